@@ -17,7 +17,7 @@ from cns_drake.ray_casting.embree_packets import (
     Tree,
     cast_packets,
 )
-from cns_drake.ray_casting.embree_placing import place_instances
+from cns_drake.ray_casting.embree_placing import Setters, place_instances
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
@@ -73,10 +73,7 @@ class EmbreeHierarchy:
         self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
         self._lib = embree.load()
         # Finding these addresses takes longer than placing ten instances.
-        self._set_transform = embree.address_of(
-            self._lib.rtcSetGeometryTransform
-        )
-        self._commit_geometry = embree.address_of(self._lib.rtcCommitGeometry)
+        self._setters = Setters.of(self._lib)
         if previous is None:
             self._device = self._lib.rtcNewDevice(embree.ALONE)
         else:
@@ -158,30 +155,18 @@ class EmbreeHierarchy:
 
     def place(self, placed: Placed) -> None:
         """Moves groups to their places, if they are in sight."""
-        mine = self._instances[placed.rows] != 0
-        if not mine.any():
-            return
-        rows, X_OLs, in_sight, moves = (one[mine] for one in placed)
-        # Fewer instances are faster to build and to cast on.
-        for row in rows[in_sight == self._is_disabled[rows]]:
-            change = self._lib.rtcDisableGeometry
-            if self._is_disabled[row]:
-                change = self._lib.rtcEnableGeometry
-            change(int(self._instances[row]))
-        self._is_disabled[rows] = ~in_sight
-        for row in rows[in_sight & moves]:
-            self._set_motion(row)
-        still = in_sight & ~moves
-        for row in rows[still & self._in_motion[rows]]:
-            self._lib.rtcSetGeometryTimeStepCount(int(self._instances[row]), 1)
-        self._in_motion[rows[in_sight]] = moves[in_sight]
-        place_instances(
-            self._set_transform,
-            self._commit_geometry,
-            self._instances[rows[still]],
-            X_OLs[still].astype(np.float32),
+        for row in placed.rows[placed.in_sight & placed.moves]:
+            if self._instances[row]:
+                self._set_motion(row)
+        has_changed = place_instances(
+            self._setters,
+            placed,
+            self._instances,
+            self._is_disabled,
+            self._in_motion,
         )
-        self._lib.rtcJoinCommitScene(self._top)
+        if has_changed:
+            self._lib.rtcJoinCommitScene(self._top)
 
     def _set_motion(self, row: int) -> None:
         """Gives Embree the motion of a group during a cast."""

@@ -149,22 +149,18 @@ class MovingGroups:
             return NOTHING_PLACED
         frames = self._frames
         X_WFs, rows = self._find_poses(calc_X_WF, known)
-        moves = np.zeros(len(frames), bool)
+        moves, reaches = np.zeros(len(frames), bool), self._radii
         if motions:
             moves = np.array([frame in motions for frame in frames])
-        reaches = self._radii.copy()
-        for k in np.flatnonzero(moves):
-            motion = motions[frames[k]]
-            reaches[k] += np.linalg.norm(motion.v) * motion.duration
-        anew = moves | self._was_in_motion
-        differs = np.empty(len(frames), bool)
-        shown = np.empty(len(frames), bool)
-        _place_all(
-            X_WFs, rows, self._X_FLs, self._p_WO, seen, reaches, anew,
-            self._in_sight, self._X_OLs, shown, differs,
+            reaches = reaches.copy()
+            for k in np.flatnonzero(moves):
+                motion = motions[frames[k]]
+                reaches[k] += np.linalg.norm(motion.v) * motion.duration
+        placed, changed = _place_all(
+            X_WFs, rows, self._X_FLs, self._p_WO, seen, reaches,
+            moves | self._was_in_motion, self._in_sight, self._X_OLs,
         )  # fmt: skip
-        placed = np.flatnonzero(differs)
-        for k in placed[(shown | anew)[placed]]:
+        for k in changed:
             group = self._groups[self._rows[k]]
             group.motion = motions[frames[k]] if moves[k] else None
             group.in_sight = bool(self._in_sight[k])
@@ -209,9 +205,7 @@ def _place_all(
     anew: np.ndarray,
     in_sight: np.ndarray,
     X_OLs: np.ndarray,
-    shown: np.ndarray,
-    differs: np.ndarray,
-) -> None:
+) -> tuple[np.ndarray, np.ndarray]:
     """Places G groups that are in sight, or were.
 
     NumPy takes five times as long, for passes over many small matrices.
@@ -226,20 +220,25 @@ def _place_all(
         anew: (G,) whether each is placed even if it has not moved.
         in_sight: (G,) whether each was in sight, to update.
         X_OLs: (G, 3, 4) their places, to update.
-        shown: (G,) to fill: whether each has come in sight or left it.
-        differs: (G,) to fill: whether each is placed.
+
+    Returns:
+        The groups that are placed; and those of them that have come in sight,
+        have left it, or are placed even if they have not moved.
     """
+    placed = np.empty(len(rows), np.int64)
+    changed = np.empty(len(rows), np.int64)
+    num_placed = num_changed = 0
     for k in range(len(rows)):
         X_WF, X_FL = X_WFs[rows[k]], X_FLs[k]
         square = 0.0
         for i in range(3):
             square += (X_WF[i, 3] - seen.p_W[i]) ** 2
         sees = np.sqrt(square) <= seen.radius + reaches[k]
-        shown[k] = sees != in_sight[k]
+        shown = sees != in_sight[k]
         in_sight[k] = sees
-        differs[k] = (sees and anew[k]) or shown[k]
-        if not (sees or shown[k]):
+        if not (sees or shown):
             continue
+        is_changed = differs = shown or anew[k]
         for i in range(3):
             for j in range(4):
                 value = 0.0
@@ -247,8 +246,15 @@ def _place_all(
                     value += X_WF[i, n] * X_FL[n, j]
                 if j == 3:
                     value -= p_WO[i]
-                differs[k] |= value != X_OLs[k, i, j]
+                differs |= value != X_OLs[k, i, j]
                 X_OLs[k, i, j] = value
+        if differs:
+            placed[num_placed] = k
+            num_placed += 1
+        if is_changed:
+            changed[num_changed] = k
+            num_changed += 1
+    return placed[:num_placed], changed[:num_changed]
 
 
 def _radius_about_F(group: RayGroup) -> float:
