@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import functools
-import sys
+import struct
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,9 @@ from cns_drake.base.recordings.ros_types import (
 MAP_FRAME = "map"
 BASE_FRAME = "base_link"
 IMU_FRAME = "imu"
+_NS_PER_S = 1_000_000_000
+# Stands for numbers that change, in a message that is made once.
+_MARK = 0x5A17C0DE
 
 
 def encode_point_cloud(
@@ -48,28 +51,48 @@ def encode_point_cloud(
     """
     size = points.dtype.itemsize
     rows = np.ascontiguousarray(points).view(np.uint8).reshape(-1, size)
-    fields, padding = _point_fields(points.dtype)
+    _, padding = _point_fields(points.dtype)
     if any(rows[:, column].any() for column in padding):
         rows = rows.copy()
         for column in padding:
             rows[:, column] = 0
-    head = ros_types.serialize(
+    start, middle, steps, end = _cloud_frame(points.dtype, frame_id)
+    stamp = struct.pack("=iI", *divmod(stamp_ns, _NS_PER_S))
+    width, length = (struct.pack("=I", n) for n in (len(rows), rows.nbytes))
+    # The data follow their length twice: of a row, and of the whole. Records
+    # are copied once here, and three times by the serialiser.
+    return b"".join(
+        [start, stamp, middle, width, steps, length, length, rows.data, end]
+    )
+
+
+@functools.cache
+def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
+    """Returns what is about the stamp, the width and the data of a cloud.
+
+    Args:
+        dtype: of its records.
+        frame_id: see `encode_point_cloud`.
+    """
+    time = message_class("builtin_interfaces/msg/Time")
+    data = ros_types.serialize(
         message_class(POINT_CLOUD)(
-            header=make_header(frame_id, stamp_ns),
+            header=message_class("std_msgs/msg/Header")(
+                stamp=time(sec=_MARK, nanosec=_MARK), frame_id=frame_id
+            ),
             height=1,
-            width=len(rows),
-            fields=list(fields),
+            width=_MARK,
+            fields=list(_point_fields(dtype)[0]),
             is_bigendian=False,
-            point_step=size,
-            row_step=rows.nbytes,
+            point_step=dtype.itemsize,
+            row_step=_MARK,
             data=np.zeros(0, np.uint8),
             is_dense=True,
         )
     )
+    start, _, middle, steps, end = data.split(struct.pack("=I", _MARK))
     # The message ends with the length of the data, the data and one byte.
-    # Records are copied once here, and three times by the serialiser.
-    length = rows.nbytes.to_bytes(4, sys.byteorder)
-    return b"".join([head[:-5], length, rows.reshape(-1).data, head[-1:]])
+    return [start, middle, steps, end[-1:]]
 
 
 @functools.cache
@@ -212,7 +235,7 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
 
 def make_header(frame_id: str, stamp_ns: int) -> Any:
     """Returns the header of a message."""
-    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    sec, nanosec = divmod(stamp_ns, _NS_PER_S)
     time = message_class("builtin_interfaces/msg/Time")
     return message_class("std_msgs/msg/Header")(
         stamp=time(sec=sec, nanosec=nanosec), frame_id=frame_id
