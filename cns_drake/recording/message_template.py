@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from cns_drake.base.recordings.ros_types import serialize
 
 # Placeholders of numbers in a message: this and the following integers, which
@@ -86,8 +87,28 @@ class MessageTemplate:
         """
         data = np.tile(self._data, (len(numbers), 1))
         floats, words = self._views(data)
-        floats[:, self._places] = numbers[:, self._which]
         times = np.array([divmod(one, _NS_PER_S) for one in stamps_ns])
+        _fill_in(floats, self._places, numbers, self._which)
         words[:, self._stamps] = times[:, :1]
         words[:, self._stamps + 1] = times[:, 1:]
         return [row.tobytes() for row in data]
+
+
+@compiled
+def _fill_in(
+    floats: np.ndarray,
+    places: np.ndarray,
+    numbers: np.ndarray,
+    which: np.ndarray,
+) -> None:
+    """Fills in numbers: NumPy takes three times as long.
+
+    Args:
+        floats: (K, F) all that can be a number in each of K messages, to fill.
+        places: (P,) of numbers.
+        numbers: (K, N).
+        which: (P,) the number at each place.
+    """
+    for k in range(len(floats)):
+        for n in range(len(places)):
+            floats[k, places[n]] = numbers[k, which[n]]
