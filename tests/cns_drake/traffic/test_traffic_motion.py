@@ -1,5 +1,7 @@
 """Traffic in a diagram: poses, labels, and points on the bodies."""
 
+from dataclasses import replace
+
 import numpy as np
 from pydrake.geometry import Role, SceneGraph
 from pydrake.math import RigidTransform, RotationMatrix
@@ -181,6 +183,37 @@ def test_points_in_boxes_are_those_of_instances(scanned):
     assert moving == [101, 103, 104]
     np.testing.assert_allclose(np.linalg.norm(objects.v_WO[0]), 6.0, rtol=2e-4)
     assert objects.yaw_rate[0] == pytest.approx(0.3, rel=1e-6)
+
+
+def test_objects_come_and_go():
+    plan = make_plan()
+    # The second vehicle is there from 0.8 to 3.0 s alone.
+    present = np.ones((60, 3), bool)
+    present[:8, 1] = present[31:, 1] = False
+    vehicles = Tracks(plan.vehicles.dt, plan.vehicles.values, present)
+    traffic = make_traffic(SceneGraph(), replace(plan, vehicles=vehicles))
+    context = traffic.CreateDefaultContext()
+    port = traffic.GetOutputPort("objects")
+    ids = {}
+    for time in (0.5, 1.0, 2.9, 3.2, 2.0):
+        context.SetTime(time)
+        objects = port.Eval(context)
+        ids[time] = objects.instance.tolist()
+        assert len(objects.names) == len(objects.semantic_classes)
+        assert objects.sizes.tolist() == [
+            [*plan.kinds[k - 1].size] if k < 4 else [*WALKER_SIZE]
+            for k in ids[time]
+        ]
+        assert objects.p_WO.shape == (len(ids[time]), 3)
+        # The bicycle keeps its line, whichever row it has.
+        assert objects.p_WO[ids[time].index(3), 0] == pytest.approx(-9)
+    assert ids == {
+        0.5: [1, 3, 4, 5],
+        1.0: [1, 2, 3, 4, 5],
+        2.9: [1, 2, 3, 4, 5],
+        3.2: [1, 3, 4, 5],
+        2.0: [1, 2, 3, 4, 5],
+    }
 
 
 def test_poses_as_one_array_are_those_of_the_scene_graph(scanned):
