@@ -24,7 +24,7 @@ import time
 # Distance of neighbouring houses, and houses of a block in each direction.
 SPACING = 24.0
 BLOCK = 5
-# Of the first house.
+# Where the first house stands [deg].
 LATITUDE, LONGITUDE = 52.0, 13.0
 METRES_PER_DEG = 111_195.0
 
