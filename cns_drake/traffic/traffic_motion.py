@@ -148,8 +148,6 @@ class TrafficMotion(LeafSystem):
             [kind.size for kind in plan.kinds]
             + [WALKER_SIZE] * (len(bodies) - len(plan.kinds))
         ).reshape(-1, 3)
-        # Which bodies were there last, and what does not change of them.
-        self._there: tuple[bytes, np.ndarray, tuple] | None = None
         now = {self.time_ticket()}
         self._blocks = TickBlocks(self._moments, turn, _BLOCK)
         self._moment = self.DeclareCacheEntry(
@@ -240,30 +238,17 @@ class TrafficMotion(LeafSystem):
 
     def _calc_objects(self, context: Context, output: AbstractValue) -> None:
         moment: _Moment = self._moment.Eval(context)
-        who = moment.present.tobytes()
-        if self._there is None or self._there[0] != who:
-            rows = np.flatnonzero(moment.present)
-            self._there = who, rows, self._constants(rows)
-        _, rows, (instances, names, classes, sizes) = self._there
+        rows = np.flatnonzero(moment.present)
         output.set_value(
             TrafficObjects(
-                instances,
-                names,
-                classes,
+                self._instances[rows],
+                tuple(self._names[rows].tolist()),
+                tuple(self._classes[rows].tolist()),
                 moment.p_WO[rows],
                 moment.quat_xyzw[rows],
-                sizes,
+                self._sizes[rows],
                 moment.v_WB[rows],
                 moment.yaw_rate[rows],
                 moment.is_moving[rows],
             )
-        )
-
-    def _constants(self, rows: np.ndarray) -> tuple:
-        """Returns instances, names, classes and sizes of some bodies."""
-        return (
-            self._instances[rows],
-            tuple(self._names[rows].tolist()),
-            tuple(self._classes[rows].tolist()),
-            self._sizes[rows],
         )
