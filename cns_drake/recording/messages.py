@@ -29,8 +29,9 @@ MAP_FRAME = "map"
 BASE_FRAME = "base_link"
 IMU_FRAME = "imu"
 _NS_PER_S = 1_000_000_000
-# Stands for numbers that change, in a message that is made once.
-_MARK = 0x5A17C0DE
+# Stands for numbers that change, in a message that is made once. It can be the
+# nanoseconds of a stamp, and no part of a text.
+_MARK = 0x3A17C0DE
 
 
 def encode_point_cloud(
@@ -74,12 +75,9 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
         dtype: of its records.
         frame_id: see `encode_point_cloud`.
     """
-    time = message_class("builtin_interfaces/msg/Time")
     data = ros_types.serialize(
         message_class(POINT_CLOUD)(
-            header=message_class("std_msgs/msg/Header")(
-                stamp=time(sec=_MARK, nanosec=_MARK), frame_id=frame_id
-            ),
+            header=make_header(frame_id, _MARK * _NS_PER_S + _MARK),
             height=1,
             width=_MARK,
             fields=list(_point_fields(dtype)[0]),
