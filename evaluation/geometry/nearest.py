@@ -1,8 +1,8 @@
 """The nearest point of a cloud for each point of another one.
 
 The cloud is sorted into the cells of a grid, which are searched from the cell
-of a point outwards. For clouds of surfaces this takes half of the time of
-a tree.
+of a point outwards. For clouds of surfaces this takes half of the time of a
+tree.
 """
 
 from __future__ import annotations
@@ -43,12 +43,13 @@ class NearestPoints:
         self._size = float(np.cbrt(volume / (_CELLS * len(filled))))
         self._shape = (sides / self._size).astype(np.int64) + 1
         place = ((cloud - self._low) / self._size).astype(np.int64)
-        _, rows, layers = self._shape
-        cells = (place[:, 0] * rows + place[:, 1]) * layers + place[:, 2]
-        self._order = stable_order(cells)
+        cells = np.ravel_multi_index(place.T, self._shape)
+        order = stable_order(cells)
+        # The last entry serves points without a nearest one.
+        self._order = np.append(order, len(order))
         counts = np.bincount(cells, minlength=int(self._shape.prod()))
         self._starts = np.concatenate([[0], np.cumsum(counts)])
-        self._cloud = np.ascontiguousarray(cloud[self._order])
+        self._cloud = cloud.take(order, axis=0)
 
     def find(
         self, points: np.ndarray, limit: float = math.inf
@@ -72,9 +73,7 @@ class NearestPoints:
             self._size,
             self._shape,
         )
-        order = np.append(self._order, len(self._order))
-        is_found = found < len(self._order)
-        return order[found], np.where(is_found, np.sqrt(squares), np.inf)
+        return self._order[found], np.sqrt(squares)
 
 
 @compiled
@@ -121,7 +120,7 @@ def _search(
         shape: (3,) numbers of cells.
     """
     found = np.full(len(points), len(cloud))
-    squares = np.full(len(points), limit)
+    squares = np.full(len(points), math.inf)
     own = np.empty(3, np.int64)
     for i in range(len(points)):
         p = points[i]
@@ -165,5 +164,6 @@ def _search(
                                 p, cloud, start, stop, nearest, least
                             )
             ring += 1
-        found[i], squares[i] = nearest, least
+        if nearest < len(cloud):
+            found[i], squares[i] = nearest, least
     return found, squares
