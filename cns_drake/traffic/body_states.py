@@ -40,9 +40,12 @@ class BodyStates(NamedTuple):
     swing: np.ndarray
 
     @property
-    def R_WB(self) -> np.ndarray:
-        """The (N, 3, 3) orientations."""
-        return _matrices(self.yaw, self.pitch)
+    def up_W(self) -> np.ndarray:
+        """The (N, 3) upward axes."""
+        (cy, sy), (cp, sp) = (
+            (np.cos(a), np.sin(a)) for a in (self.yaw, self.pitch)
+        )
+        return np.stack([cy * sp, sy * sp, cp], axis=-1)
 
     @property
     def quat_xyzw(self) -> np.ndarray:
@@ -89,20 +92,14 @@ class LimbTable:
         self._swing = np.array([limb.swing for limb in limbs])
 
     def poses(self, states: BodyStates) -> np.ndarray:
-        """Returns X_WL (M, 4, 4) of all limbs.
-
-        At T times it has one more dimension, the first.
-        """
+        """Returns X_WL (M, 4, 4) of all limbs at a time."""
         angles = (states.yaw, states.pitch, self._angles(states)[1])
-        trig = [np.atleast_2d(f(a)) for a in angles for f in (np.cos, np.sin)]
-        p_WB = np.where(states.present[..., None], states.p_WB, _AWAY)
-        num_limbs = len(self.body)
-        X_WLs = np.empty((len(trig[0]), num_limbs, 4, 4))
+        X_WLs = np.empty((len(self.body), 4, 4))
         _pose_limbs(
-            X_WLs, self.body, self._joint, p_WB.reshape(-1, *p_WB.shape[-2:]),
-            *trig,
+            X_WLs, self.body, self._joint, states.p_WB, states.present,
+            *(f(a) for a in angles for f in (np.cos, np.sin)),
         )  # fmt: skip
-        return X_WLs.reshape(*states.yaw.shape[:-1], num_limbs, 4, 4)
+        return X_WLs
 
     def quat_xyzw(self, states: BodyStates) -> np.ndarray:
         """Returns the (M, 4) orientations of all limbs."""
@@ -124,6 +121,7 @@ def _pose_limbs(
     body: np.ndarray,
     joint: np.ndarray,
     p_WB: np.ndarray,
+    present: np.ndarray,
     cos_yaw: np.ndarray,
     sin_yaw: np.ndarray,
     cos_pitch: np.ndarray,
@@ -131,43 +129,42 @@ def _pose_limbs(
     cos_limb: np.ndarray,
     sin_limb: np.ndarray,
 ) -> None:
-    """Fills in the poses of M limbs at T times; see `_matrices`.
+    """Fills in the poses of M limbs, which turn about y, then about z.
 
     Args:
-        X_WLs: (T, M, 4, 4) to fill.
+        X_WLs: (M, 4, 4) to fill.
         body: (M,) of each limb.
         joint: (M, 3) its origin in the frame of the body.
-        p_WB: (T, N, 3) of the bodies.
-        cos_yaw, sin_yaw, cos_pitch, sin_pitch: (T, N) of the bodies.
-        cos_limb, sin_limb: (T, M) of the pitches of limbs.
+        p_WB: (N, 3) of the bodies.
+        present: (N,) whether each is there; others are put away.
+        cos_yaw, sin_yaw, cos_pitch, sin_pitch: (N,) of the bodies.
+        cos_limb, sin_limb: (M,) of the pitches of limbs.
     """
-    for k in range(X_WLs.shape[0]):
-        for m in range(X_WLs.shape[1]):
-            X, n, p = X_WLs[k, m], body[m], joint[m]
-            cy, sy = cos_yaw[k, n], sin_yaw[k, n]
-            cp, sp = cos_limb[k, m], sin_limb[k, m]
-            X[0, 0], X[0, 1], X[0, 2] = cy * cp, -sy, cy * sp
-            X[1, 0], X[1, 1], X[1, 2] = sy * cp, cy, sy * sp
-            X[2, 0], X[2, 1], X[2, 2] = -sp, 0.0, cp
-            X[3, 0], X[3, 1], X[3, 2], X[3, 3] = 0.0, 0.0, 0.0, 1.0
-            cp, sp = cos_pitch[k, n], sin_pitch[k, n]
-            p_W = p_WB[k, n]
-            X[0, 3] = p_W[0] + (cy * cp * p[0] - sy * p[1] + cy * sp * p[2])
-            X[1, 3] = p_W[1] + (sy * cp * p[0] + cy * p[1] + sy * sp * p[2])
-            X[2, 3] = p_W[2] + (cp * p[2] - sp * p[0])
-
-
-def _matrices(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
-    """Returns (..., 3, 3) rotations about y, then about z [rad]."""
-    (cy, sy), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch))
-    R = np.zeros((*yaw.shape, 3, 3))
-    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cp, -sy, cy * sp
-    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, cy, sy * sp
-    R[..., 2, 0], R[..., 2, 2] = -sp, cp
-    return R
+    for m in range(len(body)):
+        X, n, p = X_WLs[m], body[m], joint[m]
+        cy, sy = cos_yaw[n], sin_yaw[n]
+        cp, sp = cos_limb[m], sin_limb[m]
+        X[0, 0], X[0, 1], X[0, 2] = cy * cp, -sy, cy * sp
+        X[1, 0], X[1, 1], X[1, 2] = sy * cp, cy, sy * sp
+        X[2, 0], X[2, 1], X[2, 2] = -sp, 0.0, cp
+        X[3, 0], X[3, 1], X[3, 2], X[3, 3] = 0.0, 0.0, 0.0, 1.0
+        cp, sp = cos_pitch[n], sin_pitch[n]
+        for i in range(3):
+            X[i, 3] = p_WB[n, i] if present[n] else _AWAY[i]
+        X[0, 3] += cy * cp * p[0] - sy * p[1] + cy * sp * p[2]
+        X[1, 3] += sy * cp * p[0] + cy * p[1] + sy * sp * p[2]
+        X[2, 3] += cp * p[2] - sp * p[0]
 
 
 def _quaternions(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
-    """Returns the rotations of `_matrices` as (..., 4) quaternions, x y z w."""
+    """Returns rotations about y, then about z [rad], as (..., 4) quaternions.
+
+    Args:
+        yaw: (...) angle about z.
+        pitch: (...) angle about y.
+
+    Returns:
+        Unit quaternions, x y z w.
+    """
     (cy, sy), (cp, sp) = ((np.cos(a / 2), np.sin(a / 2)) for a in (yaw, pitch))
     return np.stack([-sy * sp, cy * sp, sy * cp, cy * cp], axis=-1)

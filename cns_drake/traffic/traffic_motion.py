@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.motion.tick_blocks import TickBlocks
 from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.body_states import LimbTable, bodies_at
+from cns_drake.traffic.body_states import BodyStates, LimbTable, bodies_at
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
 # Faster bodies are labelled as moving, slower ones as standing [m/s].
@@ -49,6 +49,20 @@ class TrafficObjects(NamedTuple):
     yaw_rate: np.ndarray
     is_moving: np.ndarray
 
+    def select(self, rows: np.ndarray) -> TrafficObjects:
+        """Returns those of some rows."""
+        return TrafficObjects(
+            self.instance[rows],
+            tuple(self.names[row] for row in rows),
+            tuple(self.semantic_classes[row] for row in rows),
+            self.p_WO[rows],
+            self.quat_xyzw[rows],
+            self.sizes[rows],
+            self.v_WO[rows],
+            self.yaw_rate[rows],
+            self.is_moving[rows],
+        )
+
 
 class TrafficBody(NamedTuple):
     """A vehicle or a walker.
@@ -69,27 +83,19 @@ class TrafficBody(NamedTuple):
 
 
 class _Moment(NamedTuple):
-    """The N bodies and M limbs at a time.
-
-    At T times, each array has one more dimension, the first.
+    """The N bodies at a time; at T times, arrays have one more dimension.
 
     Attributes:
-        X_WLs: (M, 4, 4) poses of the limbs.
-        p_WO: (N, 3) middles of the bodies' boxes [m].
-        quat_xyzw: (N, 4) their orientations.
-        v_WB: (N, 3) velocities [m/s].
-        yaw_rate: (N,) [rad/s].
+        states: of the bodies.
+        p_WO: (N, 3) middles of their boxes [m].
+        quat_xyzw: (N, 4) orientations of the boxes.
         is_moving: (N,) whether each is labelled as moving.
-        present: (N,) whether it is there.
     """
 
-    X_WLs: np.ndarray
+    states: BodyStates
     p_WO: np.ndarray
     quat_xyzw: np.ndarray
-    v_WB: np.ndarray
-    yaw_rate: np.ndarray
     is_moving: np.ndarray
-    present: np.ndarray
 
 
 class TrafficMotion(LeafSystem):
@@ -142,8 +148,8 @@ class TrafficMotion(LeafSystem):
         self._plant_context = plant.CreateDefaultContext()
         self._turn = turn
         self._instances = np.array([b.instance for b in bodies], np.uint16)
-        self._names = np.array([b.name for b in bodies], object)
-        self._classes = np.array([b.semantic_class for b in bodies], object)
+        self._names = tuple(b.name for b in bodies)
+        self._classes = tuple(b.semantic_class for b in bodies)
         self._sizes = np.array(
             [kind.size for kind in plan.kinds]
             + [WALKER_SIZE] * (len(bodies) - len(plan.kinds))
@@ -189,26 +195,26 @@ class TrafficMotion(LeafSystem):
         return {frame: k for k, frame in enumerate(self._frames)}
 
     def _calc_moment(self, context: Context, value: AbstractValue) -> None:
-        value.set_value(_Moment(*self._blocks.at(context.get_time())))
+        rows = self._blocks.at(context.get_time())
+        num_states = len(BodyStates._fields)
+        states = BodyStates(*rows[:num_states])
+        value.set_value(_Moment(states, *rows[num_states:]))
 
-    def _moments(self, times: np.ndarray) -> _Moment:
-        """Returns the bodies at (T,) times [s]."""
+    def _moments(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Returns the states, and what is left of a `_Moment`, at (T,) times.
+
+        Poses of limbs are left out: those of many times do not fit a cache.
+        """
         states = bodies_at(self._plan, times)
-        up = states.R_WB[..., 2]
-        return _Moment(
-            self._limbs.poses(states),
-            states.p_WB + up * self._sizes[:, 2:] / 2,
-            states.quat_xyzw,
-            states.v_WB,
-            states.yaw_rate,
-            states.speed > MOVING_SPEED,
-            states.present,
-        )
+        p_WO = states.p_WB + states.up_W * self._sizes[:, 2:] / 2
+        is_moving = states.speed > MOVING_SPEED
+        return (*states, p_WO, states.quat_xyzw, is_moving)
 
     def _calc_frame_poses(
         self, context: Context, output: AbstractValue
     ) -> None:
-        output.set_value(self._moment.Eval(context).X_WLs)
+        moment: _Moment = self._moment.Eval(context)
+        output.set_value(self._limbs.poses(moment.states))
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
         states = bodies_at(self._plan, context.get_time())
@@ -238,17 +244,18 @@ class TrafficMotion(LeafSystem):
 
     def _calc_objects(self, context: Context, output: AbstractValue) -> None:
         moment: _Moment = self._moment.Eval(context)
-        rows = np.flatnonzero(moment.present)
-        output.set_value(
-            TrafficObjects(
-                self._instances[rows],
-                tuple(self._names[rows].tolist()),
-                tuple(self._classes[rows].tolist()),
-                moment.p_WO[rows],
-                moment.quat_xyzw[rows],
-                self._sizes[rows],
-                moment.v_WB[rows],
-                moment.yaw_rate[rows],
-                moment.is_moving[rows],
-            )
+        states = moment.states
+        objects = TrafficObjects(
+            self._instances,
+            self._names,
+            self._classes,
+            moment.p_WO,
+            moment.quat_xyzw,
+            self._sizes,
+            states.v_WB,
+            states.yaw_rate,
+            moment.is_moving,
         )
+        if not states.present.all():
+            objects = objects.select(np.flatnonzero(states.present))
+        output.set_value(objects)

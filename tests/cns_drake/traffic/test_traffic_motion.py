@@ -245,6 +245,7 @@ def test_limbs_stay_in_the_walkers_box():
     half = np.array(WALKER_SIZE) / 2
     for t in np.linspace(1, 2, 21):
         states = bodies_at(plan, t)
+        R_WB = Rotation.from_quat(states.quat_xyzw).as_matrix()
         X_WLs = traffic._limbs.poses(states)
         R_WL, p_WL = X_WLs[:, :3, :3], X_WLs[:, :3, 3]
         for frame, k in traffic.moving_frames.items():
@@ -256,5 +257,5 @@ def test_limbs_stay_in_the_walkers_box():
                 for end in (-1, 1):
                     p_L = X @ np.array([0, 0, end * shape.length() / 2])
                     p_W = p_WL[k] + R_WL[k] @ p_L - states.p_WB[body]
-                    p_B = states.R_WB[body].T @ p_W - (0, 0, half[2])
+                    p_B = R_WB[body].T @ p_W - (0, 0, half[2])
                     assert (np.abs(p_B) + shape.radius() <= half + 1e-9).all()
