@@ -221,20 +221,6 @@ def voxelise(
     return accumulator.to_map(), ignored
 
 
-def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
-    """Returns the voxel centroids of a cloud in the frame of a sensor.
-
-    Args:
-        points: (N, 3) [m]; points that are not finite are left out.
-        voxel_size: length of a voxel's side [m].
-
-    Returns:
-        (V, 3), sorted by voxel.
-    """
-    cells, _ = voxelise(point_arrays.from_xyz(points), voxel_size)
-    return cells.centroids_W
-
-
 def map_sequence(
     sequence: Sequence,
     voxel_size: float = VOXEL_SIZE,

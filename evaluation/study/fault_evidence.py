@@ -17,7 +17,7 @@ from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence as Drive
 from evaluation.geometry.nearest import NearestPoints
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.thinning import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap
 from evaluation.methods.overlap_coarse import LayeredScan

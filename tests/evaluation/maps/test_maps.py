@@ -6,7 +6,6 @@ from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import (
     VoxelAccumulator,
     map_sequence,
-    thin,
     voxelise,
 )
 from evaluation.sequences import open_sequence
@@ -189,13 +188,6 @@ def test_empty_map():
     assert ignored == 0
     assert voxels.centroids_W.shape == (0, 3)
     assert VoxelAccumulator(5.0, 10).samples().shape == (0, 3)
-
-
-def test_thin():
-    points = np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [-0.1, 0.1, 0.1]])
-    np.testing.assert_allclose(
-        thin(points, 0.5), [[-0.1, 0.1, 0.1], [0.2, 0.1, 0.1]], atol=1e-12
-    )
 
 
 def test_map_of_a_recording(tmp_path):
