@@ -16,7 +16,7 @@ from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence as Drive
-from evaluation.geometry.nearest import NearestPoints
+from evaluation.geometry.coinciding import CoincidingPoints
 from evaluation.maps.thinning import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap
@@ -215,9 +215,9 @@ class _Shown:
         return thin(self.points[self.points[:, 2] > _standing()], _CELL)
 
     @cached_property
-    def nearest(self) -> NearestPoints:
-        """Finds the nearest of the standing points."""
-        return NearestPoints(self.standing)
+    def coinciding(self) -> CoincidingPoints:
+        """Compares the standing points with others."""
+        return CoincidingPoints(self.standing, _COINCIDENT)
 
     @cached_property
     def some(self) -> np.ndarray:
@@ -291,11 +291,7 @@ class _Aligner:
         for k, X_PQ in zip(standing, poses, strict=True):
             if X_PQ is not None:
                 moved = transform(X_PQ, query.standing)
-                place = places[k]
-                shared[k] = min(
-                    _met(moved, place.nearest),
-                    _met(place.standing, NearestPoints(moved)),
-                )
+                shared[k] = min(places[k].coinciding.shares(moved))
         return shared
 
     def _place(self, place: _Shown) -> LayeredScan:
@@ -303,12 +299,6 @@ class _Aligner:
         if place not in self._places:
             self._places[place] = self._method.describe_place(place.points)
         return self._places[place]
-
-
-def _met(points: np.ndarray, others: NearestPoints) -> float:
-    """Returns the part of points that have a counterpart nearby."""
-    _, distances = others.find(points, _COINCIDENT)
-    return float(np.isfinite(distances).mean())
 
 
 def _standing() -> float:
