@@ -13,6 +13,7 @@ of scans that were taken up to 30 m away, and more beyond
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
 from typing import NamedTuple
 
@@ -31,6 +32,8 @@ _FARTHEST = 3.0
 # Numbers of cells in elevation and in azimuth; a cell has a width of 1 deg.
 _UP, _SIDE = 2, 1
 _ROWS, _COLUMNS = 180, 360
+# Squares are compared with this margin, against rounding.
+_MARGIN = 1.0 + 1e-9
 _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
@@ -55,13 +58,11 @@ class SeenSurfaces:
         angles_deg: (N, 2) elevation from -90 deg on, and azimuth from the
             back on.
         starts: of each cell in the points, row by row; the last is N.
-        reach: of the farthest return [m].
     """
 
     points: np.ndarray
     angles_deg: np.ndarray
     starts: np.ndarray
-    reach: float
 
     @classmethod
     def of(cls, points: np.ndarray) -> SeenSurfaces:
@@ -77,11 +78,17 @@ class SeenSurfaces:
         order = np.argsort(cells.astype(np.uint16), kind="stable")
         counts = np.bincount(cells, minlength=_ROWS * _COLUMNS)
         return cls(
-            points=np.ascontiguousarray(points[order], dtype=np.float64),
-            angles_deg=np.stack([elevation, azimuth], axis=1)[order],
+            points=points.take(order, axis=0).astype(np.float64, copy=False),
+            angles_deg=np.stack(
+                [elevation.take(order), azimuth.take(order)], axis=1
+            ),
             starts=np.concatenate([[0], np.cumsum(counts)]),
-            reach=float(np.linalg.norm(points, axis=1).max(initial=0.0)),
         )
+
+    @cached_property
+    def reach(self) -> float:
+        """Distance of the farthest return [m]."""
+        return float(np.linalg.norm(self.points, axis=1).max(initial=0.0))
 
     def share_of(self, points: np.ndarray) -> float:
         """Returns which part of points (N, 3) is shown; NaN without points.
@@ -157,9 +164,9 @@ def _find_corners(
                 side -= 180.0
                 quadrant = 2 * int(up >= 0.0) + int(side >= 0.0)
                 across = side * shrink
-                # Square roots are slow, and one coordinate alone shows that
-                # most returns are too far.
-                if max(abs(up), abs(across)) >= away[quadrant]:
+                # Square roots are slow, and squares show which are too far.
+                square = up * up + across * across
+                if square > away[quadrant] * away[quadrant] * _MARGIN:
                     continue
                 distance = math.hypot(up, across)
                 if distance < away[quadrant]:

@@ -224,6 +224,11 @@ class _Shown:
         """(M, 3) some of the points, drawn at random."""
         return sampled(self.points)
 
+    @cached_property
+    def some_instances(self) -> np.ndarray | None:
+        """(M,) their instances."""
+        return None if self.instances is None else sampled(self.instances)
+
     def seen_from(self, other: _Shown) -> np.ndarray:
         """Returns some points in the frame of another scan's sensor."""
         X_OS = inverse(other.X_WS) @ self.X_WS
@@ -246,9 +251,9 @@ def _change(
     changed: Counter[str] = Counter()
     total = 0
     for one, other in ((place, query), (query, place)):
-        if one.instances is None or other.instances is None:
+        points, instances = one.some, one.some_instances
+        if instances is None or other.instances is None:
             return math.nan, ""
-        points, instances = one.some, sampled(one.instances)
         is_standing = points[:, 2] > _standing()
         total += int(is_standing.sum())
         is_gone = is_standing & ~np.isin(instances, other.instances)
