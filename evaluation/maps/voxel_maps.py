@@ -12,30 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base import points as point_arrays
-from cns_drake.base.compiled import compiled
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence
 from evaluation.geometry.sorting import cell_order
+from evaluation.maps.voxel_table import SLOT, enter, locate, move
 
 VOXEL_SIZE = 5.0
 Z_ORIGIN = -2.5
 
-# One slot of the hash table of voxels: the number of a voxel, how many points
-# it has (0: the slot is free), and their sum relative to its corner [m]. A slot
-# is one record, because fetching slots from memory takes most of the time.
-_SLOT = np.dtype(
-    [
-        ("ix", "i4"),
-        ("iy", "i4"),
-        ("iz", "i4"),
-        ("count", "u4"),
-        ("sx", "f8"),
-        ("sy", "f8"),
-        ("sz", "f8"),
-    ],
-    align=True,
-)
 # Number of points in a batch; the table grows between batches.
 _BATCH = 1 << 15
 # A table is at most this full, as a fraction (numerator, denominator).
@@ -116,7 +100,7 @@ class VoxelAccumulator:
         """
         self._voxel_size = voxel_size
         self._divisions = divisions
-        self._table = np.zeros(2 * _BATCH, dtype=_SLOT)
+        self._table = np.zeros(2 * _BATCH, dtype=SLOT)
         self._size = 0
         # One bit for each part of a slot's voxel: whether it has a sample.
         num_bytes = (divisions**3 + 7) // 8
@@ -124,6 +108,8 @@ class VoxelAccumulator:
         self._samples = np.empty((0, 3))
         self._num_samples = 0
         self._num_ignored = 0
+        self._columns = np.zeros((3, _BATCH))
+        self._located = np.empty((3, 3, _BATCH))
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
         """Adds a cloud.
@@ -141,15 +127,22 @@ class VoxelAccumulator:
         X[2, 3] -= Z_ORIGIN
         ignored = 0
         for start in range(0, len(points), _BATCH):
-            batch = point_arrays.xyz(points[start : start + _BATCH])
+            batch = points[start : start + _BATCH]
+            # NumPy warns when it converts some NaN.
+            with np.errstate(invalid="ignore"):
+                for column, name in zip(self._columns, "xyz", strict=True):
+                    column[: len(batch)] = batch[name]
             self._reserve(len(batch))
-            self._size, self._num_samples, skipped = _add_points(
-                batch,
-                X,
-                self._voxel_size,
+            locate(
+                self._columns, len(batch), X, self._voxel_size, self._located
+            )
+            self._size, self._num_samples, skipped = enter(
+                self._located,
+                len(batch),
+                self._divisions / self._voxel_size,
+                self._divisions,
                 self._table,
                 self._size,
-                self._divisions,
                 self._sampled,
                 self._samples,
                 self._num_samples,
@@ -192,9 +185,9 @@ class VoxelAccumulator:
             # Sizes are powers of two, because slots are found by masking.
             slots *= 2
         if slots > len(self._table):
-            table = np.zeros(slots, dtype=_SLOT)
+            table = np.zeros(slots, dtype=SLOT)
             sampled = np.zeros((slots, self._sampled.shape[1]), dtype=np.uint8)
-            _move(self._table, self._sampled, table, sampled)
+            move(self._table, self._sampled, table, sampled)
             self._table, self._sampled = table, sampled
         needed = self._num_samples + number
         if self._divisions and needed > len(self._samples):
@@ -251,107 +244,3 @@ def map_sequence(
 
 def _corners(indices: np.ndarray, voxel_size: float) -> np.ndarray:
     return np.array([0.0, 0.0, Z_ORIGIN]) + indices * voxel_size
-
-
-@compiled
-def _find(
-    table: np.ndarray, ix: np.int32, iy: np.int32, iz: np.int32
-) -> np.int64:
-    """Returns the slot of a voxel, or its free slot."""
-    mask = len(table) - 1
-    # Large odd factors spread neighbouring voxels; products wrap around.
-    mixed = (
-        np.int64(ix) * np.int64(73856093)
-        ^ np.int64(iy) * np.int64(19349669)
-        ^ np.int64(iz) * np.int64(83492791)
-    )
-    mixed ^= mixed >> 15
-    slot = mixed & mask
-    while table[slot].count != 0 and not (
-        table[slot].ix == ix and table[slot].iy == iy and table[slot].iz == iz
-    ):
-        slot = (slot + 1) & mask
-    return slot
-
-
-@compiled
-def _move(
-    table: np.ndarray,
-    sampled: np.ndarray,
-    larger: np.ndarray,
-    larger_sampled: np.ndarray,
-) -> None:
-    """Enters all voxels of one table into another, empty one."""
-    for i in range(len(table)):
-        if table[i].count != 0:
-            slot = _find(larger, table[i].ix, table[i].iy, table[i].iz)
-            larger[slot] = table[i]
-            larger_sampled[slot] = sampled[i]
-
-
-@compiled
-def _add_points(
-    points: np.ndarray,
-    X: np.ndarray,
-    voxel_size: float,
-    table: np.ndarray,
-    size: int,
-    divisions: int,
-    sampled: np.ndarray,
-    samples: np.ndarray,
-    num_samples: int,
-) -> tuple[int, int, int]:
-    """Adds points (N, 3).
-
-    Returns the new size and number of samples, and how many were skipped.
-    """
-    limit = 2.0**31
-    scale = divisions / voxel_size
-    skipped = 0
-    for i in range(len(points)):
-        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        x = X[0, 0] * px + X[0, 1] * py + X[0, 2] * pz + X[0, 3]
-        y = X[1, 0] * px + X[1, 1] * py + X[1, 2] * pz + X[1, 3]
-        z = X[2, 0] * px + X[2, 1] * py + X[2, 2] * pz + X[2, 3]
-        fx = np.floor(x / voxel_size)
-        fy = np.floor(y / voxel_size)
-        fz = np.floor(z / voxel_size)
-        # A comparison with NaN is false.
-        if not (abs(fx) < limit and abs(fy) < limit and abs(fz) < limit):
-            skipped += 1
-            continue
-        ix, iy, iz = np.int32(fx), np.int32(fy), np.int32(fz)
-        slot = _find(table, ix, iy, iz)
-        if table[slot].count == 0:
-            table[slot].ix = ix
-            table[slot].iy = iy
-            table[slot].iz = iz
-            size += 1
-        dx = x - fx * voxel_size
-        dy = y - fy * voxel_size
-        dz = z - fz * voxel_size
-        table[slot].count += 1
-        table[slot].sx += dx
-        table[slot].sy += dy
-        table[slot].sz += dz
-        if divisions > 0:
-            part = _part(dx * scale, divisions)
-            part = part * divisions + _part(dy * scale, divisions)
-            part = part * divisions + _part(dz * scale, divisions)
-            bit = np.uint8(1 << (part & 7))
-            if not sampled[slot, part >> 3] & bit:
-                sampled[slot, part >> 3] |= bit
-                samples[num_samples, 0] = x
-                samples[num_samples, 1] = y
-                samples[num_samples, 2] = z
-                num_samples += 1
-    return size, num_samples, skipped
-
-
-@compiled
-def _part(place: float, divisions: int) -> int:
-    """Returns the part of a voxel's side at a place.
-
-    Rounding may put a point on an end just outside: -0.1 becomes 0 as well.
-    """
-    return min(int(place), divisions - 1)
