@@ -26,7 +26,7 @@ INVALID_ID = 0xFFFFFFFF
 # A setting of devices: room for more threads of the caller than a machine has.
 # `rtcJoinCommitScene` then builds a scene in the calling thread alone. Once
 # woken, Embree's own threads go on looking for work, and hundreds of instances
-# have none for them.
+# have none for them. A forked process would lack these threads.
 ALONE = b"user_threads=65536"
 # Rays in a packet, and RTC_DEVICE_PROPERTY_NATIVE_RAY<rays>_SUPPORTED.
 _NATIVE_PACKETS = ((8, 33), (16, 34))
@@ -67,7 +67,6 @@ def load() -> ctypes.CDLL:
         ("rtcGetDeviceProperty", ctypes.c_ssize_t, [pointer, integer]),
         ("rtcNewScene", pointer, [pointer]),
         ("rtcSetSceneFlags", None, [pointer, integer]),
-        ("rtcCommitScene", None, [pointer]),
         ("rtcJoinCommitScene", None, [pointer]),
         ("rtcRetainScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),

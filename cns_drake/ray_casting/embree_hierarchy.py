@@ -232,7 +232,7 @@ class EmbreeHierarchy:
             self._lib.rtcCommitGeometry(handle)
             self._lib.rtcAttachGeometry(scene, handle)
             self._lib.rtcReleaseGeometry(handle)
-        self._lib.rtcCommitScene(scene)
+        self._lib.rtcJoinCommitScene(scene)
         return _Built(scene, tuple(part.owners for part in parts))
 
     def _new_instance(self, scene: int) -> int:

@@ -48,11 +48,14 @@ class World:
 
     def anchored_frames(self) -> frozenset[FrameId]:
         """Returns the geometry frames that can never move."""
-        bodies = self.plant.GetBodiesWeldedTo(self.plant.world_body())
-        frames = (
-            self.plant.GetBodyFrameIdIfExists(body.index()) for body in bodies
-        )
-        return frozenset(frame for frame in frames if frame is not None)
+        return anchored_frames(self.plant)
+
+
+def anchored_frames(plant: MultibodyPlant) -> frozenset[FrameId]:
+    """Returns the geometry frames of a plant that can never move."""
+    bodies = plant.GetBodiesWeldedTo(plant.world_body())
+    frames = (plant.GetBodyFrameIdIfExists(body.index()) for body in bodies)
+    return frozenset(frame for frame in frames if frame is not None)
 
 
 def load_world(
@@ -88,12 +91,18 @@ def load_world(
 
         world = load_world(Path("my_world.sdf"))
     """
-    parsed = take_world(sdf, without=without, model_paths=model_paths)
+    parsed = take_world(
+        sdf,
+        without=without,
+        model_paths=model_paths,
+        is_whole=vehicle is None,
+    )
     plant, notes = parsed.plant, parsed.notes
     vehicle_model = None
     if vehicle is not None:
         vehicle_model = parse_models(parsed.parser, vehicle)[0]
-    plant.Finalize()
+    if not plant.is_finalized():
+        plant.Finalize()
 
     table = structures or MapFolder(sdf.parent).structures
     found = set(map(structure_name, parsed.names))

@@ -28,6 +28,7 @@ from cns_drake.scenarios.sensor_making import (
 )
 from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar import Lidar
+from cns_drake.simulation.kept_scenes import keep_scene, take_scene
 from cns_drake.simulation.planned_sequence import PlannedSequence
 from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,
@@ -57,7 +58,10 @@ class SimulatedDrive:
         return stage_group(self.scenario)
 
     def load(self) -> None:
-        keep_stage(self.scenario)
+        world = keep_stage(self.scenario, with_vehicle=False)
+        # Passing changes replace much of what such a scene would hold.
+        if self.scenario.transient.is_off:
+            keep_scene(world)
 
     def identity(self) -> dict:
         """Returns the scenario, and digests of its files and of the code."""
@@ -94,6 +98,7 @@ class SimulatedSequence(PlannedSequence):
         self._is_random = measurement.is_random or returns is not None
         # No LiDAR sees the vehicle that carries it.
         world = load_stage(scenario, with_vehicle=False, trajectory=trajectory)
+        built = take_scene(world)
         traffic = None
         if not scenario.traffic.is_off:
             plan = plan_scenario_traffic(scenario, trajectory)
@@ -121,6 +126,7 @@ class SimulatedSequence(PlannedSequence):
             posed_frames=traffic.moving_frames if traffic else None,
             structures=world.structures,
             anchored_frames=world.anchored_frames(),
+            built=built,
         )
         self._diagram = make_still_world(world, self._lidar, traffic)
         self._context = self._diagram.CreateDefaultContext()

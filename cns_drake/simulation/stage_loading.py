@@ -16,6 +16,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.kept_worlds import keep_world
+from cns_drake.scene.parsed_world import ParsedWorld
 from cns_drake.scene.world import World, load_world
 from cns_drake.traffic.lane_file import read_lanes
 from cns_drake.transient.changing import change_world
@@ -59,16 +60,22 @@ def load_stage(
     )
 
 
-def keep_stage(scenario: Scenario) -> None:
+def keep_stage(scenario: Scenario, *, with_vehicle: bool = True) -> ParsedWorld:
     """Parses the stage of a scenario for processes that are forked from here.
 
     See `cns_drake.scene.kept_worlds`.
+
+    Args:
+        scenario: names the stage.
+        with_vehicle: whether a vehicle will come into it.
 
     Raises:
         InputError: the scenario's files cannot be used.
     """
     without = (*scenario.without, *_in_the_way(scenario))
-    keep_world(world_file(scenario), without=without)
+    return keep_world(
+        world_file(scenario), without=without, is_whole=not with_vehicle
+    )
 
 
 def _in_the_way(scenario: Scenario) -> Sequence[str]:

@@ -70,6 +70,19 @@ def test_a_world_without_structures_is_another_one(world, parsed):
     assert len(parsed) == 2
 
 
+def test_a_whole_world_is_for_those_that_add_no_model(world, parsed):
+    whole = keep_world(world, is_whole=True)
+    assert whole.plant.is_finalized()
+    more = take_world(world)
+    assert not more.plant.is_finalized()
+    assert len(parsed) == 2
+    assert take_world(world, is_whole=True) is whole
+    # Any kept world serves where no more models come.
+    keep_world(world)
+    take_world(world, is_whole=True)
+    assert len(parsed) == 3
+
+
 def test_model_paths_are_looked_at(world, parsed, tmp_path):
     keep_world(world)
     take_world(world, model_paths=[tmp_path])
