@@ -62,6 +62,8 @@ class SimulatedDrive:
         # Passing changes replace much of what such a scene would hold.
         if self.scenario.transient.is_off:
             keep_scene(world)
+        # Forked processes have the digests of its files as well.
+        self.identity()
 
     def identity(self) -> dict:
         """Returns the scenario, and digests of its files and of the code."""
