@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import linregress, spearmanr
 
 from evaluation.change.change_result import (
     ChangeResult,
@@ -86,6 +85,9 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
     spread = float(np.ptp(y))
     if np.ptp(x) == 0.0 or spread == 0.0:
         return Trend(np.nan, np.nan, 0.0, spread, len(x))
+    # Slow to import, and not needed by the processes of jobs.
+    from scipy.stats import linregress, spearmanr
+
     rank = spearmanr(x, y)
     return Trend(
         rho=float(rank.statistic),
