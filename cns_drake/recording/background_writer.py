@@ -12,9 +12,10 @@ import threading
 from types import TracebackType
 from typing import Any
 
-# Number of messages that may wait, each with the small ones before it. A killed
-# process loses them: two frames with one LiDAR. A longer queue is no faster.
-_WAITING = 2
+# Number of messages that may wait, each with the small ones before it: two
+# frames with one LiDAR and traffic, so that the next frame does not wait for
+# the last one. A killed process loses them, at most eight frames.
+_WAITING = 8
 # Small messages wait for the next larger one, at most this many: handing one
 # over takes longer than making it.
 _SMALL_BYTES = 1024
