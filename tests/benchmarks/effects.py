@@ -22,6 +22,7 @@ import argparse
 from collections.abc import Mapping
 import multiprocessing as mp
 from multiprocessing.connection import Connection
+import os
 from pathlib import Path
 import tempfile
 import time
@@ -30,6 +31,7 @@ import numpy as np
 from processes import in_process
 
 from cns_drake.base.garbage import look_seldom
+from cns_drake.base.jobs.job_process import ALLOCATION
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
@@ -126,7 +128,7 @@ def record(
     # Ends of turns, each reported once.
     ends = iter(range(step, frames + 1, step))
     end = next(ends)
-    look_seldom()  # As commands do.
+    look_seldom()  # As jobs do.
     turns.recv()
 
     def on_frame(done: int, total: int) -> None:
@@ -209,6 +211,8 @@ def main() -> None:
         "--only", nargs="*", choices=COMPARED, help="these variants"
     )
     options = parser.parse_args()
+    # Recordings are made by jobs, and the C library reads this as it starts.
+    os.environ.update(ALLOCATION)
     names = ["ideal", "slow", *COMPARED]
     if options.only is not None:
         bases = {COMPARED[name] for name in options.only}

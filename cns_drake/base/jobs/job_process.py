@@ -42,7 +42,7 @@ _LOOK_INTERVAL = 0.2
 # A job takes and frees the same arrays thousands of times. The C library would
 # return their memory each time: Dask's workers set it so, and its own guess may
 # be wrong. Fetching memory anew takes longer than filling it [bytes].
-_ALLOCATION = {
+ALLOCATION = {
     "MALLOC_MMAP_THRESHOLD_": str(1 << 25),  # The largest that glibc takes.
     "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
 }
@@ -108,7 +108,7 @@ def start_interpreter(
         number = theirs.fileno()
         process = subprocess.Popen(
             [sys.executable, "-c", code, str(number), *sys.path],
-            env={**_ONE_CORE, **os.environ, **_ALLOCATION},
+            env={**_ONE_CORE, **os.environ, **ALLOCATION},
             pass_fds=[number],
             stdin=subprocess.DEVNULL,
             stdout=_STDERR,
