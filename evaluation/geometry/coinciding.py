@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from evaluation.geometry.sorting import stable_order
+from evaluation.geometry.sorting import sort_into_grid
 
 # Length of a cell in distances at which points coincide. Longer cells hold more
 # points that are too far, and shorter ones are more to look at.
@@ -47,10 +47,7 @@ class CoincidingPoints:
         self._size = size
         self._shape = (sides // size).astype(np.int64) + 1
         place = ((cloud - self._low) // size).astype(np.int64)
-        cells = np.ravel_multi_index(tuple(place.T), self._shape)
-        counts = np.bincount(cells, minlength=int(self._shape.prod()))
-        self._starts = np.concatenate([[0], np.cumsum(counts)])
-        order = stable_order(cells)
+        order, self._starts = sort_into_grid(place, self._shape)
         self._cloud = np.asarray(cloud, np.float64).take(order, axis=0)
 
     def shares(self, points: np.ndarray) -> tuple[float, float]:

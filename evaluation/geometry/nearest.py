@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from evaluation.geometry.sorting import stable_order
+from evaluation.geometry.sorting import sort_into_grid
 
 # Cells of the cloud's box for each of its points. Most are empty, because
 # surfaces fill little of the space around them.
@@ -43,12 +43,9 @@ class NearestPoints:
         self._size = float(np.cbrt(volume / (_CELLS * len(filled))))
         self._shape = (sides / self._size).astype(np.int64) + 1
         place = ((cloud - self._low) / self._size).astype(np.int64)
-        cells = np.ravel_multi_index(place.T, self._shape)
-        order = stable_order(cells)
+        order, self._starts = sort_into_grid(place, self._shape)
         # The last entry serves points without a nearest one.
         self._order = np.append(order, len(order))
-        counts = np.bincount(cells, minlength=int(self._shape.prod()))
-        self._starts = np.concatenate([[0], np.cumsum(counts)])
         self._cloud = cloud.take(order, axis=0)
 
     def find(

@@ -11,9 +11,7 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from evaluation.geometry.sorting import cell_order
 from evaluation.maps.voxel_maps import Z_ORIGIN
-
-# Voxels are numbered from here on [1].
-_FARTHEST = 2.0**31
+from evaluation.maps.voxel_table import FARTHEST
 
 
 def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
@@ -68,7 +66,7 @@ def _find_cells(
         fy = np.floor(points[i, 1] / size)
         fz = np.floor((points[i, 2] - z_origin) / size)
         # A comparison with NaN is false.
-        if abs(fx) < _FARTHEST and abs(fy) < _FARTHEST and abs(fz) < _FARTHEST:
+        if abs(fx) < FARTHEST and abs(fy) < FARTHEST and abs(fz) < FARTHEST:
             cells[count, 0] = np.int32(fx)
             cells[count, 1] = np.int32(fy)
             cells[count, 2] = np.int32(fz)

@@ -26,7 +26,7 @@ SLOT = np.dtype(
     align=True,
 )
 # Voxels are numbered up to here, either way.
-_LIMIT = 2.0**31
+FARTHEST = 2.0**31
 
 
 @compiled
@@ -127,7 +127,9 @@ def enter(
     for i in range(number):
         fx, fy, fz = located[0, 1, i], located[1, 1, i], located[2, 1, i]
         # A comparison with NaN is false.
-        if not (abs(fx) < _LIMIT and abs(fy) < _LIMIT and abs(fz) < _LIMIT):
+        if not (
+            abs(fx) < FARTHEST and abs(fy) < FARTHEST and abs(fz) < FARTHEST
+        ):
             skipped += 1
             continue
         ix, iy, iz = np.int32(fx), np.int32(fy), np.int32(fz)
