@@ -15,7 +15,7 @@ from evaluation.clouds.cloud_files import is_cloud, read_cloud
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
-from evaluation.sequences.sampling import select
+from evaluation.sequences.cropped_cloud import CroppedCloud
 
 
 def write_scores(
@@ -94,8 +94,11 @@ def _read(path: Path, method: Method) -> tuple[np.ndarray, int]:
     scan = read_cloud(path)
     points = point_arrays.xyz(scan)
     num_finite = int(np.isfinite(points).all(axis=1).sum())
-    max_range = RetrievalProtocol.max_range
-    cropped = select(scan, points, max_range, method.point_fields, str(path))
+    cloud = CroppedCloud(
+        RetrievalProtocol.max_range, method.point_fields, str(path)
+    )
+    cloud.add(scan)
+    cropped = cloud.finish()
     if len(cropped) == 0:
         raise InputError(f"{path}: no finite point within range")
     return cropped, len(points) - num_finite

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import points as point_arrays
 from cns_drake.base import poses
-from cns_drake.base.errors import InputError
 from cns_drake.base.recordings.sequence import Sequence
+from evaluation.sequences.cropped_cloud import CroppedCloud
 
 
 def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
@@ -76,54 +75,10 @@ def gather(
     end = min(frame - num_before + num_scans, len(sequence))
     X_WS = sequence.X_WS
     X_S0W = poses.inverse(X_WS[frame])
-    clouds = []
+    cloud = CroppedCloud(max_range, fields, sequence.name)
     for index in range(first, end):
         scan = sequence.scan(index)
-        cloud = point_arrays.xyz(scan)
-        if index != frame:
-            cloud = poses.transform(X_S0W @ X_WS[index], cloud)
-        clouds.append(select(scan, cloud, max_range, fields, sequence.name))
-    return np.concatenate(clouds)
-
-
-def select(
-    scan: np.ndarray,
-    p_S: np.ndarray,
-    max_range: float,
-    fields: tuple[str, ...],
-    source: str,
-) -> np.ndarray:
-    """Returns the points of a scan that a method describes.
-
-    Args:
-        scan: structured array (N,).
-        p_S: (N, 3) float64, where its points are [m].
-        max_range: see `within_range`.
-        fields: of the points, beside their coordinates.
-        source: of the scan, for messages.
-
-    Returns:
-        See `gather`.
-
-    Raises:
-        InputError: if the scan lacks a field.
-    """
-    kept = within_range(p_S, max_range)
-    p_S = p_S.compress(kept, axis=0)
-    if not fields:
-        return p_S
-    known = scan.dtype.names or ()
-    for name in fields:
-        if name not in known:
-            raise InputError(
-                f"{source}: its points have no field {name!r} (they have"
-                f" {', '.join(known)})"
-            )
-    dtype = [(axis, np.dtype(np.float64)) for axis in "xyz"]
-    dtype += [(name, scan.dtype[name]) for name in fields]
-    result = np.empty(len(p_S), dtype)
-    for axis, coordinates in zip("xyz", p_S.T, strict=True):
-        result[axis] = coordinates
-    for name in fields:
-        result[name] = scan[name].compress(kept)
-    return result
+        # Products with an identity would be rounded.
+        X_S0S = None if index == frame else X_S0W @ X_WS[index]
+        cloud.add(scan, X_S0S, num_more=end - 1 - index)
+    return cloud.finish()
