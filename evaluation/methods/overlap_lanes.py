@@ -17,6 +17,12 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
+from evaluation.methods.llvm_vectors import (
+    in_all_lanes,
+    load_vector,
+    store_vector,
+)
+
 LANES = 8
 # The first search: rows of a map, a word a row, and the weights of the
 # common bits of its maps, as powers of two; then those of the second.
@@ -25,7 +31,6 @@ SECOND_ROWS, SECOND_POWERS = 64, (0, 0, 2, 1)
 
 _LONG = ir.IntType(64)
 _LANES = ir.VectorType(_LONG, LANES)
-_WORD_BYTES = 8
 
 
 def _common_of_places(
@@ -68,12 +73,12 @@ def _common_of_places(
                 adders.add(
                     power,
                     builder.and_(
-                        _in_all_lanes(builder, word),
-                        _load(builder, array(2), at),
+                        in_all_lanes(builder, word, _LANES),
+                        load_vector(builder, array(2), at, _LANES),
                     ),
                 )
-        pointer = builder.bitcast(array(5), _LANES.as_pointer())
-        builder.store(adders.total(), pointer).align = _WORD_BYTES
+        start = ir.Constant(_LONG, 0)
+        store_vector(builder, array(5), start, adders.total())
         return context.get_dummy_value()
 
     signature = types.void(queries, query, places, place, map_words, counts)
@@ -109,12 +114,12 @@ def _common_of_rows(
     ) -> Any:
         array = _arrays(context, builder, signature, values)
         adders = _Adders(builder)
-        lefts = _in_all_lanes(builder, values[2])
-        rights = _in_all_lanes(builder, values[3])
+        lefts = in_all_lanes(builder, values[2], _LANES)
+        rights = in_all_lanes(builder, values[3], _LANES)
         for row in range(0, SECOND_ROWS, LANES):
             for one, power in enumerate(SECOND_POWERS):
                 at = _sum(builder, values[1], one * SECOND_ROWS + row)
-                words = _load(builder, array(0), at)
+                words = load_vector(builder, array(0), at, _LANES)
                 words = builder.lshr(builder.shl(words, lefts), rights)
                 at = _sum(
                     builder,
@@ -123,7 +128,10 @@ def _common_of_rows(
                     builder.mul(values[6], ir.Constant(_LONG, one)),
                 )
                 adders.add(
-                    power, builder.and_(words, _load(builder, array(4), at))
+                    power,
+                    builder.and_(
+                        words, load_vector(builder, array(4), at, _LANES)
+                    ),
                 )
         total = adders.total()
         lanes = [
@@ -196,20 +204,3 @@ def _sum(builder: Any, first: Any, *others: Any) -> Any:
             other = ir.Constant(_LONG, other)
         first = builder.add(first, other)
     return first
-
-
-def _load(builder: Any, words: Any, at: Any) -> Any:
-    """Returns words that follow each other as a vector."""
-    pointer = builder.bitcast(builder.gep(words, [at]), _LANES.as_pointer())
-    vector = builder.load(pointer)
-    vector.align = _WORD_BYTES
-    return vector
-
-
-def _in_all_lanes(builder: Any, word: Any) -> Any:
-    """Returns a vector each lane of which is a word."""
-    index = ir.IntType(32)
-    nothing = ir.Constant(_LANES, ir.Undefined)
-    first = builder.insert_element(nothing, word, ir.Constant(index, 0))
-    zeros = ir.Constant(ir.VectorType(index, LANES), [0] * LANES)
-    return builder.shuffle_vector(first, nothing, zeros)

@@ -28,6 +28,7 @@ from evaluation.methods.local_features import (
     NUM_FEATURES,
     local_features,
 )
+from evaluation.methods.many_correlations import ManyCorrelations
 from evaluation.methods.method import Method, MethodConfig, register
 from evaluation.methods.radon import radon
 
@@ -38,8 +39,6 @@ from evaluation.methods.radon import radon
 _NORM_EPSILON = 1e-5
 # The authors' scale of the correlation, chosen to make distances of 0 to 1.
 _CORRELATION_SCALE = 0.15
-# Number of places compared with a query at a time, to fit into a cache.
-_PLACES_AT_ONCE = 8
 
 
 class RingPlusPlusConfig(MethodConfig):
@@ -105,12 +104,12 @@ class RingDatabase:
 
     Attributes:
         places: the D descriptors.
-        conjugates: (D, 6 F, F) complex64 conjugates of their spectra.
+        correlations: with their spectra.
         is_empty: (D,) bool, whether a place shows nothing.
     """
 
     places: Sequence[Ring]
-    conjugates: np.ndarray
+    correlations: ManyCorrelations
     is_empty: np.ndarray
 
 
@@ -156,7 +155,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def build_database(self, places: Sequence[Ring]) -> RingDatabase:
         return RingDatabase(
             places=places,
-            conjugates=np.stack([place.spectrum.conj() for place in places]),
+            correlations=ManyCorrelations(
+                [place.spectrum for place in places], self.config.cells
+            ),
             is_empty=np.array([len(place.filled) == 0 for place in places]),
         )
 
@@ -164,23 +165,10 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         self, query: Ring, database: RingDatabase, *, exhaustive: bool = False
     ) -> np.ndarray:
         del exhaustive  # It always is.
-        num_places = len(database.places)
         if len(query.filled) == 0:
-            return np.full(num_places, np.nan)
-        scores = np.empty(num_places)
-        weighted = self._weigh(query)
-        # One buffer for all: fetching freed memory anew can take longer than
-        # the transforms.
-        product = np.empty((_PLACES_AT_ONCE, *weighted.shape), np.complex64)
-        for start in range(0, num_places, _PLACES_AT_ONCE):
-            some = slice(start, start + _PLACES_AT_ONCE)
-            conjugates = database.conjugates[some]
-            correlations = self._correlate(
-                np.multiply(
-                    weighted, conjugates, out=product[: len(conjugates)]
-                )
-            )
-            scores[some] = correlations.max(axis=1)
+            return np.full(len(database.places), np.nan)
+        found = database.correlations.greatest_sums(self._weigh(query))
+        scores = found.astype(np.float64)
         scores[database.is_empty] = np.nan
         return scores
 
@@ -228,9 +216,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             place: which of them.
         """
         num_cells = self.config.cells
-        correlation = self._correlate(
-            weighted * database.conjugates[place : place + 1]
-        )
+        correlation = self._correlate(weighted, database.places[place].spectrum)
         shift = -_signed(int(correlation.argmax()), num_cells)
         reference = _spectrum(database.places[place].bev(num_cells))
         # Rows lie 360 / (n - 1) deg apart, but since the last one repeats the
@@ -299,24 +285,25 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         weights = np.tile(_frequency_weights(n) / scale, NUM_FEATURES)
         return query.spectrum * weights[:, None].astype(np.float32)
 
-    def _correlate(self, product: np.ndarray) -> np.ndarray:
-        """Correlates a query with some places.
+    def _correlate(
+        self, weighted: np.ndarray, spectrum: np.ndarray
+    ) -> np.ndarray:
+        """Correlates a query with one place.
 
         The circular correlation over the angles is taken for each channel
         and frequency, and the magnitudes are summed, as in the program.
 
         Args:
-            product: (B, 6 F, F) of the query's weighted spectrum and the
-                places' conjugates; it is overwritten.
+            weighted: (6 F, F), see `_weigh`.
+            spectrum: (6 F, F) of the place.
 
         Returns:
-            (B, n) for each shift of the place's rows by 0, ..., n - 1.
+            (n,) for each shift of the place's rows by 0, ..., n - 1.
         """
         correlations = scipy.fft.irfft(
-            product, n=self.config.cells, axis=2, overwrite_x=True
+            weighted * spectrum.conj(), n=self.config.cells, axis=1
         )
-        np.abs(correlations, out=correlations)
-        return correlations.sum(axis=1)
+        return np.abs(correlations).sum(axis=0)
 
 
 def _without_duplicates(points: np.ndarray) -> np.ndarray:
