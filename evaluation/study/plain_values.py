@@ -14,11 +14,22 @@ import json
 import re
 import struct
 import sys
-from typing import Any
+import tokenize
+from typing import Any, Literal
 
 import numpy as np
 
 _LENGTH = struct.Struct("<Q")
+# Types of number whose arrays are bytes that follow each other: bool, integers,
+# floating point.
+_KINDS = "biufc"
+# What NumPy writes before an array, if its type has a short name: the length of
+# the text, the type, the order, and the shape.
+_HEADER = re.compile(
+    rb"\x93NUMPY\x01\x00([\x00-\xff]{2})"
+    rb"\{'descr': ('[<>|]\w+'), 'fortran_order': (True|False),"
+    rb" 'shape': \((|\d{1,18},|\d{1,18}(?:, \d{1,18})+)\), \} *\n"
+)
 _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
 
 
@@ -34,7 +45,7 @@ def encode(value: object) -> bytes:
     """
     encoder = _Encoder()
     tree = json.dumps(encoder.encode(value), separators=(",", ":")).encode()
-    return _LENGTH.pack(len(tree)) + tree + encoder.arrays.getvalue()
+    return b"".join([_LENGTH.pack(len(tree)), tree, *encoder.arrays])
 
 
 def decode(data: bytes) -> Any:
@@ -50,21 +61,20 @@ def decode(data: bytes) -> Any:
         (length,) = _LENGTH.unpack_from(data)
         start = _LENGTH.size + length
         tree = json.loads(data[_LENGTH.size : start])
-        stream = io.BytesIO(data)
-        stream.seek(start)
-        arrays = []
-        while stream.tell() < len(data):
-            arrays.append(np.lib.format.read_array(stream, allow_pickle=False))
-        return _decode(tree, arrays)
+        return _decode(tree, _read_arrays(data, start))
     except (
-        # Errors for a tree of another form, or with other fields.
+        # Errors for a tree of another form or with other fields, and for
+        # headers of arrays that NumPy cannot parse.
         AttributeError,
         ImportError,
         IndexError,
         KeyError,
+        OverflowError,
         RecursionError,
+        SyntaxError,
         TypeError,
         struct.error,
+        tokenize.TokenError,
     ) as error:
         raise ValueError(f"{type(error).__name__}: {error}") from error
 
@@ -73,7 +83,8 @@ class _Encoder:
     """Makes a tree of a value; arrays that occur twice are stored once."""
 
     def __init__(self) -> None:
-        self.arrays = io.BytesIO()
+        # Headers, each with the numbers that follow it.
+        self.arrays: list[bytes | memoryview] = []
         # Keys are identities of arrays, which stay alive meanwhile.
         self._numbers: dict[int, tuple[int, np.ndarray]] = {}
 
@@ -112,9 +123,57 @@ class _Encoder:
         if id(array) not in self._numbers:
             if array.dtype.hasobject:
                 raise TypeError("an array of objects cannot be kept")
-            np.lib.format.write_array(self.arrays, array, allow_pickle=False)
+            self._write(array)
             self._numbers[id(array)] = len(self._numbers), array
         return self._numbers[id(array)][0]
+
+    def _write(self, array: np.ndarray) -> None:
+        stream = io.BytesIO()
+        if array.dtype.kind not in _KINDS or not array.flags.forc:
+            np.lib.format.write_array(stream, array, allow_pickle=False)
+            self.arrays.append(stream.getvalue())
+            return
+        header = np.lib.format.header_data_from_array_1_0(array)
+        np.lib.format.write_array_header_1_0(stream, header)
+        ordered = array.T if header["fortran_order"] else array
+        self.arrays += [stream.getvalue(), ordered.data]
+
+
+def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
+    """Returns the arrays from a place on.
+
+    NumPy parses a header as code, which takes longer than copying most arrays.
+    It is asked to once for each type of number.
+    """
+    stream = io.BytesIO(data)
+    dtypes: dict[bytes, np.dtype] = {}
+    arrays = []
+    while start < len(data):
+        header = _HEADER.match(data, start)
+        if header is not None and header[2] in dtypes:
+            array = _read_array(data, header, dtypes[header[2]])
+            start = header.end() + array.nbytes
+        else:
+            stream.seek(start)
+            array = np.lib.format.read_array(stream, allow_pickle=False)
+            start = stream.tell()
+            if header is not None:
+                dtypes[header[2]] = array.dtype
+        arrays.append(array)
+    return arrays
+
+
+def _read_array(
+    data: bytes, header: re.Match[bytes], dtype: np.dtype
+) -> np.ndarray:
+    """Returns the array behind its header."""
+    length, _, is_fortran, shape = header.groups()
+    if int.from_bytes(length, "little") != header.end() - header.end(1):
+        raise ValueError("a header of another length")
+    sides = tuple(map(int, shape.replace(b",", b"").split()))
+    order: Literal["C", "F"] = "F" if is_fortran == b"True" else "C"
+    stored = np.ndarray(sides, dtype, data, header.end(), order=order)
+    return stored.copy(order)
 
 
 def _decode(tree: Any, arrays: list[np.ndarray]) -> Any:
