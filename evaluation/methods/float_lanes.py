@@ -22,6 +22,7 @@ from numba.extending import (
 )
 
 from evaluation.methods.llvm_vectors import (
+    array_data,
     in_all_lanes,
     load_vector,
     store_vector,
@@ -60,8 +61,7 @@ def load(
     def generate(
         context: Any, builder: Any, signature: Any, values: Any
     ) -> Any:
-        make = context.make_array(signature.args[0])
-        data = make(context, builder, values[0]).data
+        data = array_data(context, builder, signature, values, 0)
         return load_vector(builder, data, values[1], _FLOATS)
 
     return _floats(array, types.intp), generate
@@ -76,8 +76,7 @@ def store(
     def generate(
         context: Any, builder: Any, signature: Any, values: Any
     ) -> Any:
-        make = context.make_array(signature.args[0])
-        data = make(context, builder, values[0]).data
+        data = array_data(context, builder, signature, values, 0)
         store_vector(builder, data, values[1], values[2])
         return context.get_dummy_value()
 

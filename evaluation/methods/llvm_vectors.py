@@ -1,10 +1,23 @@
-"""Vectors of the processor, in the language of the compiler."""
+"""Arrays and vectors in the language of the compiler, for intrinsics."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from llvmlite import ir
+
+
+def array_data(
+    context: Any, builder: Any, signature: Any, values: Any, index: int
+) -> Any:
+    """Returns the pointer to the numbers of an argument, an array.
+
+    Args:
+        context, builder, signature, values: those of an intrinsic's code.
+        index: of the argument.
+    """
+    make = context.make_array(signature.args[index])
+    return make(context, builder, values[index]).data
 
 
 def load_vector(builder: Any, array: Any, at: Any, kind: Any) -> Any:

@@ -10,11 +10,13 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from evaluation.methods.llvm_vectors import array_data
 from evaluation.methods.overlap_layers import GRID, NUM_LAYERS
 
 # Bits of a word.
@@ -38,6 +40,30 @@ def _population(typing_context: Any, word: Any) -> Any:
 
 # Returns how many bits of a word are set; for compiled functions only.
 population: Callable[[np.uint64], np.uint64] = intrinsic(_population)
+
+
+def _window(typing_context: Any, words: Any, byte: Any) -> Any:
+    """Compiles the load of 64 bits that begin in the middle of a word."""
+    del typing_context, byte
+
+    def generate(
+        context: Any, builder: Any, signature: Any, values: Any
+    ) -> Any:
+        data = array_data(context, builder, signature, values, 0)
+        first = builder.bitcast(data, ir.IntType(8).as_pointer())
+        place = builder.gep(first, [values[1]])
+        word = builder.load(
+            builder.bitcast(place, ir.IntType(WORD).as_pointer())
+        )
+        word.align = 1
+        return word
+
+    return types.uint64(words, types.intp), generate
+
+
+# Returns the 64 bits from a byte of uint64 words on, of which a lower bit is in
+# an earlier byte; for compiled functions only.
+window: Callable[[np.ndarray, int], np.uint64] = intrinsic(_window)
 
 
 def turns(number: int) -> np.ndarray:
@@ -122,22 +148,25 @@ def fine_bits(cells: np.ndarray, starts: np.ndarray) -> np.ndarray:
         starts: (layers + 1,) where layers begin.
 
     Returns:
-        (layers, GRID, GRID / 64) uint64.
+        (layers, GRID + 2, GRID / 64 + 2) uint64, a row and a word without bits
+        on either side.
     """
     words = GRID // WORD
     one = np.uint64(1)
-    wide = np.zeros((NUM_LAYERS, GRID, words), np.uint64)
+    wide = np.zeros((NUM_LAYERS, GRID + 2, words + 2), np.uint64)
     for layer in range(NUM_LAYERS):
         for i in range(starts[layer], starts[layer + 1]):
             row, column = int(cells[i]) >> 8, int(cells[i]) & 255
             for near in range(max(column - 1, 0), min(column + 2, GRID)):
-                wide[layer, row, near // WORD] |= one << np.uint64(near % WORD)
-    result = wide.copy()
+                bit = one << np.uint64(near % WORD)
+                wide[layer, row + 1, near // WORD + 1] |= bit
+    result = np.zeros_like(wide)
     for layer in range(NUM_LAYERS):
-        for row in range(GRID - 1):
-            for word in range(words):
-                result[layer, row + 1, word] |= wide[layer, row, word]
-                result[layer, row, word] |= wide[layer, row + 1, word]
+        # Rows follow each other, so that one loop can pass over all of them.
+        own, all_near = wide[layer].ravel(), result[layer].ravel()
+        row = words + 2
+        for i in range(row, (GRID + 1) * row):
+            all_near[i] = own[i - row] | own[i] | own[i + row]
     return result
 
 

@@ -11,6 +11,7 @@ its own language.
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
 from typing import Any
 
 from llvmlite import ir
@@ -18,6 +19,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from evaluation.methods.llvm_vectors import (
+    array_data,
     in_all_lanes,
     load_vector,
     store_vector,
@@ -189,12 +191,7 @@ class _Adders:
 
 def _arrays(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     """Returns what gives the pointer to the words of an argument."""
-
-    def pointer(index: int) -> Any:
-        make = context.make_array(signature.args[index])
-        return make(context, builder, values[index]).data
-
-    return pointer
+    return functools.partial(array_data, context, builder, signature, values)
 
 
 def _sum(builder: Any, first: Any, *others: Any) -> Any:

@@ -9,13 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from evaluation.methods.overlap_bits import UNIT_BITS, WORD
+from evaluation.methods.overlap_bits import UNIT_BITS, WORD, window
 from evaluation.methods.overlap_lanes import (
     LANES,
     common_of_places,
     common_of_rows,
 )
 from evaluation.methods.overlap_layers import GRID
+
+_WORD_BYTES = WORD // 8
+# Three counts share a word. A layer has at most GRID * GRID cells.
+_COUNT_BITS = 21
+_COUNT_MASK = np.uint64((1 << _COUNT_BITS) - 1)
 
 
 def in_lanes(maps: np.ndarray, margin: int) -> np.ndarray:
@@ -151,71 +156,120 @@ def climb(
     Args:
         cells: (M,) uint16 of the query.
         starts: (layers + 1,) where its layers begin.
-        place: (layers, GRID, words) uint64, with neighbours set.
+        place: of the place, see `fine_bits`.
         weights: (layers,) int64.
         turns: (H, 2) int64 cosines and sines of equal steps of a full turn.
         start: (3,) int64: which turn, shift along rows and along columns in
             half cells.
-        steps: (K, 2) int64: of the turn and of the shifts, coarse to fine.
+        steps: (K, 2) int64: of the turn and of the shifts, which are even,
+            coarse to fine.
 
     Returns:
         (3 + layers,) int64: the pose, and the query's cells that meet some
         of the place, in each layer.
     """
-    best = np.concatenate((start, _common(cells, starts, place, turns, start)))
+    common = np.zeros((3, 3, len(weights)), np.int64)
+    pose = start.copy()
+    _count_common(cells, starts, place, turns, pose, 1, common)
+    best = np.concatenate((start, common[1, 1]))
+    most = _weighted(common[1, 1], weights)
     move = (0, 0, 0)
     for level in range(len(steps)):
+        step = steps[level, 1]
         # How the centre moved last, in steps; at first, from out of reach.
         last = (3, 3, 3)
         while True:
             centre = best.copy()
+            before = most
             for dt in range(-1, 2):
+                # Those around the centre before are no better.
+                if abs(last[0] + dt) <= 1 and last[1] == 0 and last[2] == 0:
+                    continue
+                pose[0] = (centre[0] + dt * steps[level, 0]) % len(turns)
+                pose[1], pose[2] = centre[1], centre[2]
+                _count_common(
+                    cells, starts, place, turns, pose, step // 2, common
+                )
                 for dr in range(-1, 2):
                     for dc in range(-1, 2):
-                        # Those around the centre before are no better.
-                        if (dt == 0 and dr == 0 and dc == 0) or (
-                            abs(last[0] + dt) <= 1
-                            and abs(last[1] + dr) <= 1
-                            and abs(last[2] + dc) <= 1
-                        ):
-                            continue
-                        pose = centre[:3].copy()
-                        pose[0] = (pose[0] + dt * steps[level, 0]) % len(turns)
-                        pose[1] += dr * steps[level, 1]
-                        pose[2] += dc * steps[level, 1]
-                        found = _common(cells, starts, place, turns, pose)
-                        if (found * weights).sum() > (best[3:] * weights).sum():
-                            best = np.concatenate((pose, found))
+                        found = common[dr + 1, dc + 1]
+                        total = _weighted(found, weights)
+                        if total > most:
+                            most = total
+                            best[0] = pose[0]
+                            best[1] = centre[1] + dr * step
+                            best[2] = centre[2] + dc * step
+                            for layer in range(len(found)):
+                                best[3 + layer] = found[layer]
                             move = (dt, dr, dc)
-            if (best == centre).all():
+            if most == before:
                 break
             last = move
     return best
 
 
 @compiled
-def _common(
+def _weighted(counts: np.ndarray, weights: np.ndarray) -> int:
+    total = 0
+    for layer in range(len(counts)):
+        total += counts[layer] * weights[layer]
+    return total
+
+
+@compiled
+def _count_common(
     cells: np.ndarray,
     starts: np.ndarray,
     place: np.ndarray,
     turns: np.ndarray,
     pose: np.ndarray,
-) -> np.ndarray:
-    """Returns how many cells of each layer meet the place's, at a pose."""
-    num_layers = len(starts) - 1
-    counts = np.zeros(num_layers, np.int64)
+    step: int,
+    common: np.ndarray,
+) -> None:
+    """Counts the cells of each layer that meet the place's, near a pose.
+
+    Shifts by whole cells move all cells alike: each is turned once, and of the
+    place's bits those of three columns are read together.
+
+    Args:
+        cells, starts, place, turns: see `climb`.
+        pose: (3,) int64.
+        step: k, of the shifts in whole cells, from 1 to 6.
+        common: (3, 3, layers) int64 to fill: for shifts by -k, 0 and k
+            along rows and along columns.
+    """
     c, s = turns[pose[0], 0], turns[pose[0], 1]
     right, up = (pose[1] + GRID) << UNIT_BITS, (pose[2] + GRID) << UNIT_BITS
-    for layer in range(num_layers):
-        bits = place[layer]
-        count = 0
+    one, k = np.uint64(1), np.uint64(step)
+    # A product takes the three bits of a row, k apart, to where their counts
+    # begin: none of its other terms is there.
+    first, second = np.uint64(_COUNT_BITS), np.uint64(2 * _COUNT_BITS)
+    wanted = one | one << k | one << (k + k)
+    spread = one | one << (first - k) | one << (second - k - k)
+    counted = one | one << first | one << second
+    row_bytes = place.shape[2] * _WORD_BYTES
+    for layer in range(len(starts) - 1):
+        origin = (layer * place.shape[1] + 1) * row_bytes
+        before = here = after = np.uint64(0)
         for i in range(starts[layer], starts[layer + 1]):
             u = 2 * (np.int64(cells[i]) >> 8) + 1 - GRID
             v = 2 * (np.int64(cells[i]) & 255) + 1 - GRID
             row = (c * u - s * v + right) >> (UNIT_BITS + 1)
             column = (s * u + c * v + up) >> (UNIT_BITS + 1)
-            if 0 <= row < GRID and 0 <= column < GRID:
-                word = bits[row, column // WORD]
-                count += (word >> np.uint64(column % WORD)) & np.uint64(1)
-        counts[layer] = np.int64(count)
-    return counts
+            # Beside the map are no bits.
+            bit = WORD - step + min(max(column, -1 - step), GRID + step)
+            byte, shift = origin + (bit >> 3), np.uint64(bit & 7)
+            at = byte + min(max(row - step, -1), GRID) * row_bytes
+            bits = window(place, at) >> shift & wanted
+            before += bits * spread & counted
+            at = byte + min(max(row, -1), GRID) * row_bytes
+            bits = window(place, at) >> shift & wanted
+            here += bits * spread & counted
+            at = byte + min(max(row + step, -1), GRID) * row_bytes
+            bits = window(place, at) >> shift & wanted
+            after += bits * spread & counted
+        for dr, counts in enumerate((before, here, after)):
+            for dc in range(3):
+                common[dr, dc, layer] = np.int64(
+                    counts >> np.uint64(dc * _COUNT_BITS) & _COUNT_MASK
+                )

@@ -112,35 +112,97 @@ def test_second_search():
     assert (counts[0], poses[0].tolist()) == best
 
 
-def test_last_search_counts_cells_that_meet_neighbours():
-    query, place = some_cells(7), some_cells(8, (900, 800, 700, 60, 300))
-    turned = turns(288)
+def wide_layers(place):
+    """Returns a place's layers (5, 256, 256) with all cells' neighbours."""
+    wide = np.zeros((5, 258, 258), dtype=bool)
+    for layer in range(5):
+        picture = image(*place, layer, (1 << 14, 0), 0)
+        for i in range(3):
+            for j in range(3):
+                wide[layer, i : i + 256, j : j + 256] |= picture
+    return wide[:, 1:-1, 1:-1]
+
+
+def count_common(query, wide, turn, right, up):
+    """Returns how many of a query's cells meet each of a place's layers."""
+    counts = []
+    c, s = turn.tolist()
+    for layer in range(5):
+        first, last = query[1][layer : layer + 2]
+        u, v = (
+            2 * k - 255 for k in np.divmod(query[0][first:last], 256, dtype=int)
+        )
+        row = (c * u - s * v + ((right + 256) << 14)) // 2**15
+        column = (s * u + c * v + ((up + 256) << 14)) // 2**15
+        shown = (row >= 0) & (row < 256) & (column >= 0) & (column < 256)
+        counts.append(int(wide[layer, row[shown], column[shown]].sum()))
+    return counts
+
+
+def climb_slowly(query, wide, weights, turned, pose, steps):
+    """Climbs as `climb` is described, pose by pose."""
+    counts = {}
+
+    def total(*pose):
+        if pose not in counts:
+            turn, right, up = pose
+            counts[pose] = count_common(query, wide, turned[turn], right, up)
+        return int(weights @ counts[pose])
+
+    best = tuple(pose)
+    for step, shift in steps:
+        while True:
+            row, column = best[1:]
+            near = [
+                ((best[0] + dt) % len(turned), row + dr, column + dc)
+                for dt in (-step, 0, step)
+                for dr in (-shift, 0, shift)
+                for dc in (-shift, 0, shift)
+            ]
+            better = max(near, key=lambda one: total(*one))
+            if total(*better) == total(*best):
+                break
+            best = better
+    return [*best, *counts[best]]
+
+
+# Some begin where half of a query, or nearly all of it, is beside the map.
+@pytest.mark.parametrize(
+    "start",
+    [(40, 8, -8), (0, 0, 0), (287, -250, 120), (100, 480, -470), (9, -900, 0)],
+)
+@pytest.mark.parametrize("steps", [[(2, 4), (1, 2)], [(3, 12), (1, 6)]])
+def test_last_search_climbs_by_cells_that_meet_neighbours(start, steps):
+    query = some_cells(7, (500, 400, 300, 40, 200))
+    place = some_cells(8, (900, 800, 700, 60, 300))
+    turned, weights = turns(288), np.array([3, 3, 2, 60, 5])
     found = climb(
         *query,
         fine_bits(*place),
-        np.array([3, 3, 2, 60, 5]),
+        weights,
         turned,
-        np.array([40, 8, -8]),
-        np.array([[2, 4], [1, 2]]),
+        np.array(start),
+        np.array(steps),
     )
-    heading, right, up = found[:3].tolist()
-    for layer in range(5):
-        wide = np.zeros((258, 258), dtype=bool)
-        picture = image(*place, layer, turned[0], 0)
-        for i in range(3):
-            for j in range(3):
-                wide[i : i + 256, j : j + 256] |= picture
-        wide = wide[1:-1, 1:-1]
-        c, s = turned[heading].tolist()
-        count = 0
-        first, last = query[1][layer : layer + 2]
-        for number in query[0][first:last].tolist():
-            u, v = 2 * (number // 256) - 255, 2 * (number % 256) - 255
-            row = (c * u - s * v + ((right + 256) << 14)) // 2**15
-            column = (s * u + c * v + ((up + 256) << 14)) // 2**15
-            if 0 <= row < 256 and 0 <= column < 256:
-                count += wide[row, column]
-        assert found[3 + layer] == count
+    assert found.tolist() == climb_slowly(
+        query, wide_layers(place), weights, turned, start, steps
+    )
+
+
+def test_last_search_of_full_layers():
+    full = (
+        np.arange(256 * 256).astype(np.uint16),
+        65536 * np.array([0, 1, 1, 1, 1, 1]),
+    )
+    found = climb(
+        *full,
+        fine_bits(*full),
+        np.ones(5, np.int64),
+        turns(4),
+        np.zeros(3, np.int64),
+        np.array([[1, 2]]),
+    )
+    assert found.tolist() == [0, 0, 0, 65536, 0, 0, 0, 0]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
