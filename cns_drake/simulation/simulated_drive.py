@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, FixedInputPortValue
 
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.recordings.sequence import index_instances
@@ -132,6 +133,9 @@ class SimulatedSequence(PlannedSequence):
         )
         self._diagram = make_still_world(world, self._lidar, traffic)
         self._context = self._diagram.CreateDefaultContext()
+        self._lidar_context = self._lidar.GetMyMutableContextFromRoot(
+            self._context
+        )
 
     @property
     def instances(self) -> Mapping[int, Mapping]:
@@ -158,18 +162,24 @@ class SimulatedSequence(PlannedSequence):
 
     def _place_lidar(self, index: int) -> Context:
         """Moves the LiDAR to a scan; returns its Context."""
-        context = self._lidar.GetMyMutableContextFromRoot(self._context)
         if self._is_random or self._has_traffic:
             # The time is set only for noise and traffic, which depend on it:
             # the SceneGraph computes everything anew at a new time.
             self._context.SetTime(index * self.period)
-        self._lidar.GetInputPort("sweep").FixValue(context, self._sweep(index))
-        return context
+        # Unlike a new fixed value, it does not hold a copy.
+        self._fixed_sweep.GetMutableData().set_value(self._sweep(index))
+        return self._lidar_context
+
+    @cached_property
+    def _fixed_sweep(self) -> FixedInputPortValue:
+        """The value of the LiDAR's port; notes each change."""
+        port = self._lidar.GetInputPort("sweep")
+        return port.FixValue(self._lidar_context, self._sweep(0))
 
     def _sweep(self, index: int) -> Sweep:
         """Returns the poses of the sensor during a frame."""
         if self._column_t is not None:
             times = index * self.period + self._column_t
             return Sweep(*self.trajectory.poses(times)).of_frame(self.X_BS)
-        X_WS = self.X_WBs[index] @ self.X_BS
+        X_WS = self.X_WBs[index].multiply(self.X_BS)
         return Sweep(X_WS.rotation().matrix()[None], X_WS.translation()[None])

@@ -55,6 +55,22 @@ def test_noise_and_motion_distortion_too(tmp_path):
     check_same(simulated, recorded, [40, 0, 41, FRAMES - 1, 40])
 
 
+def test_scans_of_a_still_world_in_any_order(tmp_path):
+    """The time stands still there: only the sensor's pose differs."""
+    source = SimulatedDrive(
+        tiny_scenario(
+            tmp_path, lidars={"lidar": {"preset": "vlp-16", "columns": 64}}
+        )
+    )
+    alone = {k: source().scan(k).tobytes() for k in (10, 25, 40)}
+    assert len(set(alone.values())) == 3
+    together = source()
+    for frame in (25, 10, 40, 40, 10, 25):
+        assert together.scan(frame).tobytes() == alone[frame]
+        # Views of others leave the LiDAR at their places.
+        together.look(30)
+
+
 def test_calibrated_returns_in_fog_too(tmp_path):
     scenario = tiny_scenario(
         tmp_path,
