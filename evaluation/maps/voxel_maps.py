@@ -110,6 +110,7 @@ class VoxelAccumulator:
         self._num_ignored = 0
         self._columns = np.zeros((3, _BATCH))
         self._located = np.empty((3, 3, _BATCH))
+        self._parts = np.empty(_BATCH)
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
         """Adds a cloud.
@@ -134,12 +135,18 @@ class VoxelAccumulator:
                     column[: len(batch)] = batch[name]
             self._reserve(len(batch))
             locate(
-                self._columns, len(batch), X, self._voxel_size, self._located
+                self._columns,
+                len(batch),
+                X,
+                self._voxel_size,
+                self._divisions,
+                self._located,
+                self._parts,
             )
             self._size, self._num_samples, skipped = enter(
                 self._located,
+                self._parts,
                 len(batch),
-                self._divisions / self._voxel_size,
                 self._divisions,
                 self._table,
                 self._size,

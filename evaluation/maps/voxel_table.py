@@ -32,8 +32,12 @@ FARTHEST = 2.0**31
 @compiled
 def _find(
     table: np.ndarray, ix: np.int32, iy: np.int32, iz: np.int32
-) -> np.int64:
-    """Returns the slot of a voxel, or its free slot."""
+) -> np.uint64:
+    """Returns the slot of a voxel, or its free slot.
+
+    It has no sign: for a signed index, numba looks at each use whether it
+    counts from the end.
+    """
     mask = len(table) - 1
     # Large odd factors spread neighbouring voxels; products wrap around.
     mixed = (
@@ -42,11 +46,11 @@ def _find(
         ^ np.int64(iz) * np.int64(83492791)
     )
     mixed ^= mixed >> 15
-    slot = mixed & mask
+    slot = np.uint64(mixed & mask)
     while table[slot].count != 0 and not (
         table[slot].ix == ix and table[slot].iy == iy and table[slot].iz == iz
     ):
-        slot = (slot + 1) & mask
+        slot = np.uint64((np.int64(slot) + 1) & mask)
     return slot
 
 
@@ -71,9 +75,11 @@ def locate(
     number: int,
     X: np.ndarray,
     voxel_size: float,
+    divisions: int,
     located: np.ndarray,
+    parts: np.ndarray,
 ) -> None:
-    """Locates points in voxels.
+    """Locates points in voxels, and in parts of voxels.
 
     Args:
         points: (3, N) in the frame of a sensor [m].
@@ -81,9 +87,13 @@ def locate(
         X: (4, 4) its pose in the world, which is lifted so that voxels begin at
             height 0.
         voxel_size: length of a voxel's side [m].
+        divisions: of a side into parts; 0 for no parts.
         located: (3, 3, N) to fill, for each axis with the place in that world
             [m], the number of the voxel, and the distance from its corner [m].
+        parts: (N,) float64 to fill with the number of the part.
     """
+    scale = divisions / voxel_size
+    last = np.float64(divisions - 1)
     for axis in range(3):
         a, b, c, d = X[axis, 0], X[axis, 1], X[axis, 2], X[axis, 3]
         for i in range(number):
@@ -92,13 +102,21 @@ def locate(
             located[axis, 0, i] = place
             located[axis, 1, i] = cell
             located[axis, 2, i] = place - cell * voxel_size
+    if divisions > 0:
+        for i in range(number):
+            # Rounding may put a point on an end just outside; -0.1 becomes 0.
+            part = min(np.trunc(located[0, 2, i] * scale), last)
+            for axis in range(1, 3):
+                place = min(np.trunc(located[axis, 2, i] * scale), last)
+                part = part * divisions + place
+            parts[i] = part
 
 
 @compiled
 def enter(
     located: np.ndarray,
+    parts: np.ndarray,
     number: int,
-    scale: float,
     divisions: int,
     table: np.ndarray,
     size: int,
@@ -110,8 +128,8 @@ def enter(
 
     Args:
         located: (3, 3, N), see `locate`.
+        parts: (N,), likewise.
         number: of the points to enter, the first ones.
-        scale: parts of a voxel's side for each metre.
         divisions: parts of a voxel's side; 0 for no samples.
         table: (S,) of `SLOT`, with room for all.
         size: number of its voxels up to now.
@@ -134,34 +152,24 @@ def enter(
             continue
         ix, iy, iz = np.int32(fx), np.int32(fy), np.int32(fz)
         slot = _find(table, ix, iy, iz)
-        if table[slot].count == 0:
-            table[slot].ix = ix
-            table[slot].iy = iy
-            table[slot].iz = iz
+        voxel = table[slot]
+        if voxel.count == 0:
+            voxel.ix = ix
+            voxel.iy = iy
+            voxel.iz = iz
             size += 1
-        dx, dy, dz = located[0, 2, i], located[1, 2, i], located[2, 2, i]
-        table[slot].count += 1
-        table[slot].sx += dx
-        table[slot].sy += dy
-        table[slot].sz += dz
+        voxel.count += 1
+        voxel.sx += located[0, 2, i]
+        voxel.sy += located[1, 2, i]
+        voxel.sz += located[2, 2, i]
         if divisions > 0:
-            part = _part(dx * scale, divisions)
-            part = part * divisions + _part(dy * scale, divisions)
-            part = part * divisions + _part(dz * scale, divisions)
-            bit = np.uint8(1 << (part & 7))
-            if not sampled[slot, part >> 3] & bit:
-                sampled[slot, part >> 3] |= bit
+            part = np.uint64(parts[i])
+            byte = part >> np.uint64(3)
+            bit = np.uint8(np.uint64(1) << (part & np.uint64(7)))
+            if not sampled[slot, byte] & bit:
+                sampled[slot, byte] |= bit
                 samples[num_samples, 0] = located[0, 0, i]
                 samples[num_samples, 1] = located[1, 0, i]
                 samples[num_samples, 2] = located[2, 0, i]
                 num_samples += 1
     return size, num_samples, skipped
-
-
-@compiled
-def _part(place: float, divisions: int) -> int:
-    """Returns the part of a voxel's side at a place.
-
-    Rounding may put a point on an end just outside: -0.1 becomes 0 as well.
-    """
-    return min(int(place), divisions - 1)
