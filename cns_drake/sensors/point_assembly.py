@@ -59,7 +59,9 @@ def assemble_points(
         step: coordinates are rounded to multiples of it [m]; not rounded if 0.
     """
     for k in range(len(beams)):
-        beam = beams[k]
+        # For a signed index, numba looks at each use whether it counts from
+        # the end.
+        beam = np.uint64(beams[k])
         x = table.d_Sset[beam, 0] * ranges[k]
         y = table.d_Sset[beam, 1] * ranges[k]
         z = table.d_Sset[beam, 2] * ranges[k]
@@ -77,8 +79,9 @@ def assemble_points(
         if met[k] < 0:
             point.label, point.instance = SCATTERED_LABEL, 0
         else:
-            point.label = label[met[k]]
-            point.instance = instance[met[k]]
+            geometry = np.uint64(met[k])
+            point.label = label[geometry]
+            point.instance = instance[geometry]
 
 
 def points_in_world(
