@@ -1,5 +1,6 @@
 """The benchmarks run; for a moment each, on as little as they take."""
 
+import json
 from pathlib import Path
 import subprocess
 import sys
@@ -47,10 +48,11 @@ BY_HAND = {
     "source_rays.py",
 }
 SHARED = {"processes.py", "stages.py"}
-# Runs a program whose new processes are forks: they import nothing anew. Their
-# functions are found by name, as new interpreters find them.
+# A process that imports what benchmarks need, and forks for each one. Their own
+# new processes are forks, too: they import nothing anew. Functions are found by
+# name, as new interpreters find them.
 FORKING = """
-import multiprocessing, pickle, runpy, sys
+import gc, importlib, json, multiprocessing, os, pickle, runpy, sys
 
 class Fork(multiprocessing.get_context("fork").Process):
     def start(self):
@@ -60,10 +62,28 @@ class Fork(multiprocessing.get_context("fork").Process):
 fork = multiprocessing.get_context("fork")
 fork.Process = Fork
 multiprocessing.get_context = {"spawn": fork}.get
-folder, *sys.argv = sys.argv[1:]
+folder, *modules = sys.argv[1:]
 sys.path.insert(0, folder)
-runpy.run_path(sys.argv[0], run_name="__main__")
+for module in modules:
+    importlib.import_module(module)
+gc.freeze()
+for line in sys.stdin:
+    output, *words = json.loads(line)
+    if os.fork() == 0:
+        with open(output, "w") as printed:
+            os.dup2(printed.fileno(), 1)
+            os.dup2(printed.fileno(), 2)
+        sys.argv = words
+        runpy.run_path(words[0], run_name="__main__")
+        sys.exit()
+    print(os.waitstatus_to_exitcode(os.wait()[1]), flush=True)
 """
+# They import most of the rest.
+IMPORTED = (
+    "cns_drake.simulation.simulation",
+    "cns_drake.command_line.simulating",
+    "evaluation.sequences",
+)
 
 
 def test_each_benchmark_is_accounted_for():
@@ -79,28 +99,39 @@ def drive(tmp_path_factory):
     return town / "sequence_01.yaml"
 
 
+@pytest.fixture(scope="module")
+def forking():
+    with subprocess.Popen(
+        [sys.executable, "-c", FORKING, FOLDER, *IMPORTED],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        yield process
+
+
+def run(forking, folder, *words):
+    """Runs a program with its arguments; returns what it prints."""
+    output = folder / "printed"
+    line = json.dumps([str(word) for word in (output, *words)])
+    print(line, file=forking.stdin, flush=True)
+    status = forking.stdout.readline()
+    printed = output.read_text()
+    assert status == "0\n", printed
+    return printed
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
-def test_it_runs(name, drive):
+def test_it_runs(name, drive, forking, tmp_path):
     arguments, word = RUNS[name]
     words = [str(argument).format(drive=drive) for argument in arguments]
-    done = subprocess.run(
-        [sys.executable, "-c", FORKING, FOLDER, FOLDER / name, *words],
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert word in done.stdout
+    assert word in run(forking, tmp_path, FOLDER / name, *words)
 
 
-def test_the_others_are_imported():
+def test_the_others_are_imported(forking, tmp_path):
     """Whatever they import is still there."""
     names = sorted(Path(name).stem for name in BY_HAND - {"peers.py"})
-    code = f"import sys; sys.argv = ['x']; import {', '.join(names)}"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=FOLDER,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
+    program = tmp_path / "program.py"
+    program.write_text(f"import {', '.join(names)}\nprint('all')")
+    assert run(forking, tmp_path, program) == "all\n"
