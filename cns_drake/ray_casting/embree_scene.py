@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.ray_casting.capsule_axes import CapsuleAxes
 from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
@@ -60,16 +61,23 @@ class EmbreeScene:
         self._near = NearCurvedShapes(
             [groups[row] for row in self._second.rows]
         )
+        self._axes = CapsuleAxes(groups)
 
     def place(self, placed: Placed) -> None:
         """Moves groups to their places."""
         self._first.place(placed)
+        self._axes.place(placed)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays."""
         hits = self._first.cast(rays, with_normals=with_normals)
-        if not self._second.rows:
-            return hits
+        if self._second.rows:
+            self._cast_again(rays, hits, with_normals)
+        self._axes.cast(rays, hits)
+        return hits
+
+    def _cast_again(self, rays: Rays, hits: Hits, with_normals: bool) -> None:
+        """Updates the hits of rays that may meet curved shapes that stay."""
         is_near = self._near.contain(rays.p_OSset)
         again = np.empty(len(hits.owner), np.int64)
         again = again[: _find_unsure(hits.owner, is_near, again)]
@@ -89,7 +97,6 @@ class EmbreeScene:
             ):
                 second[is_first] = first[is_first]
                 result[again] = second
-        return hits
 
 
 @compiled
