@@ -68,11 +68,11 @@ for module in modules:
     importlib.import_module(module)
 gc.freeze()
 for line in sys.stdin:
-    output, *words = json.loads(line)
+    *outputs, words = json.loads(line)
     if os.fork() == 0:
-        with open(output, "w") as printed:
-            os.dup2(printed.fileno(), 1)
-            os.dup2(printed.fileno(), 2)
+        for number, output in enumerate(outputs, start=1):
+            with open(output, "w") as printed:
+                os.dup2(printed.fileno(), number)
         sys.argv = words
         runpy.run_path(words[0], run_name="__main__")
         sys.exit()
@@ -112,13 +112,12 @@ def forking():
 
 def run(forking, folder, *words):
     """Runs a program with its arguments; returns what it prints."""
-    output = folder / "printed"
-    line = json.dumps([str(word) for word in (output, *words)])
+    printed, errors = folder / "printed", folder / "errors"
+    line = json.dumps([str(printed), str(errors), [str(one) for one in words]])
     print(line, file=forking.stdin, flush=True)
     status = forking.stdout.readline()
-    printed = output.read_text()
-    assert status == "0\n", printed
-    return printed
+    assert status == "0\n", errors.read_text()
+    return printed.read_text()
 
 
 @pytest.mark.slow
