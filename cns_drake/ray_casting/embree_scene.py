@@ -6,7 +6,8 @@ the unit sphere. A curved shape in a scene slows down all its rays by a third
 (measured), even those that meet only triangles. Curved shapes that stay
 therefore have a second hierarchy. Polyhedra about them in the first one select
 the few rays to cast on it. Those that move are instances, which few rays enter:
-they are in the first hierarchy themselves.
+they are in the first hierarchy themselves. Embree loses rays along the axis of
+a rounded segment, which are therefore cast in closed form (`capsule_axes`).
 """
 
 from __future__ import annotations

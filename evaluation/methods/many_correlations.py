@@ -60,10 +60,11 @@ class ManyCorrelations:
             spectrum: (R, n // 2 + 1) complex64 of the query.
         """
         length = len(self._roots)
+        numbers = np.ascontiguousarray(spectrum).view(np.float32)
         sums = np.empty((len(self._conjugates), length, LANES), np.float32)
         for conjugates, found in zip(self._conjugates, sums, strict=True):
             _sum_magnitudes(
-                np.ascontiguousarray(spectrum).view(np.float32),
+                numbers,
                 conjugates.ravel(),
                 self._factors,
                 self._roots,
