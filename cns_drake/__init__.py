@@ -10,9 +10,9 @@ from cns_drake.base.version import __version__
 
 if TYPE_CHECKING:
     from cns_drake.base.errors import InputError
-    from cns_drake.command_line.sequence_script import (
+    from cns_drake.command_line.drive_script import (
+        run_drive,
         run_script,
-        run_sequence,
     )
     from cns_drake.motion.vehicle_motion import VehicleMotion
     from cns_drake.pictures.static_page import save_meshcat_page
@@ -90,8 +90,8 @@ __all__ = [
     "plan_drive",
     "plan_scenario_traffic",
     "recording_topics",
+    "run_drive",
     "run_script",
-    "run_sequence",
     "save_meshcat_page",
     "simulate",
 ]
@@ -99,7 +99,7 @@ __all__ = [
 # Module -> the public names it defines.
 _HOMES = {
     "cns_drake.base.errors": ("InputError",),
-    "cns_drake.command_line.sequence_script": ("run_script", "run_sequence"),
+    "cns_drake.command_line.drive_script": ("run_script", "run_drive"),
     "cns_drake.motion.vehicle_motion": ("VehicleMotion",),
     "cns_drake.pictures.static_page": ("save_meshcat_page",),
     "cns_drake.recording.bag_writer": ("BagWriter",),

@@ -26,7 +26,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulation import simulate
-from evaluation import sequences
+from evaluation import open_drive
 
 DRIVE = "metropolis_01"
 STAGES = ("01", "04")
@@ -101,14 +101,14 @@ def _film(drive: Scenario, folder: Path, view: View):
         Image.fromarray(photograph).resize(SIZE, Image.Resampling.LANCZOS)
     )
     font = ImageFont.load_default(size=22)
-    sequence = sequences.open(folder)
-    frames = range(FIRST, len(sequence), STEP)
+    recorded = open_drive(folder)
+    frames = range(FIRST, len(recorded), STEP)
     for i in track(frames, f"stage {drive.stage}", len(frames)):
         pixels = still.copy()
-        _draw_scan(pixels, sequence.scan(i), sequence.X_WS[i], view)
+        _draw_scan(pixels, recorded.scan(i), recorded.X_WS[i], view)
         picture = Image.fromarray(pixels)
         pen = ImageDraw.Draw(picture)
-        _draw_car(pen, sequence.X_WS[i], view)
+        _draw_car(pen, recorded.X_WS[i], view)
         title = f"Metropolis, stage {drive.stage}"
         pen.text(
             (14, 10),

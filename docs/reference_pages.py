@@ -53,7 +53,7 @@ SCENARIO: Sections = {
 }
 FAMILY: Sections = {
     "Family": variation.Family,
-    "Routes by lot": variation.DrawnRoutes,
+    "Routes at random": variation.DrawnRoutes,
 }
 CITY: Sections = {
     "roads.yaml": road_schema.RoadsFile,

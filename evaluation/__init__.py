@@ -1,10 +1,10 @@
-"""Structural change and place recognition on LiDAR sequences.
+"""Structural change and place recognition on LiDAR drives.
 
 Independent of the simulator: this package imports neither Drake nor any part of
 `cns_drake` except `cns_drake.base`.
 
 The public names are in `__all__`; a name is imported when it is first used.
-`evaluation.sequences` and `evaluation.methods` are public as well.
+`evaluation.drives` and `evaluation.methods` are public as well.
 """
 
 import importlib
@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cns_drake.base.errors import InputError
     from evaluation.change.tcr import TemporalChange, covered, temporal_change
-    from evaluation.maps.voxel_maps import VoxelMap, map_sequence, voxelise
+    from evaluation.drives import Drive, open_drive
+    from evaluation.maps.voxel_maps import VoxelMap, map_drive, voxelise
     from evaluation.methods import (
         Method,
         MethodConfig,
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
     from evaluation.recognition.protocol import RetrievalProtocol
     from evaluation.recognition.query_outcomes import QueryOutcomes, judge
     from evaluation.recognition.retrieval import Retrieval, retrieve
-    from evaluation.sequences import Sequence, open_sequence
 
 __all__ = [
+    "Drive",
     "InputError",
     "Method",
     "MethodConfig",
@@ -36,7 +37,6 @@ __all__ = [
     "QueryOutcomes",
     "Retrieval",
     "RetrievalProtocol",
-    "Sequence",
     "TemporalChange",
     "VoxelMap",
     "covered",
@@ -44,8 +44,8 @@ __all__ = [
     "judge",
     "known_methods",
     "make_method",
-    "map_sequence",
-    "open_sequence",
+    "map_drive",
+    "open_drive",
     "register",
     "retrieve",
     "temporal_change",
@@ -56,7 +56,7 @@ __all__ = [
 _HOMES = {
     "cns_drake.base.errors": ("InputError",),
     "evaluation.change.tcr": ("TemporalChange", "covered", "temporal_change"),
-    "evaluation.maps.voxel_maps": ("VoxelMap", "map_sequence", "voxelise"),
+    "evaluation.maps.voxel_maps": ("VoxelMap", "map_drive", "voxelise"),
     "evaluation.methods": (
         "Method",
         "MethodConfig",
@@ -68,7 +68,7 @@ _HOMES = {
     "evaluation.recognition.protocol": ("RetrievalProtocol",),
     "evaluation.recognition.query_outcomes": ("QueryOutcomes", "judge"),
     "evaluation.recognition.retrieval": ("Retrieval", "retrieve"),
-    "evaluation.sequences": ("Sequence", "open_sequence"),
+    "evaluation.drives": ("Drive", "open_drive"),
 }
 
 # Python prefers a package to a folder without `__init__`. A user's folder of

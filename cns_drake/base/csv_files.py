@@ -9,6 +9,9 @@ from pathlib import Path
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 
+# Column of files of earlier versions -> what it is called now.
+_FORMER_COLUMNS = {"radius_told": "gate"}
+
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:
     """Returns the rows of a CSV file, each with the number of its line.
@@ -43,13 +46,18 @@ def read_records(
         columns: those that must be there.
 
     Returns:
-        For each row the number of its line, and column -> cell.
+        For each row the number of its line, and column -> cell. A column that
+        had another name in earlier versions has that of now.
 
     Raises:
         InputError: as `read_rows`, a column is missing, or a row has not
             one cell for each column.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
+    names = [
+        now if (now := _FORMER_COLUMNS.get(name, name)) not in names else name
+        for name in names
+    ]
     for column in columns:
         if column not in names:
             raise InputError(f"{path}: no column '{column}'")

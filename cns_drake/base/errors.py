@@ -22,10 +22,10 @@ class InputError(Exception):
         exit_status: exit status of a command that ends with this error.
 
     Example:
-        from evaluation import InputError, open_sequence
+        from evaluation import InputError, open_drive
 
         try:
-            open_sequence("nowhere")
+            open_drive("nowhere")
         except InputError as error:
             print(error)
     """

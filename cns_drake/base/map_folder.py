@@ -59,8 +59,8 @@ class MapFolder:
         return self.path / STRUCTURES_NAME
 
     @property
-    def sequence_table(self) -> Path:
-        """The table of sequences and their figures."""
+    def drive_table(self) -> Path:
+        """The table of drives and their figures."""
         return self.path / "sequences.csv"
 
     @property
@@ -84,15 +84,15 @@ class MapFolder:
             for path in sorted(self.path.glob(stage_name("*")))
         }
 
-    def sequence(self, number: str) -> Path:
-        """Returns the scenario file of a sequence."""
+    def drive(self, number: str) -> Path:
+        """Returns the scenario file of a drive."""
         return self.path / f"sequence_{number}.yaml"
 
-    def sequences(self) -> list[Path]:
-        """Returns the scenario files of the sequences, in order."""
-        return sorted(self.path.glob(self.sequence("*").name))
+    def drives(self) -> list[Path]:
+        """Returns the scenario files of the drives, in order."""
+        return sorted(self.path.glob(self.drive("*").name))
 
-    def recordable_sequences(self) -> list[Path]:
+    def recordable_drives(self) -> list[Path]:
         """Returns those whose stage is there as well.
 
         A map's roads and drives may be there before its city is.
@@ -100,13 +100,13 @@ class MapFolder:
         stages = self.stages()
         return [
             path
-            for path in self.sequences()
+            for path in self.drives()
             if path.stem.removeprefix("sequence_") in stages
         ]
 
 
-def sequence_name(path: Path) -> str:
-    """Returns the name of the sequence that a scenario file describes.
+def drive_name(path: Path) -> str:
+    """Returns the name of the drive that a scenario file describes.
 
     `<map>/sequence_04.yaml` is `<map>_04`; any other file has the name of
     its stem.

@@ -19,7 +19,7 @@ def city(
         typer.Argument(
             metavar="FOLDER",
             help="Folder with roads.yaml, city.yaml and stages.yaml, and the "
-            "sequences of the city, whose figures are brought up to date.",
+            "drives of the city, whose figures are brought up to date.",
         ),
     ],
     start: Annotated[
@@ -27,7 +27,7 @@ def city(
         typer.Option(
             "--start",
             help="First write the missing files besides roads.yaml: a plan "
-            "with a district for each block, two stages, a sequence for "
+            "with a district for each block, two stages, a drive for "
             "each.",
         ),
     ] = False,
@@ -55,7 +55,7 @@ def city(
         tuple[str, str] | None,
         typer.Option(
             metavar="EARLIER LATER",
-            help="Generate nothing. Simulate the sequences of two stages, "
+            help="Generate nothing. Simulate the drives of two stages, "
             "such as 01 04, and show TCR_sym and each method without the "
             "offset of the routes, without absent structures, and "
             "without lower ones.",
@@ -73,7 +73,7 @@ def city(
             generate_city,
         )
         from cns_drake.city.generation.starter import start_city
-        from cns_drake.scenarios.sequence_table import write_table
+        from cns_drake.scenarios.drive_table import write_table
 
     if check:
         changed = differing_files(folder, note, repair_stages=repair_stages)
@@ -98,7 +98,7 @@ def _calibrate(
         from cns_drake.studies.knob_effects import effect_lines, knob_effects
 
     first, last = (
-        load_scenario(MapFolder(folder).sequence(stage))
+        load_scenario(MapFolder(folder).drive(stage))
         for stage in (earlier, later)
     )
     effects = knob_effects(first, last, choose_cluster(jobs, None))

@@ -11,7 +11,7 @@ from cns_drake.base.terminal import example
 from cns_drake.command_line.city import city
 from cns_drake.command_line.importing import import_city
 from cns_drake.command_line.laddering import ladder, levels
-from cns_drake.command_line.listing import list_sequences
+from cns_drake.command_line.listing import list_drives
 from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
 from cns_drake.command_line.reproducing import reproduce
@@ -27,7 +27,7 @@ app = terminal.make_program(
     "Cities that change, driven and recorded by simulated LiDAR.",
     example("cns-drake simulate metropolis_01 --output drives"),
 )
-app.command("list", epilog=example("cns-drake list"))(list_sequences)
+app.command("list", epilog=example("cns-drake list"))(list_drives)
 app.command(epilog=example("cns-drake simulate metropolis_01 --output drives"))(
     simulate
 )

@@ -98,13 +98,14 @@ def import_city(
             max=0.9,
             metavar="PART",
             help="Add a first stage that lacks this share of the buildings, "
-            "drawn by lot, or has them lower; 0.3 without --years.",
+            "drawn at random, or has them lower; 0.3 without --years.",
         ),
     ] = None,
     plain: Annotated[
         bool,
         typer.Option(
-            "--plain", help="Only the content of the file; draw nothing by lot."
+            "--plain",
+            help="Only the content of the file; draw nothing at random.",
         ),
     ] = False,
 ) -> None:
@@ -120,7 +121,7 @@ def import_city(
     path = Path(paths[0])
     stages = tuple(sorted([*(years or ()), *more]))
     if plain and grow is not None:
-        raise InputError("--grow: --plain has nothing drawn by lot")
+        raise InputError("--grow: --plain has nothing drawn at random")
     if not plain and not stages and path.suffix != ".xodr" and grow is None:
         grow = _GROW
     options = ImportOptions(
@@ -146,7 +147,7 @@ def _imported(path: Path, output: Path, options: ImportOptions) -> ImportReport:
     """Writes the map folder of a file."""
     with uninterrupted():
         from cns_drake.imports import import_map
-        from cns_drake.scenarios.sequence_table import write_table
+        from cns_drake.scenarios.drive_table import write_table
 
     return import_map.import_city(
         path,
@@ -175,7 +176,7 @@ def _shortcomings(
         yield (
             f"{report.dated} of {report.dated + report.undated} buildings have"
             f" a year; from stage to stage {_differences(numbers)} structures"
-            " more stand; --grow draws what changes by lot"
+            " more stand; --grow draws what changes at random"
         )
 
 

@@ -15,10 +15,10 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
 
 if TYPE_CHECKING:
-    from cns_drake.scenarios.sequence_table import SequenceRow
+    from cns_drake.scenarios.drive_table import DriveRow
 
 _HEADINGS = (
-    "sequence",
+    "drive",
     "map",
     "stage",
     "length",
@@ -40,7 +40,7 @@ _GIVE_WAY = (
 _GAP = "  "
 
 
-def list_sequences(
+def list_drives(
     folders: Annotated[
         list[Path] | None,
         typer.Argument(
@@ -49,19 +49,19 @@ def list_sequences(
         ),
     ] = None,
 ) -> None:
-    """List sequences and their figures.
+    """List drives and their figures.
 
     Shows length and time of each drive, its recorded frames, and the structures
     and triangles of its stage. A narrow terminal shows fewer columns; a file or
     pipe gets all of them.
     """
     with uninterrupted():
-        from cns_drake.scenarios.sequence_table import sequence_rows
+        from cns_drake.scenarios.drive_table import drive_rows
         from cns_drake.scenarios.shipped import shipped_maps
 
     rows = []
     for folder in folders or shipped_maps().values():
-        of_map = sequence_rows(folder, note)
+        of_map = drive_rows(folder, note)
         if folders and not of_map:
             raise InputError(
                 f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
@@ -72,11 +72,11 @@ def list_sequences(
         print(line)
 
 
-def table_lines(rows: list[SequenceRow], width: int | None) -> Iterator[str]:
-    """Yields the lines of a table of sequences.
+def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
+    """Yields the lines of a table of drives.
 
     Args:
-        rows: the sequences.
+        rows: the drives.
         width: the most characters of a line; columns other than the names are
             dropped to keep it. None keeps all columns.
     """
@@ -104,7 +104,7 @@ def table_lines(rows: list[SequenceRow], width: int | None) -> Iterator[str]:
         cells = dict(zip(_HEADINGS, line, strict=True))
         yield _GAP.join(
             cells[name].ljust(widths[name])
-            if name in ("sequence", "map", "stage")
+            if name in ("drive", "map", "stage")
             else cells[name].rjust(widths[name])
             for name in widths
         ).rstrip()

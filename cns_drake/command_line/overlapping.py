@@ -38,7 +38,7 @@ def overlap(
     with uninterrupted():
         from cns_drake.base.files import make_folder
         from cns_drake.scenarios.scenario_loading import load_scenario
-        from cns_drake.simulation.simulated_drive import SimulatedDrive
+        from cns_drake.simulation.simulated_drive import DriveSimulation
         from cns_drake.studies.exact_overlap import exact_overlaps
         from evaluation.recognition.overlap_table import write_overlaps
         from evaluation.recognition.overlap_truth import compared_frames
@@ -51,7 +51,7 @@ def overlap(
     # Before minutes of work.
     make_folder(output.parent)
     places, queries = (
-        SimulatedDrive(load_scenario(name))() for name in (database, query)
+        DriveSimulation(load_scenario(name))() for name in (database, query)
     )
     found = exact_overlaps(places, queries, protocol, terminal.track)
     frames = compared_frames(places, queries, protocol)

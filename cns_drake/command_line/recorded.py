@@ -13,7 +13,7 @@ from cns_drake.base.progress_bars import count_progress, show_progress
 
 
 class ExportFormat(str, Enum):
-    """Layouts to which sequences are exported."""
+    """Layouts to which drives are exported."""
 
     CNS = "cns"
     KITTI = "kitti"
@@ -21,10 +21,10 @@ class ExportFormat(str, Enum):
 
 
 def export(
-    sequence: Annotated[
+    drive: Annotated[
         Path,
         typer.Argument(
-            metavar="SEQUENCE", help="A recorded folder, or its .mcap file."
+            metavar="DRIVE", help="A recorded folder, or its .mcap file."
         ),
     ],
     layout: Annotated[
@@ -59,12 +59,12 @@ def export(
 ) -> None:
     """Export a recording to a common layout."""
     with uninterrupted():
-        from cns_drake.export.exporting import export_sequence
+        from cns_drake.export.exporting import export_drive
 
     with show_progress() as progress:
-        task = progress.add_task(sequence.name, total=None, note="reading")
-        drive = export_sequence(
-            sequence,
+        task = progress.add_task(drive.name, total=None, note="reading")
+        drive = export_drive(
+            drive,
             layout.value,
             output,
             lidar=sensor,

@@ -1,4 +1,4 @@
-"""Commands that simulate: one sequence, one scan, many sequences."""
+"""Commands that simulate: one drive, one scan, many drives."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def simulate(
         str,
         typer.Argument(
             metavar="NAME|SCENARIO.yaml",
-            help="A shipped sequence, or a scenario file of your own.",
+            help="A shipped drive, or a scenario file of your own.",
         ),
     ],
     output: Output,
@@ -69,15 +69,15 @@ def simulate(
     graphviz: Graphviz = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Drive a sequence and record it.
+    """Simulate a drive and record it.
 
     The recording is a rosbag2 folder of MCAP.
     """
     with uninterrupted():
-        from cns_drake.command_line.sequence_script import run_sequence
+        from cns_drake.command_line.drive_script import run_drive
 
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
-    run_sequence(
+    run_drive(
         scenario,
         output,
         frames=frames,
@@ -182,7 +182,7 @@ def generate(
         list[str] | None,
         typer.Argument(
             metavar="NAME",
-            help="Shipped sequences or scenario files; all shipped ones by "
+            help="Shipped drives or scenario files; all shipped ones by "
             "default.",
         ),
     ] = None,
@@ -196,25 +196,25 @@ def generate(
         Path | None,
         typer.Option(
             metavar="FAMILY.yaml",
-            help="Record the members of a family besides the named sequences. "
+            help="Record the members of a family besides the named drives. "
             "Their scenario files go to <output>/scenarios, cities of "
             "their own to <output>/cities.",
         ),
     ] = None,
 ) -> None:
-    """Record many sequences.
+    """Record many drives.
 
     Finished recordings are skipped; interrupted ones go on where they were.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario_loading import load_scenario
-        from cns_drake.scenarios.shipped import recordable_sequences
+        from cns_drake.scenarios.shipped import recordable_drives
         from cns_drake.studies.recording_jobs import record_all
 
     cluster = choose_cluster(jobs, scheduler)
     if not names and vary is None:
-        names = list(recordable_sequences())
+        names = list(recordable_drives())
     scenarios = [load_scenario(name) for name in names or ()]
     if vary is not None:
         scenarios += family_members(vary, output, cluster)

@@ -37,7 +37,7 @@ def trend(
         str,
         typer.Option(
             metavar="NAME|SCENARIO.yaml",
-            help="The query drive: a shipped sequence or a scenario file.",
+            help="The query drive: a shipped drive or a scenario file.",
         ),
     ],
     output: Results,
@@ -56,7 +56,7 @@ def trend(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario_loading import load_scenario
-        from cns_drake.simulation.simulated_drive import SimulatedDrive
+        from cns_drake.simulation.simulated_drive import DriveSimulation
         from evaluation.study.chosen_methods import choose_methods
         from evaluation.study.trend import write_trend
         from evaluation.study.trend_databases import (
@@ -71,14 +71,14 @@ def trend(
     controls = family_controls(members, query_drive)
     points = measure_drives(
         query_drive.name,
-        SimulatedDrive(query_drive),
+        DriveSimulation(query_drive),
         {
             member.name: TrendDatabase(
-                SimulatedDrive(member), controls[member.name].name
+                DriveSimulation(member), controls[member.name].name
             )
             for member in members
         },
-        {one.name: SimulatedDrive(one) for one in controls.values()},
+        {one.name: DriveSimulation(one) for one in controls.values()},
         output,
         cluster,
         methods,

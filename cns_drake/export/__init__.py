@@ -1,1 +1,1 @@
-"""Exports of recorded sequences to the layouts of existing data sets."""
+"""Exports of recorded drives to the layouts of existing data sets."""

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import yaml
 
 from cns_drake.base.cloud_writing import encode_pcd
-from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
 from cns_drake.export.drive_layout import (
     Layout,
     checked_name,
@@ -23,39 +23,39 @@ from cns_drake.export.drive_layout import (
 )
 
 
-def _drive_folder(sequence: McapSequence) -> PurePosixPath:
+def _drive_folder(drive: McapDrive) -> PurePosixPath:
     """Returns <Map>/<Sequence>, e.g. Metropolis/04 of metropolis_04."""
-    scenario = sequence.scenario or {}
+    scenario = drive.scenario or {}
     place = scenario.get("map") or scenario.get("world") or "world"
     name = Path(str(place)).stem
-    drive = sequence.name.removeprefix(f"{name}_")
+    number = drive.name.removeprefix(f"{name}_")
     return PurePosixPath(
-        checked_name(sequence, name.capitalize()),
-        checked_name(sequence, drive),
+        checked_name(drive, name.capitalize()),
+        checked_name(drive, number),
     )
 
 
-def _outer_files(sequence: McapSequence) -> dict[str, str]:
-    files = {"transformation_lidar.yaml": _mount(sequence.X_BS)}
-    if sequence.X_BI is not None:
-        files["transformation_imu.yaml"] = _mount(sequence.X_BI)
+def _outer_files(drive: McapDrive) -> dict[str, str]:
+    files = {"transformation_lidar.yaml": _mount(drive.X_BS)}
+    if drive.X_BI is not None:
+        files["transformation_imu.yaml"] = _mount(drive.X_BI)
     return files
 
 
-def _inner_files(sequence: McapSequence) -> dict[str, str]:
-    poses = sequence.odometry
+def _inner_files(drive: McapDrive) -> dict[str, str]:
+    poses = drive.odometry
     files = {
         "gt.csv": join_rows(
             zip(
                 poses["stamp_ns"].tolist(),
                 *poses["position"].T.tolist(),
-                *unit_quaternions(sequence).T.tolist(),
+                *unit_quaternions(drive).T.tolist(),
                 strict=True,
             ),
             ",",
         )
     }
-    imu = sequence.imu
+    imu = drive.imu
     if imu is not None:
         files["imu.csv"] = join_rows(
             zip(
@@ -67,7 +67,7 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
             ),
             ",",
         )
-    return files | imu_files(sequence) | scenario_files(sequence)
+    return files | imu_files(drive) | scenario_files(drive)
 
 
 def _scan_files(

@@ -12,7 +12,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import FARTHEST
-from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
 from cns_drake.recording.rosbag2_metadata import to_yaml
 
 # Text that may become the name of a folder: it cannot lead out of it.
@@ -28,8 +28,8 @@ class Layout:
 
     Attributes:
         files: path (with `<place holders>`) -> its content in words.
-        drive_folder: sequence -> the folder of its drive alone.
-        outer_files: sequence -> path -> text of the files outside that folder.
+        drive_folder: drive -> its folder.
+        outer_files: drive -> path -> text of the files outside that folder.
         inner_files: likewise inside that folder, relative to it, without the
             scans.
         scan_files: frame number, stamp [ns] and scan -> its files: path in the
@@ -40,15 +40,15 @@ class Layout:
     """
 
     files: dict[str, str]
-    drive_folder: Callable[[McapSequence], PurePosixPath]
-    outer_files: Callable[[McapSequence], dict[str, str]]
-    inner_files: Callable[[McapSequence], dict[str, str]]
+    drive_folder: Callable[[McapDrive], PurePosixPath]
+    outer_files: Callable[[McapDrive], dict[str, str]]
+    inner_files: Callable[[McapDrive], dict[str, str]]
     scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]] | None
     shared_outer_files: bool
     has_labels: bool
 
 
-def checked_name(sequence: McapSequence, text: str) -> str:
+def checked_name(drive: McapDrive, text: str) -> str:
     """Returns a name from a recording as a part of a path.
 
     Raises:
@@ -56,40 +56,38 @@ def checked_name(sequence: McapSequence, text: str) -> str:
     """
     if not _NAME.fullmatch(text):
         raise InputError(
-            f"{sequence.name}: {text!r} cannot be the name of a folder"
+            f"{drive.name}: {text!r} cannot be the name of a folder"
         )
     return text
 
 
-def scenario_files(
-    sequence: McapSequence, name: str | None = None
-) -> dict[str, str]:
+def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
     """Returns `scenario.yaml`, if the recording has a scenario.
 
     Args:
-        sequence: the recording.
+        drive: the recording.
         name: of the drive; by default the recording's.
     """
-    if sequence.scenario is None:
+    if drive.scenario is None:
         return {}
-    scenario = {**sequence.scenario, "name": name or sequence.name}
+    scenario = {**drive.scenario, "name": name or drive.name}
     return {"scenario.yaml": to_yaml(scenario)}
 
 
-def imu_files(sequence: McapSequence) -> dict[str, str]:
+def imu_files(drive: McapDrive) -> dict[str, str]:
     """Returns `imu.yaml`, the IMU's noise for Kalibr, if it has noise."""
-    return {} if sequence.kalibr is None else {"imu.yaml": sequence.kalibr}
+    return {} if drive.kalibr is None else {"imu.yaml": drive.kalibr}
 
 
-def structure_files(sequence: McapSequence) -> dict[str, str]:
+def structure_files(drive: McapDrive) -> dict[str, str]:
     """Returns `structures.json`, the table of instances, if recorded."""
-    if sequence.instances is None:
+    if drive.instances is None:
         return {}
-    table = list(sequence.instances.values())
+    table = list(drive.instances.values())
     return {"structures.json": json.dumps(table, indent=1) + "\n"}
 
 
-def unit_quaternions(sequence: McapSequence) -> np.ndarray:
+def unit_quaternions(drive: McapDrive) -> np.ndarray:
     """Returns the orientations of the odometry, (M, 4) of unit length.
 
     Quaternions of a recording may have any length; readers of text need unit
@@ -99,17 +97,17 @@ def unit_quaternions(sequence: McapSequence) -> np.ndarray:
         InputError: if a quaternion has no direction, or a position is not
             finite.
     """
-    quat_xyzw = sequence.odometry["quat_xyzw"]
+    quat_xyzw = drive.odometry["quat_xyzw"]
     with np.errstate(over="ignore", invalid="ignore"):
         length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
-    position = sequence.odometry["position"]
+    position = drive.odometry["position"]
     bad = ~(np.isfinite(length[:, 0]) & (length[:, 0] > 0.0))
     bad |= ~(np.abs(position) < FARTHEST).all(axis=1)  # NaN is not.
     if bad.any():
         row = int(bad.argmax())
         raise InputError(
-            f"{sequence.name}: the odometry at"
-            f" {sequence.odometry['stamp_ns'][row]} ns has the position"
+            f"{drive.name}: the odometry at"
+            f" {drive.odometry['stamp_ns'][row]} ns has the position"
             f" {position[row]} and the quaternion {quat_xyzw[row]}"
         )
     # A length of one, up to rounding, stays as it is.

@@ -19,7 +19,7 @@ from cns_drake.base.files import (
     user_errors,
     write_part,
 )
-from cns_drake.base.recordings.mcap_sequence import McapSequence, holds_mcap
+from cns_drake.base.recordings.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.export.cns_layout import CNS
 from cns_drake.export.drive_layout import Layout
@@ -31,7 +31,7 @@ _LAYOUTS = {"cns": CNS, "kitti": KITTI, "tum": TUM}
 _MARKER = "export.yaml"
 
 
-def export_sequence(
+def export_drive(
     recording: Path,
     format_name: str,
     output: Path,
@@ -49,7 +49,7 @@ def export_sequence(
             has written drives of the same format to.
         lidar: name of the LiDAR to export, if the recording has several.
         absent_in: another stage of the recording's map; points of structures
-            that are absent there get the labels of `MarkedSequence`.
+            that are absent there get the labels of `MarkedDrive`.
         on_frame: takes how many frames of how many are done.
 
     Returns:
@@ -66,36 +66,35 @@ def export_sequence(
     if not holds_mcap(recording):
         raise InputError(f"{recording}: no recording (.mcap) there")
     if absent_in is None:
-        sequence = McapSequence(recording, lidar)
+        drive = McapDrive(recording, lidar)
     else:
         # Drake takes a while to load, and only marks need it.
-        from cns_drake.export.marked_sequence import MarkedSequence
+        from cns_drake.export.marked_drive import MarkedDrive
 
-        sequence = MarkedSequence(recording, lidar, absent_in)
-    drive = output / layout.drive_folder(sequence)
+        drive = MarkedDrive(recording, lidar, absent_in)
+    folder = output / layout.drive_folder(drive)
     outer = {
-        output / name: text
-        for name, text in layout.outer_files(sequence).items()
+        output / name: text for name, text in layout.outer_files(drive).items()
     }
     _claim(output, format_name, layout)
-    if drive.exists():
+    if folder.exists():
         raise InputError(
-            f"{drive}: this drive is there already; remove it or give another "
+            f"{folder}: this drive is there already; remove it or give another "
             "folder"
         )
     if layout.shared_outer_files:
         for path, text in outer.items():
             _check_equal(path, text)
-    part = part_path(drive)
+    part = part_path(folder)
     try:
-        _write_drive(sequence, layout, part, on_frame)
+        _write_drive(drive, layout, part, on_frame)
         for path, text in outer.items():
             _write_text(path, text)
-        with user_errors(drive):
-            os.replace(part, drive)
+        with user_errors(folder):
+            os.replace(part, folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
-    return drive
+    return folder
 
 
 def _claim(output: Path, format_name: str, layout: Layout) -> None:
@@ -142,7 +141,7 @@ def _check_equal(path: Path, text: str) -> None:
 
 
 def _write_drive(
-    sequence: McapSequence,
+    drive: McapDrive,
     layout: Layout,
     folder: Path,
     on_frame: Callable[[int, int], None],
@@ -151,26 +150,26 @@ def _write_drive(
         # Left behind by an export that was killed.
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        for name, text in layout.inner_files(sequence).items():
+        for name, text in layout.inner_files(drive).items():
             (folder / name).write_text(text, encoding="utf-8")
         if layout.scan_files is None:
-            on_frame(len(sequence), len(sequence))
+            on_frame(len(drive), len(drive))
             return
         for frame, (stamp_ns, scan) in enumerate(
-            zip(sequence.stamps_ns.tolist(), sequence, strict=True)
+            zip(drive.stamps_ns.tolist(), drive, strict=True)
         ):
             try:
                 files = layout.scan_files(frame, stamp_ns, scan)
             except ValueError as error:
                 raise InputError(
-                    f"{sequence.name}: scan {frame}: {error}"
+                    f"{drive.name}: scan {frame}: {error}"
                 ) from error
             for name, content in files.items():
                 path = folder / name
                 if frame == 0:
                     path.parent.mkdir()
                 path.write_bytes(content)
-            on_frame(frame + 1, len(sequence))
+            on_frame(frame + 1, len(drive))
 
 
 def _write_text(path: Path, text: str) -> None:

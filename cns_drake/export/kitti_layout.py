@@ -14,7 +14,7 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.cloud_writing import encode_bin, encode_labels
-from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
 from cns_drake.export.drive_layout import (
     Layout,
     imu_files,
@@ -35,47 +35,47 @@ _X_CS = np.array(
 _PROJECTION = np.eye(4)
 
 
-def _number(sequence: McapSequence) -> str:
+def _number(drive: McapDrive) -> str:
     """Returns the drive's number: the digits its name ends with, or 00.
 
     The second LiDAR of a recording adds 100, the third 200: tools for KITTI
     want numbers.
     """
-    digits = re.findall(r"\d*$", sequence.name)[0]
-    lidar = sequence.lidar_names.index(sequence.lidar_name)
+    digits = re.findall(r"\d*$", drive.name)[0]
+    lidar = drive.lidar_names.index(drive.lidar_name)
     return f"{100 * lidar + int(digits or 0):02d}"
 
 
-def _name(sequence: McapSequence) -> str:
+def _name(drive: McapDrive) -> str:
     """Returns the drive's name; later LiDARs add their own name."""
-    if sequence.lidar_name == sequence.lidar_names[0]:
-        return sequence.name
-    return f"{sequence.name}_{sequence.lidar_name}"
+    if drive.lidar_name == drive.lidar_names[0]:
+        return drive.name
+    return f"{drive.name}_{drive.lidar_name}"
 
 
-def _drive_folder(sequence: McapSequence) -> PurePosixPath:
-    return PurePosixPath("sequences", _number(sequence))
+def _drive_folder(drive: McapDrive) -> PurePosixPath:
+    return PurePosixPath("sequences", _number(drive))
 
 
-def _outer_files(sequence: McapSequence) -> dict[str, str]:
-    return {f"poses/{_number(sequence)}.txt": _poses(sequence)}
+def _outer_files(drive: McapDrive) -> dict[str, str]:
+    return {f"poses/{_number(drive)}.txt": _poses(drive)}
 
 
-def _inner_files(sequence: McapSequence) -> dict[str, str]:
-    elapsed_ns = sequence.stamps_ns - sequence.stamps_ns[0]
+def _inner_files(drive: McapDrive) -> dict[str, str]:
+    elapsed_ns = drive.stamps_ns - drive.stamps_ns[0]
     calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
     calibration["Tr"] = _X_CS
     return {
         # Readers of KITTI look in `poses`, those of SemanticKITTI here.
-        "poses.txt": _poses(sequence),
+        "poses.txt": _poses(drive),
         "times.txt": "".join(f"{seconds(ns)}\n" for ns in elapsed_ns.tolist()),
         "calib.txt": "".join(
             f"{name}: {_rows(X[None])}" for name, X in calibration.items()
         ),
-        "first_pose.txt": _rows(sequence.X_WS[:1]),
-        **imu_files(sequence),
-        **structure_files(sequence),
-        **scenario_files(sequence, _name(sequence)),
+        "first_pose.txt": _rows(drive.X_WS[:1]),
+        **imu_files(drive),
+        **structure_files(drive),
+        **scenario_files(drive, _name(drive)),
     }
 
 
@@ -89,9 +89,9 @@ def _scan_files(
     return files
 
 
-def _poses(sequence: McapSequence) -> str:
+def _poses(drive: McapDrive) -> str:
     """Returns X_C0C of each scan as a row of text."""
-    X_S0S = poses.inverse(sequence.X_WS[0]) @ sequence.X_WS
+    X_S0S = poses.inverse(drive.X_WS[0]) @ drive.X_WS
     return _rows(_X_CS @ X_S0S @ poses.inverse(_X_CS))
 
 

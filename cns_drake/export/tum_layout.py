@@ -11,7 +11,7 @@ from pathlib import PurePosixPath
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
 from cns_drake.export.drive_layout import (
     Layout,
     checked_name,
@@ -21,22 +21,22 @@ from cns_drake.export.drive_layout import (
 )
 
 
-def _drive_folder(sequence: McapSequence) -> PurePosixPath:
-    return PurePosixPath(checked_name(sequence, sequence.name))
+def _drive_folder(drive: McapDrive) -> PurePosixPath:
+    return PurePosixPath(checked_name(drive, drive.name))
 
 
-def _inner_files(sequence: McapSequence) -> dict[str, str]:
-    X_WB = sequence.odometry
-    X_WS = sequence.X_WS
+def _inner_files(drive: McapDrive) -> dict[str, str]:
+    X_WB = drive.odometry
+    X_WS = drive.X_WS
     R_WS = Rotation.from_matrix(X_WS[:, :3, :3])
     return {
         "base_link.tum": _rows(
-            X_WB["stamp_ns"], X_WB["position"], unit_quaternions(sequence)
+            X_WB["stamp_ns"], X_WB["position"], unit_quaternions(drive)
         ),
         "lidar.tum": _rows(
-            sequence.stamps_ns, X_WS[:, :3, 3], R_WS.as_quat(canonical=True)
+            drive.stamps_ns, X_WS[:, :3, 3], R_WS.as_quat(canonical=True)
         ),
-        **imu_files(sequence),
+        **imu_files(drive),
     }
 
 
@@ -53,17 +53,17 @@ def _rows(
 
 TUM = Layout(
     files={
-        "<sequence>/base_link.tum": "timestamp tx ty tz qx qy qz qw: pose of"
+        "<drive>/base_link.tum": "timestamp tx ty tz qx qy qz qw: pose of"
         " the vehicle's frame (on the ground, under the LiDAR; forward, left,"
         " up) in the world, a row for each message of the odometry; seconds"
         " and metres",
-        "<sequence>/lidar.tum": "pose of the LiDAR in the world, likewise, a"
+        "<drive>/lidar.tum": "pose of the LiDAR in the world, likewise, a"
         " row a scan",
-        "<sequence>/imu.yaml": "noise of the IMU, if it has noise, as Kalibr"
+        "<drive>/imu.yaml": "noise of the IMU, if it has noise, as Kalibr"
         " has it",
     },
     drive_folder=_drive_folder,
-    outer_files=lambda sequence: {},
+    outer_files=lambda drive: {},
     inner_files=_inner_files,
     scan_files=None,
     shared_outer_files=False,

@@ -1,7 +1,7 @@
 """CityJSON 1.0 to 2.0 and CityJSONSeq: objects and their faces.
 
 https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON holds all
-objects; in a sequence (.jsonl) a first line of that type is followed by a
+objects; in a drive (.jsonl) a first line of that type is followed by a
 feature a line, each with vertices of its own.
 """
 

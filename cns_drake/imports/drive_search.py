@@ -18,8 +18,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from cns_drake.imports.waypoint_drives import (
     LONGEST,
     SHORTEST,
-    Drive,
     Obstacle,
+    WaypointDrive,
 )
 
 # Least and greatest length of the second drive's own arms [m].
@@ -84,7 +84,7 @@ class WayGraph(ABC):
         """Returns whether a way meets no place twice."""
 
     @abstractmethod
-    def drive(self, way: Sequence[int]) -> Drive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
         """Returns a drive along a way, or the obstacle on it."""
 
     @abstractmethod
@@ -122,21 +122,21 @@ class WayGraph(ABC):
         return np.flatnonzero(self._is_open)
 
 
-def find_drives(graph: WayGraph) -> list[Drive]:
+def find_drives(graph: WayGraph) -> list[WaypointDrive]:
     """Returns two drives that share a part, or one, or none."""
     for _ in range(_MOST_TRIES):
         way = _longest(graph)
         if graph.length(way) < SHORTEST:
             return []
         first = graph.drive(way)
-        if isinstance(first, Drive):
+        if isinstance(first, WaypointDrive):
             break
         graph.close(graph.blocked(way, first.place))
     else:
         return []
     for candidate in islice(_seconds(graph, way), _MOST_TRIES):
         second = graph.drive(candidate)
-        if isinstance(second, Drive):
+        if isinstance(second, WaypointDrive):
             return [first, second]
     return [first]
 

@@ -12,8 +12,8 @@ from shapely.geometry import LineString
 from cns_drake.imports.drive_search import WayGraph
 from cns_drake.imports.free_space import CELL, FreeSpace
 from cns_drake.imports.waypoint_drives import (
-    Drive,
     Obstacle,
+    WaypointDrive,
     steerable_drive,
 )
 
@@ -74,7 +74,7 @@ class CellGraph(WayGraph):
     def is_simple(self, way: Sequence[int]) -> bool:
         return len(set(way)) == len(way)
 
-    def drive(self, way: Sequence[int]) -> Drive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
         return simplified_drive(self._xy[list(way)], self._space)
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ def simplified_drive(
     xy: np.ndarray,
     space: FreeSpace,
     tolerances: Sequence[float] = _SIMPLIFICATIONS,
-) -> Drive | Obstacle:
+) -> WaypointDrive | Obstacle:
     """Returns a drive with as few waypoints as the room allows.
 
     Args:
@@ -95,7 +95,7 @@ def simplified_drive(
         space: where a car has room.
         tolerances: of its waypoints against these places, tried in turn [m].
     """
-    found: Drive | Obstacle = Obstacle(xy[len(xy) // 2])
+    found: WaypointDrive | Obstacle = Obstacle(xy[len(xy) // 2])
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
         if len(xy) < 4 * straightened:
             break
@@ -107,7 +107,7 @@ def simplified_drive(
         found = steerable_drive(
             _densified(np.array(line.coords)), space.obstacle
         )
-        if isinstance(found, Drive):
+        if isinstance(found, WaypointDrive):
             break
     return found
 

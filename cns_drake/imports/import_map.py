@@ -35,7 +35,7 @@ from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_traffic import lanes_of_streets
 from cns_drake.imports.staged_city import StagedCity, stage_city
 from cns_drake.imports.street_drives import StreetGraph
-from cns_drake.imports.waypoint_drives import Drive, steerable_drive
+from cns_drake.imports.waypoint_drives import WaypointDrive, steerable_drive
 
 Progress = Callable[[str], None]
 # Receives the folder, and the numbers of structures and triangles by stage.
@@ -217,7 +217,7 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
 
 def _find_drives(
     city: ForeignCity, space: FreeSpace, options: ImportOptions
-) -> list[Drive]:
+) -> list[WaypointDrive]:
     """Returns drives in the lanes of streets, or else in free space."""
     streets = StreetGraph(city.streets, space, _side(city, options))
     return find_drives(streets) or find_drives(CellGraph(space))
@@ -231,8 +231,8 @@ def _side(city: ForeignCity, options: ImportOptions) -> DriveOn:
 
 
 def _lifted(
-    drives: Sequence[Drive], ground: Ground, faults: ImportFaults
-) -> list[Drive]:
+    drives: Sequence[WaypointDrive], ground: Ground, faults: ImportFaults
+) -> list[WaypointDrive]:
     """Returns drives with the heights of their waypoints.
 
     A drive that a car cannot steer on its slopes is left out and counted.
@@ -241,7 +241,7 @@ def _lifted(
     for drive in drives:
         xy = np.round(drive.waypoints, 3)
         waypoints = np.column_stack([xy, ground.height(xy)])
-        if isinstance(steerable_drive(waypoints, margin=1.0), Drive):
+        if isinstance(steerable_drive(waypoints, margin=1.0), WaypointDrive):
             lifted.append(replace(drive, waypoints=waypoints))
         else:
             faults.add("drive too tight on its slope, left out", "drive")
@@ -257,7 +257,7 @@ def _titles(city: StagedCity, options: ImportOptions) -> dict[str, str]:
 
 
 def _report(
-    city: StagedCity, drives: Sequence[Drive], faults: ImportFaults
+    city: StagedCity, drives: Sequence[WaypointDrive], faults: ImportFaults
 ) -> ImportReport:
     return ImportReport(
         kinds=dict(Counter(one.kind for one in city.kept)),

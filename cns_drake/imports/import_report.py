@@ -29,11 +29,11 @@ class ImportOptions:
         seed: of the draws of `grow`, and of buildings along a file's roads.
         along: waypoints of a drive, in place of the two proposed ones.
         grow: share of the buildings that an added first stage lacks, or has
-            lower, by lot; no such stage if None.
+            lower, at random; no such stage if None.
         drive_on: side of the streets; if None, the file's, or else the right.
         within: greatest distance of structures from the drives [m]; no limit if
             None.
-        dressed: whether looks that the file leaves open are drawn by lot.
+        dressed: whether looks that the file leaves open are drawn at random.
     """
 
     years: tuple[int, ...] = ()

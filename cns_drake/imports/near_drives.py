@@ -16,13 +16,13 @@ from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.waypoint_drives import Drive, driven_path
+from cns_drake.imports.waypoint_drives import WaypointDrive, driven_path
 from cns_drake.motion.control_points import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 
 
-def drive_along(path: Path) -> Drive:
+def drive_along(path: Path) -> WaypointDrive:
     """Returns a drive along waypoints of a file, without their heights.
 
     Raises:
@@ -37,12 +37,12 @@ def drive_along(path: Path) -> Drive:
             f"{path}: a bend at {x:.1f}, {y:.1f} has a radius of {radius:.2f} "
             f"m; the car needs {TIGHTEST_RADIUS:.2f} m"
         )
-    return Drive(points[:, :2], control)
+    return WaypointDrive(points[:, :2], control)
 
 
 def keep_near(
     structures: Sequence[Imported],
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
     distance: float,
     faults: ImportFaults,
 ) -> list[Imported | None]:

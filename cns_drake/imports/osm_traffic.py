@@ -15,7 +15,7 @@ from cns_drake.imports.import_report import DriveOn
 from cns_drake.imports.street_lanes import Street
 from cns_drake.imports.street_traffic import StreetTraffic
 from cns_drake.imports.street_walkways import StreetWalkways
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.lane_joining import join_lanes
@@ -37,7 +37,7 @@ def lanes_of_streets(
     places: StreetPlaces,
     structures: Sequence[Imported],
     added: Sequence[Imported],
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
     drive_on: DriveOn,
 ) -> str | None:
     """Returns the text of a file of lanes; None if no vehicle can drive on.

@@ -12,7 +12,7 @@ import numpy as np
 
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.free_space import CELL, FreeSpace
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 from cns_drake.scene.semantics import CLASS_RGB
 
 _DPI = 130
@@ -24,7 +24,7 @@ def draw_overview(
     path: Path,
     structures: Sequence[Imported],
     space: FreeSpace | None,
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
 ) -> None:
     """Draws structures, the room for a car, and the drives [m].
 

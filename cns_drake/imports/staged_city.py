@@ -19,7 +19,7 @@ from cns_drake.imports.gone_buildings import with_gone
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.near_drives import keep_near
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Greatest distance from the middle of a city [m].
 _FARTHEST = 10_000.0
@@ -45,7 +45,10 @@ class StagedCity:
     gone: Sequence[Imported] = ()
 
     def near(
-        self, drives: Sequence[Drive], distance: float, faults: ImportFaults
+        self,
+        drives: Sequence[WaypointDrive],
+        distance: float,
+        faults: ImportFaults,
     ) -> StagedCity:
         """Returns the city without structures far from drives.
 

@@ -18,7 +18,7 @@ from cns_drake.imports.street_lanes import (
     lane_path,
     make_lanes,
 )
-from cns_drake.imports.waypoint_drives import LONGEST, Drive, Obstacle
+from cns_drake.imports.waypoint_drives import LONGEST, Obstacle, WaypointDrive
 
 _SPACING = 1.0
 # Share of their lateral offset that cars keep in a turn: in narrow streets and
@@ -70,7 +70,7 @@ class StreetGraph(WayGraph):
         passed = [lane.begin for lane in lanes] + [lanes[-1].end]
         return len(set(passed)) == len(passed)
 
-    def drive(self, way: Sequence[int]) -> Drive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
         rows = lane_path([self.lanes[k] for k in way], _SPACING)
         middle = uniform_filter1d(rows[:, :2], _ROUND, axis=0, mode="nearest")
         along = np.gradient(middle, axis=0)
@@ -80,13 +80,13 @@ class StreetGraph(WayGraph):
         reach = int(_TURN / _SPACING)
         near = np.convolve(bends, np.ones(2 * reach + 1), mode="same") > 0
         right = np.column_stack([along[:, 1], -along[:, 0]]) * self._side
-        found: Drive | Obstacle = Obstacle(middle[len(middle) // 2])
+        found: WaypointDrive | Obstacle = Obstacle(middle[len(middle) // 2])
         for tolerance, share in product(_TOLERANCES, _AT_TURNS):
             aside = rows[:, 2] * np.where(near, share, 1.0)
             aside = uniform_filter1d(aside, _SMOOTH_ASIDE, mode="nearest")
             places = middle + aside[:, None] * right
             found = simplified_drive(places, self._space, (tolerance,))
-            if isinstance(found, Drive):
+            if isinstance(found, WaypointDrive):
                 break
         return found
 

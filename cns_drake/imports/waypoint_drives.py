@@ -31,7 +31,7 @@ Room = Callable[[np.ndarray], np.ndarray | None]
 
 
 @dataclass(frozen=True)
-class Drive:
+class WaypointDrive:
     """A drive through a city.
 
     Attributes:
@@ -63,7 +63,7 @@ class Obstacle:
 
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
-) -> Drive | Obstacle:
+) -> WaypointDrive | Obstacle:
     """Returns the drive along waypoints, or the obstacle.
 
     Args:
@@ -85,7 +85,7 @@ def steerable_drive(
     missing = None if room is None else room(driven)
     if missing is not None:
         return Obstacle(missing)
-    drive = Drive(waypoints, points)
+    drive = WaypointDrive(waypoints, points)
     too_short = drive.length < SHORTEST
     return Obstacle(points[len(points) // 2]) if too_short else drive
 

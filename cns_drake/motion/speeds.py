@@ -1,4 +1,4 @@
-"""Speeds and accelerations of a sequence."""
+"""Speeds and accelerations of a drive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
 
 
 class Speeds(BaseModel):
-    """Bounds of a sequence's speed and acceleration at every instant.
+    """Bounds of a drive's speed and acceleration at every instant.
 
     Attributes:
         cruise: the highest speed; the roads' limits hold besides [m/s].

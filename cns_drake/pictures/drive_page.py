@@ -52,7 +52,7 @@ _TRAFFIC_INTERVAL = 5
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveRecord:
     """The record of a drive.
 
     Attributes:
@@ -84,7 +84,7 @@ class Drive:
 
 
 def make_drive_page(
-    drive: Drive,
+    drive: DriveRecord,
     world: World,
     *,
     other_stage: World | None = None,
@@ -181,7 +181,7 @@ def _draw_missing(meshcat: Meshcat, name: str, parts: Sequence[Part]) -> None:
     meshcat.SetProperty(path, "visible", False)
 
 
-def _animate(meshcat: Meshcat, drive: Drive, world: World) -> None:
+def _animate(meshcat: Meshcat, drive: DriveRecord, world: World) -> None:
     """Draws moving bodies and scans, and animates them over the drive."""
     animation = MeshcatAnimation(frames_per_second=1.0 / drive.period)
     inspector = world.scene_graph.model_inspector()
@@ -211,7 +211,7 @@ def _animate(meshcat: Meshcat, drive: Drive, world: World) -> None:
 def _animate_limbs(
     meshcat: Meshcat,
     animation: MeshcatAnimation,
-    drive: Drive,
+    drive: DriveRecord,
     inspector: SceneGraphInspector,
 ) -> None:
     """Draws a moving frame and its limbs as one."""

@@ -18,7 +18,7 @@ from pydrake.systems.framework import (
 
 from cns_drake.base.files import complete_part, write_part
 from cns_drake.pictures.drive_page import (
-    Drive,
+    DriveRecord,
     make_drive_page,
     moving_frames,
 )
@@ -93,7 +93,7 @@ class MeshcatRecorder(LeafSystem):
         self._scan_spacing = scan_spacing
         self._way_to_scan = 0.0
         self._num_frames = num_frames
-        self.drive = Drive(
+        self.drive = DriveRecord(
             period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
         )
 

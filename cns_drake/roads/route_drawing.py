@@ -1,4 +1,4 @@
-"""Draws a route over a road network by lot."""
+"""Draws a route over a road network at random."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scenario: all settings of one recorded sequence."""
+"""A scenario: all settings of one recorded drive."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Scenario(Section):
     follows either lanes of the map's roads or waypoints.
 
     Attributes:
-        name: name of the sequence and its files; letters, digits and
+        name: name of the drive and its files; letters, digits and
             underscores.
         map: a shipped map, or a folder laid out like one.
         stage: stage of the map.

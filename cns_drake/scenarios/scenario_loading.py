@@ -9,11 +9,11 @@ import re
 from pydantic import ValidationError
 
 from cns_drake.base.errors import InputError, describe_validation_error
-from cns_drake.base.map_folder import sequence_name
+from cns_drake.base.map_folder import drive_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scenarios.shipped import shipped_maps, shipped_sequences
+from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
 
 
 def make_scenario(values: dict, source: object) -> Scenario:
@@ -41,10 +41,10 @@ def make_scenario(values: dict, source: object) -> Scenario:
 
 
 def load_scenario(name_or_file: str | Path) -> Scenario:
-    """Loads a shipped sequence by name, or a scenario file.
+    """Loads a shipped drive by name, or a scenario file.
 
     Raises:
-        InputError: there is no such sequence or file, or the file is not a
+        InputError: there is no such drive or file, or the file is not a
             usable scenario.
 
     Example:
@@ -52,13 +52,13 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
 
         scenario = load_scenario("metropolis_04")
     """
-    shipped = shipped_sequences()
+    shipped = shipped_drives()
     path = shipped.get(str(name_or_file), Path(name_or_file))
     # Unlike pathlib, os.path accepts names that no file can have.
     if not os.path.isfile(path):
         if re.fullmatch(r"\w+", str(name_or_file)):
             raise InputError(
-                f"unknown sequence '{name_or_file}'; there are: "
+                f"unknown drive '{name_or_file}'; there are: "
                 f"{', '.join(shipped)}; or give a scenario file"
             )
         raise InputError(f"{path}: no such scenario file")
@@ -76,7 +76,7 @@ def read_scenario_file(path: Path) -> Scenario:
     values = read_yaml(path)
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of scenario fields")
-    values.setdefault("name", sequence_name(path))
+    values.setdefault("name", drive_name(path))
     for field in ("map", "world", "waypoints"):
         place = values.get(field)
         if isinstance(place, str) and place not in shipped_maps():

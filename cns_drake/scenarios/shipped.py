@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from pathlib import Path
 
-from cns_drake.base.map_folder import MapFolder, sequence_name
+from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.scenarios.worlds_archive import unpacked
 
 
@@ -43,19 +43,19 @@ def shipped_maps() -> dict[str, Path]:
     }
 
 
-def shipped_sequences() -> dict[str, Path]:
-    """Returns the file of each shipped sequence, by name (`<map>_<NN>`)."""
+def shipped_drives() -> dict[str, Path]:
+    """Returns the file of each shipped drive, by name (`<map>_<NN>`)."""
     return {
-        sequence_name(path): path
+        drive_name(path): path
         for folder in shipped_maps().values()
-        for path in MapFolder(folder).sequences()
+        for path in MapFolder(folder).drives()
     }
 
 
-def recordable_sequences() -> dict[str, Path]:
-    """Returns the shipped sequences whose stage is shipped as well, by name."""
+def recordable_drives() -> dict[str, Path]:
+    """Returns the shipped drives whose stage is shipped as well, by name."""
     return {
-        sequence_name(path): path
+        drive_name(path): path
         for folder in shipped_maps().values()
-        for path in MapFolder(folder).recordable_sequences()
+        for path in MapFolder(folder).recordable_drives()
     }

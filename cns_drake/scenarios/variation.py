@@ -53,7 +53,7 @@ from cns_drake.scenarios.scenario_files import (
     world_file,
 )
 from cns_drake.scenarios.scenario_loading import find_files, load_scenario
-from cns_drake.scenarios.shipped import shipped_sequences
+from cns_drake.scenarios.shipped import shipped_drives
 from cns_drake.scene.world import load_world, structures_in
 
 # Tags of structures that can be missing; streets, ground and furniture stay.
@@ -112,7 +112,7 @@ class Family(_Model):
     """The base of a family of scenarios, and its variations.
 
     Attributes:
-        base: sequence or scenario file that gives map, route, speeds and
+        base: drive or scenario file that gives map, route, speeds and
             sensors.
         stage: stage from which structures are missing; by default the map's
             last one.
@@ -171,7 +171,7 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
             describe_validation_error(path, error, Family)
         ) from None
     base: str | Path = family.base
-    if base not in shipped_sequences():
+    if base not in shipped_drives():
         base = path.parent / base
     return vary(load_scenario(base), family, path, redraw)
 

@@ -10,10 +10,10 @@ from cns_drake.scenarios.recording_schedule import (
     first_points_topic,
 )
 from cns_drake.simulation.loaded_drive import LoadedDrive
-from cns_drake.simulation.planned_sequence import PlannedSequence
+from cns_drake.simulation.planned_drive import PlannedDrive
 
 
-class DriveInProgress(PlannedSequence):
+class DriveInProgress(PlannedDrive):
     """The scans of the first LiDAR, at the time of their recording.
 
     Reading a scan advances the simulation to its frame.

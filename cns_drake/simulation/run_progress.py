@@ -18,7 +18,7 @@ class Run:
     """The result of a simulation.
 
     Attributes:
-        name: of the sequence.
+        name: of the drive.
         folder: the recording.
         num_frames: frames in the recording.
         resumed_frames: number of them that an interrupted run had recorded.

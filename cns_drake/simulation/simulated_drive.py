@@ -15,7 +15,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, FixedInputPortValue
 
 from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.base.recordings.sequence import index_instances
+from cns_drake.base.recordings.drive import index_instances
 from cns_drake.motion.sweep import Sweep
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.planning import count_frames, plan_drive
@@ -30,7 +30,7 @@ from cns_drake.scenarios.sensor_making import (
 from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.simulation.kept_scenes import keep_scene, take_scene
-from cns_drake.simulation.planned_sequence import PlannedSequence
+from cns_drake.simulation.planned_drive import PlannedDrive
 from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,
     with_traffic,
@@ -42,7 +42,7 @@ from cns_drake.traffic.traffic_adding import make_traffic
 
 
 @dataclass(frozen=True)
-class SimulatedDrive:
+class DriveSimulation:
     """Opens a scenario's drive, as seen by its first LiDAR.
 
     Attributes:
@@ -51,8 +51,8 @@ class SimulatedDrive:
 
     scenario: Scenario
 
-    def __call__(self) -> SimulatedSequence:
-        return SimulatedSequence(self.scenario)
+    def __call__(self) -> SimulatedDrive:
+        return SimulatedDrive(self.scenario)
 
     @property
     def group(self) -> str | None:
@@ -75,7 +75,7 @@ class SimulatedDrive:
         }
 
 
-class SimulatedSequence(PlannedSequence):
+class SimulatedDrive(PlannedDrive):
     """The scans of a scenario, as in its recording.
 
     A scan is simulated on each access.

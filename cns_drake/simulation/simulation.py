@@ -16,7 +16,7 @@ from cns_drake.base.files import (
     write_part,
 )
 from cns_drake.base.interrupts import interrupts_wait
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.recording_folder import RecordingFolder
@@ -51,7 +51,7 @@ def simulate(
     graphviz_file: Path | None = None,
     overwrite: bool = False,
     num_threads: int = 1,
-    reader: Callable[[Sequence], None] | None = None,
+    reader: Callable[[Drive], None] | None = None,
     on_frame: ProgressCallback = lambda done, total: None,
     on_note: NoteCallback = lambda text: None,
 ) -> Run:
@@ -182,7 +182,7 @@ def _advance(
     drive: LoadedDrive,
     first: int,
     on_frame: Callable[[int], None],
-    reader: Callable[[Sequence], None] | None,
+    reader: Callable[[Drive], None] | None,
 ) -> float:
     """Simulates frames and writes their messages.
 

@@ -16,7 +16,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.studies.redrawing import redraw_cities
-from evaluation.sequences.sampling import sample_frames
+from evaluation.drives.sampling import sample_frames
 
 # Name of the only stage of a redrawn city.
 _STAGE = "01"
@@ -71,8 +71,8 @@ def _drives(
 ) -> Iterator[Scenario]:
     """Yields an endless series of drives."""
     maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
-    sequences = {
-        name: [load_scenario(path) for path in folder.recordable_sequences()]
+    drives = {
+        name: [load_scenario(path) for path in folder.recordable_drives()]
         for name, folder in maps.items()
     }
     own = Path(str(query.map)).name
@@ -80,18 +80,18 @@ def _drives(
 
     def redrawn(name: str, seed: int) -> Iterator[Scenario]:
         cities = redraw_cities(maps[name].path, _STAGE, [seed], output, cluster)
-        for one in sequences[name]:
+        for one in drives[name]:
             yield _elsewhere(one, str(cities[seed]), _STAGE, f"c{seed}")
 
     for name in others:
-        yield from sequences[name]
+        yield from drives[name]
     if own in maps:
         yield from redrawn(own, 1)
     for name in others:
         for stage in maps[name].stages():
             yield from (
                 _elsewhere(one, one.map, stage, stage)
-                for one in sequences[name]
+                for one in drives[name]
                 if one.stage != stage
             )
     for seed in itertools.count(1):

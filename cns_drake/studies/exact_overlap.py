@@ -23,12 +23,12 @@ from cns_drake.base.progress import Track, silent
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.sensors.beam_coverage import BeamCoverage
 from cns_drake.sensors.beam_pattern import BeamPattern
-from cns_drake.simulation.simulated_drive import SimulatedSequence
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from evaluation.drives import Drive, check_same_world
+from evaluation.drives.sampling import within_range
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE
-from evaluation.sequences import Sequence, check_same_world
-from evaluation.sequences.sampling import within_range
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class VisibleSurfaces:
 
 
 def exact_overlaps(
-    database: SimulatedSequence,
-    query: Sequence,
+    database: SimulatedDrive,
+    query: Drive,
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> np.ndarray:

@@ -21,7 +21,7 @@ from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.plan.stages import Stage, Stages, load_stages
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import DriveSimulation
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.trend_databases import TrendDatabase, measure_drives
 from evaluation.study.trend_points import TrendPoint
@@ -56,8 +56,8 @@ def knob_effects(
     """Simulates the pair as it is and with each knob taken back.
 
     Args:
-        earlier: a sequence; the database.
-        later: a sequence of the same map at a later stage; the query.
+        earlier: a drive; the database.
+        later: a drive of the same map at a later stage; the query.
         cluster: where the work is done.
 
     Raises:
@@ -68,9 +68,9 @@ def knob_effects(
         drives = _variants(earlier, later, folder)
         points = measure_drives(
             later.name,
-            SimulatedDrive(later),
+            DriveSimulation(later),
             {
-                name: TrendDatabase(SimulatedDrive(drive))
+                name: TrendDatabase(DriveSimulation(drive))
                 for name, drive in drives.items()
             },
             {},

@@ -19,7 +19,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.distractors import distracting_drives
 from cns_drake.studies.ladder_causes import plain_drives
 from cns_drake.studies.ladder_rungs import Extent, Rung, plan_rungs
@@ -129,7 +129,7 @@ def _query_drives(maps: Iterable[str]) -> list[Scenario]:
     """
     drives: dict[str, Scenario] = {}
     for folder in dict.fromkeys(recordable_map(name) for name in maps):
-        drive = load_scenario(MapFolder(folder).recordable_sequences()[-1])
+        drive = load_scenario(MapFolder(folder).recordable_drives()[-1])
         if drive.name in drives:
             raise InputError(
                 f"{folder}: another map has a drive {drive.name}, too"
@@ -190,7 +190,7 @@ class _Plan:
         # Only drives without a change serve several rungs.
         is_shared = drive == getattr(self._plain, side)
         files = self._describe(drive, role, needs) if is_shared else None
-        return RungDrive(SimulatedDrive(drive), files)
+        return RungDrive(DriveSimulation(drive), files)
 
     def _describe(
         self,
@@ -204,7 +204,7 @@ class _Plan:
         files = self._files.survey(f"{drive.name} {role}")
         name = f"describe {drive.name}"
         step = DescribeDrive(
-            SimulatedDrive(drive),
+            DriveSimulation(drive),
             role,
             self._methods,
             self._protocol,

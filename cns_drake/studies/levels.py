@@ -70,7 +70,7 @@ def planned_levels() -> dict[tuple[str, int], str]:
     """Returns the levels as this version of the program simulates them."""
     found = {}
     for name, folder in shipped_maps().items():
-        query = load_scenario(MapFolder(folder).recordable_sequences()[-1])
+        query = load_scenario(MapFolder(folder).recordable_drives()[-1])
         drives: dict[int, list[str]] = {}
         for rung in plan_rungs(query, LEVELS_EXTENT)[0]:
             drives.setdefault(rung.level, []).append(rung.fingerprint())
@@ -127,13 +127,13 @@ def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
 
 
 def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
-    columns = ("map", "cause", "level", "method", "radius_told", "drives")
+    columns = ("map", "cause", "level", "method", "gate", "drives")
     for line, row in read_records(file, (*columns, *_NUMBERS)):
         if row["cause"] not in (NONE, ALL):
             continue
         where = f"{file}: line {line}"
         try:
-            level, is_gated = int(row["level"]), int(row["radius_told"])
+            level, is_gated = int(row["level"]), int(row["gate"])
             auc, low, high = (float(row[name]) for name in _NUMBERS)
         except ValueError:
             raise InputError(f"{where}: not a number") from None
@@ -166,7 +166,7 @@ def _check_complete(
             number = there.count((level, is_gated))
             if name == map_name and number != 1:
                 raise InputError(
-                    f"{file}: {method}: level {level} of {name}, radius_told "
+                    f"{file}: {method}: level {level} of {name}, gate "
                     f"{int(is_gated)}: {number} rows instead of 1"
                 )
 

@@ -33,7 +33,7 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
     # Workers may run elsewhere.
     folder, pictures = folder.resolve(), pictures.absolute()
     kinds: dict[str, tuple[type[_Picture], int]] = {
-        "drives": (DrawDrives, len(MapFolder(folder).recordable_sequences()))
+        "drives": (DrawDrives, len(MapFolder(folder).recordable_drives()))
     }
     if MapFolder(folder).views.is_file():
         kinds["stages"] = (DrawStages, 2)
@@ -114,7 +114,7 @@ class DrawDrives(_Picture):
     def _scenarios(self) -> list[Scenario]:
         return [
             load_scenario(file)
-            for file in MapFolder(self.folder).recordable_sequences()
+            for file in MapFolder(self.folder).recordable_drives()
         ]
 
 

@@ -72,7 +72,7 @@ def plan_recordings(
     """
     for name, count in Counter(s.name for s in scenarios).items():
         if count > 1:
-            raise InputError(f"{name}: {count} sequences have this name")
+            raise InputError(f"{name}: {count} drives have this name")
     output = output.absolute()
     waiting = []
     for scenario in scenarios:

@@ -12,7 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.scenarios.planning import shown_beside
@@ -87,7 +87,7 @@ class Record(Step):
         survey = self.survey if is_new and self._is_first_read() else None
         found: list[RecordingSurvey] = []
 
-        def read(drive: Sequence) -> None:
+        def read(drive: Drive) -> None:
             assert survey is not None
             methods = survey.methods if survey.roles else ()
             # The survey's own job reports the error again.

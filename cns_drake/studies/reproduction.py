@@ -16,7 +16,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording_jobs import plan_recordings
 from cns_drake.studies.recording_step import Record, is_recorded
@@ -44,10 +44,10 @@ def reproduce_maps(
     with_costs: bool = False,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Records the sequences of maps, evaluates them and reports.
+    """Records the drives of maps, evaluates them and reports.
 
     `<output>/<name>/` gets each recording, `<output>/pages/<name>.html` a
-    web page of each sequence's drive, `<output>/pictures` the drives of each
+    web page of each drive, `<output>/pictures` the routes of each
     map from above and a street in its first and last stage,
     `<output>/report` the tables and figures. Finished work is not repeated.
 
@@ -73,31 +73,31 @@ def reproduce_maps(
     """
     methods = choose_methods(settings=settings)
     folders = [recordable_map(name) for name in maps or _recordable_maps()]
-    sequences, controls, pictures = [], [], []
+    drives, controls, pictures = [], [], []
     for folder in folders:
-        of_map = _sequences(folder)
-        sequences += of_map
+        of_map = _drives(folder)
+        drives += of_map
         controls += control_drives(of_map)
         if not quick:
             pictures += plan_pictures(folder, output / "pictures")
-    pages = {s.name: output / "pages" / f"{s.name}.html" for s in sequences}
+    pages = {s.name: output / "pages" / f"{s.name}.html" for s in drives}
     jobs = []
     if not quick:
         jobs = plan_recordings(
-            [*sequences, *controls], output, pages=pages if with_pages else {}
+            [*drives, *controls], output, pages=pages if with_pages else {}
         )
     waiting = {job.name for job in jobs}
     recordings = [
         recording_info(scenario, output, is_waiting=scenario.name in waiting)
-        for scenario in (*sequences, *controls)
+        for scenario in (*drives, *controls)
     ]
     if quick:
         recordings = [
             recording
             if is_recorded(scenario, output)
-            else replace(recording, made_by=SimulatedDrive(scenario))
+            else replace(recording, made_by=DriveSimulation(scenario))
             for scenario, recording in zip(
-                (*sequences, *controls), recordings, strict=True
+                (*drives, *controls), recordings, strict=True
             )
         ]
     # The order is that of `cns-eval report`.
@@ -142,37 +142,37 @@ def _surveyed(recording: Job, study: Sequence[Job]) -> Job:
     return recording
 
 
-def _sequences(folder: Path) -> list[Scenario]:
-    sequences = [
-        load_scenario(path) for path in MapFolder(folder).recordable_sequences()
+def _drives(folder: Path) -> list[Scenario]:
+    drives = [
+        load_scenario(path) for path in MapFolder(folder).recordable_drives()
     ]
-    for sequence in sequences:
-        if sequence.map is None:
+    for drive in drives:
+        if drive.map is None:
             raise InputError(
-                f"{sequence.source}: map: missing, and needed to compare stages"
+                f"{drive.source}: map: missing, and needed to compare stages"
             )
-    return sequences
+    return drives
 
 
-def control_drives(sequences: Sequence[Scenario]) -> list[Scenario]:
-    """Returns the control drives of a map's sequences.
+def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
+    """Returns the control drives of a map's drives.
 
     A control drive is the route of an earlier stage through the last one:
-    compared with the last stage's own sequence, all of its apparent change is
+    compared with the last stage's own drive, all of its apparent change is
     due to the routes and not to the city.
     """
-    last = max(sequences, key=lambda sequence: sequence.stage or "")
+    last = max(drives, key=lambda drive: drive.stage or "")
     return [
-        sequence.model_copy(
+        drive.model_copy(
             update={
-                "name": f"{sequence.name}_stage_{last.stage}",
+                "name": f"{drive.name}_stage_{last.stage}",
                 "stage": last.stage,
-                "title": f"Control: the route of {sequence.name} "
+                "title": f"Control: the route of {drive.name} "
                 f"in stage {last.stage}",
             }
         )
-        for sequence in sequences
-        if sequence is not last
+        for drive in drives
+        if drive is not last
     ]
 
 
@@ -201,7 +201,7 @@ def _recordable_maps() -> list[str]:
     return [
         name
         for name, folder in shipped_maps().items()
-        if MapFolder(folder).recordable_sequences()
+        if MapFolder(folder).recordable_drives()
     ]
 
 
@@ -217,7 +217,7 @@ def recordable_map(name: str) -> Path:
         raise InputError(
             f"unknown map '{name}'; there are: {known}; or give a folder"
         )
-    if not MapFolder(folder).recordable_sequences():
+    if not MapFolder(folder).recordable_drives():
         raise InputError(
             f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
         )

@@ -23,7 +23,7 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.sequence import Sequence, check_same_map
+from cns_drake.base.recordings.drive import Drive, check_same_map
 from evaluation.alignment.alignment_report import AlignmentReport
 from evaluation.alignment.anchor_search import (
     find_candidates,
@@ -46,7 +46,7 @@ from evaluation.alignment.straightening import (
     make_consistent,
 )
 from evaluation.alignment.submaps import Submaps
-from evaluation.sequences.moved import MovedSequence
+from evaluation.drives.moved import MovedDrive
 
 When = Literal["auto", "always", "never"]
 
@@ -75,14 +75,14 @@ class Alignment:
         report: on the alignment.
     """
 
-    first: Sequence
-    second: Sequence
+    first: Drive
+    second: Drive
     report: AlignmentReport
 
 
 def in_one_world(
-    first: Sequence,
-    second: Sequence,
+    first: Drive,
+    second: Drive,
     when: When,
     track: Track = silent,
     *,
@@ -114,8 +114,8 @@ def in_one_world(
 
 
 def align(
-    first: Sequence,
-    second: Sequence,
+    first: Drive,
+    second: Drive,
     track: Track = silent,
     *,
     hold_first: bool = False,
@@ -166,19 +166,19 @@ def align(
     if abs(ground) < _GROUND_TOLERANCE:
         ground = 0.0
     X_TS = source.bend(X_TK)
-    frame = target.sequence.world_frame
+    frame = target.drive.world_frame
     if ground != 0.0 or held.disagreement > 0.0:
         # The result is no longer in the world that the name stands for.
         frame = f"{frame}, corrected by {target.name}"
-    held_drive = _lowered(target.sequence, target.X_WS, ground, frame, target)
-    moved_drive = _lowered(source.sequence, X_TS, ground, frame, target)
+    held_drive = _lowered(target.drive, target.X_WS, ground, frame, target)
+    moved_drive = _lowered(source.drive, X_TS, ground, frame, target)
     return Alignment(
         moved_drive if swapped else held_drive,
         held_drive if swapped else moved_drive,
         AlignmentReport(
             held=target.name,
             moved=source.name,
-            frames=(target.sequence.world_frame, source.sequence.world_frame),
+            frames=(target.drive.world_frame, source.drive.world_frame),
             guess=guess,
             candidates=num_candidates,
             attempts=search.num_attempts,
@@ -207,7 +207,7 @@ def _start(
     Raises:
         InputError: if no guess fits.
     """
-    a, b = source.sequence, target.sequence
+    a, b = source.drive, target.drive
     known = None
     if a.world_frame == b.world_frame:
         known = "the common frame"
@@ -291,16 +291,16 @@ def _doubtful(search: LoopSearch, X_TK: np.ndarray) -> np.ndarray:
 
 
 def _lowered(
-    sequence: Sequence,
+    drive: Drive,
     X_WS: np.ndarray,
     ground: float,
     world_frame: str,
     target: Submaps,
-) -> Sequence:
+) -> Drive:
     """Returns a drive at poses whose heights start at the ground."""
     X = X_WS.copy()
     X[:, 2, 3] -= ground
-    return MovedSequence(sequence, X, world_frame, target.sequence.datum)
+    return MovedDrive(drive, X, world_frame, target.drive.datum)
 
 
 def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:

@@ -15,8 +15,8 @@ import numpy as np
 from cns_drake.base.angles import wrapped
 from cns_drake.base.progress import Track
 from evaluation.alignment.submaps import Submaps
+from evaluation.drives.sampling import gather
 from evaluation.methods.scan_context import ScanContext
-from evaluation.sequences.sampling import gather
 
 # Candidates for each query. LT-mapper takes 3 with a score of at least 0.7.
 # Here there is no limit: in a changed city right ones score 0.3 to 0.5, and
@@ -74,7 +74,7 @@ def find_candidates(
     """Finds keyframes of two drives that look alike."""
     method = ScanContext()
     places = [
-        method.describe_place(gather(target.sequence, frame, 1, _MAX_RANGE))
+        method.describe_place(gather(target.drive, frame, 1, _MAX_RANGE))
         for frame in track(
             target.frames, f"describing {target.name}", len(target)
         )
@@ -85,7 +85,7 @@ def find_candidates(
         range(len(source)), f"recognising {source.name}", len(source)
     ):
         frame = int(source.frames[k])
-        query = method.describe(gather(source.sequence, frame, 1, _MAX_RANGE))
+        query = method.describe(gather(source.drive, frame, 1, _MAX_RANGE))
         scores = np.nan_to_num(method.score(query, database), nan=-np.inf)
         for place in np.argsort(-scores, kind="stable")[:_CANDIDATES]:
             if not np.isfinite(scores[place]):

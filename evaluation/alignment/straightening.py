@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.progress import Track
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
 from evaluation.alignment.anchoring import straighten
 from evaluation.alignment.loop_search import find_self_loops
 from evaluation.alignment.loops import loop_errors
 from evaluation.alignment.submaps import Submaps
-from evaluation.sequences.moved import MovedSequence
+from evaluation.drives.moved import MovedDrive
 
 # Number of tried pairs; number that must fit, so that a chance fit bends no
 # drive; and number of rounds, if the drive has drifted.
@@ -40,7 +40,7 @@ class Straightened:
     disagreement: float
 
 
-def make_consistent(sequence: Sequence, track: Track) -> Straightened:
+def make_consistent(drive: Drive, track: Track) -> Straightened:
     """Makes a drive agree with itself, if it passes a place again.
 
     It can where it passes a place again.
@@ -48,20 +48,20 @@ def make_consistent(sequence: Sequence, track: Track) -> Straightened:
     Raises:
         InputError: if a scan cannot be read.
     """
-    drive = Submaps(sequence)
+    submaps = Submaps(drive)
     worst = 0.0
     # Near places come first: their loops bring others within reach.
     for _ in range(_ROUNDS):
-        loops = find_self_loops(drive, _NUM_LOOPS, track)
+        loops = find_self_loops(submaps, _NUM_LOOPS, track)
         if len(loops) < _FEWEST_LOOPS:
             break
-        distances, _ = loop_errors(loops, drive.X_WK, drive.X_WK)
+        distances, _ = loop_errors(loops, submaps.X_WK, submaps.X_WK)
         disagreement = float(np.quantile(distances, 0.75))
         if disagreement < _DRIFT:
             break
         worst = max(worst, disagreement)
-        X_WS = drive.bend(straighten(loops, drive))
-        drive = Submaps(
-            MovedSequence(sequence, X_WS, sequence.world_frame, sequence.datum)
+        X_WS = submaps.bend(straighten(loops, submaps))
+        submaps = Submaps(
+            MovedDrive(drive, X_WS, drive.world_frame, drive.datum)
         )
-    return Straightened(drive, worst)
+    return Straightened(submaps, worst)

@@ -7,10 +7,10 @@ from functools import lru_cache
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
 from evaluation.alignment.registration import Surface, make_surface
+from evaluation.drives.sampling import sample_frames
 from evaluation.maps.voxel_maps import VoxelAccumulator
-from evaluation.sequences.sampling import sample_frames
 
 # Between keyframes, along the path [m]; on very long drives more, on very
 # short ones less.
@@ -37,16 +37,16 @@ class Submaps:
     """Keyframes K of a drive, and their surroundings.
 
     Attributes:
-        sequence: the drive.
+        drive: the drive.
         X_WS: (N, 4, 4) poses of its frames.
         travelled: (N,) length of the path so far [m].
         frames: (K,) keyframes.
         X_WK: (K, 4, 4) their poses.
     """
 
-    def __init__(self, sequence: Sequence):
-        self.sequence = sequence
-        self.X_WS = sequence.X_WS
+    def __init__(self, drive: Drive):
+        self.drive = drive
+        self.X_WS = drive.X_WS
         p_WS = self.X_WS[:, :3, 3]
         steps = np.linalg.norm(np.diff(p_WS, axis=0), axis=1)
         self.travelled = np.concatenate([[0.0], np.cumsum(steps)])
@@ -67,7 +67,7 @@ class Submaps:
     @property
     def name(self) -> str:
         """Name of the drive."""
-        return self.sequence.name
+        return self.drive.name
 
     @property
     def length(self) -> float:
@@ -128,7 +128,7 @@ class Submaps:
         X_KW = poses.inverse(self.X_WS[frame])
         accumulator = VoxelAccumulator(_VOXEL_SIZE)
         for other in sorted(chosen):
-            points = self.sequence.scan(other)
+            points = self.drive.scan(other)
             near = np.hypot(points["x"], points["y"]) < _RANGE
             accumulator.add(points[near], X_KW @ self.X_WS[other])
         centroids = accumulator.to_map().centroids_W

@@ -25,17 +25,17 @@ from evaluation.change.tcr import (
     temporal_change,
 )
 from evaluation.clouds.cloud_files import is_cloud, read_blocks
+from evaluation.drives import (
+    Drive,
+    Placed,
+    check_same_world,
+    open_drive,
+)
 from evaluation.maps.voxel_maps import (
     VOXEL_SIZE,
     VoxelAccumulator,
     VoxelMap,
-    map_sequence,
-)
-from evaluation.sequences import (
-    Placed,
-    Sequence,
-    check_same_world,
-    open_sequence,
+    map_drive,
 )
 
 if TYPE_CHECKING:
@@ -50,16 +50,16 @@ class Surveyed:
     """A map, with the drive that made it.
 
     Attributes:
-        name: of the sequence or file.
+        name: of the drive or file.
         voxels: the map on the grid of the TCR.
         positions: (N, 3) of the sensor [m]; None for a map file.
-        sequence: the drive, or its world frame and map; None for a map file.
+        drive: the drive, or its world frame and map; None for a map file.
     """
 
     name: str
     voxels: VoxelMap
     positions: np.ndarray | None = None
-    sequence: Placed | None = None
+    drive: Placed | None = None
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class ChangeReport:
 
 
 def survey(path: Path, track: Track = silent) -> Surveyed:
-    """Maps a sequence, or reads a map file.
+    """Maps a drive, or reads a map file.
 
     Raises:
         InputError: if it can be read as neither.
@@ -145,11 +145,11 @@ def survey_in_one_world(
     track: Track = silent,
     lidar: str | None = None,
 ) -> tuple[list[Surveyed], list[AlignmentReport]]:
-    """Maps sequences, or reads map files, all in one world.
+    """Maps drives, or reads map files, all in one world.
 
     Args:
-        paths: of sequences or map files; map files must be in that world.
-        when: whether later sequences are aligned with the first.
+        paths: of drives or map files; map files must be in that world.
+        when: whether later drives are aligned with the first.
         track: reports progress.
         lidar: name of the LiDAR, for recordings with several.
 
@@ -157,12 +157,10 @@ def survey_in_one_world(
         The maps, in the order of the paths, and reports on alignments.
 
     Raises:
-        InputError: if a path cannot be read, or a sequence cannot be aligned.
+        InputError: if a path cannot be read, or a drive cannot be aligned.
     """
     opened = [_open(path, lidar) for path in paths]
-    drives = {
-        i: one for i, one in enumerate(opened) if isinstance(one, Sequence)
-    }
+    drives = {i: one for i, one in enumerate(opened) if isinstance(one, Drive)}
     if when == "always" and len(drives) < len(opened):
         raise InputError("--align always: a map file cannot be aligned")
     reports = []
@@ -187,9 +185,9 @@ def survey_in_one_world(
     ], reports
 
 
-def survey_sequence(sequence: Sequence, voxels: VoxelMap) -> Surveyed:
-    """Returns a sequence with its map on the grid of the TCR."""
-    return Surveyed(sequence.name, voxels, sequence.X_WS[:, :3, 3], sequence)
+def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
+    """Returns a drive with its map on the grid of the TCR."""
+    return Surveyed(drive.name, voxels, drive.X_WS[:, :3, 3], drive)
 
 
 def compare(
@@ -212,8 +210,8 @@ def compare(
         InputError: if the three are not of one world, or the control is on
             neither route.
     """
-    if source.sequence is not None and target.sequence is not None:
-        check_same_world(source.sequence, target.sequence)
+    if source.drive is not None and target.drive is not None:
+        check_same_world(source.drive, target.drive)
     change = temporal_change(
         source.voxels.centroids_W, target.voxels.centroids_W
     )
@@ -242,18 +240,18 @@ def compare(
     )
 
 
-def _open(path: Path, lidar: str | None = None) -> Sequence | Path:
-    """Returns the sequence at a path, or the path if it is a map file."""
+def _open(path: Path, lidar: str | None = None) -> Drive | Path:
+    """Returns the drive at a path, or the path if it is a map file."""
     path = Path(path)
     if path.is_file() and is_cloud(path):
         return path
-    return open_sequence(path, lidar)
+    return open_drive(path, lidar)
 
 
-def _survey(source: Sequence | Path, track: Track) -> Surveyed:
-    if isinstance(source, Sequence):
-        voxels = map_sequence(source, VOXEL_SIZE, track)
-        return survey_sequence(source, voxels)
+def _survey(source: Drive | Path, track: Track) -> Surveyed:
+    if isinstance(source, Drive):
+        voxels = map_drive(source, VOXEL_SIZE, track)
+        return survey_drive(source, voxels)
     accumulator = VoxelAccumulator(VOXEL_SIZE)
     for points in read_blocks(source):
         accumulator.add(points)
@@ -265,17 +263,17 @@ def _same_stage_partner(
 ) -> Surveyed:
     """Returns the drive whose route differs from the control's."""
     if (
-        source.sequence is None
-        or control.sequence is None
+        source.drive is None
+        or control.drive is None
         or source.positions is None
         or target.positions is None
         or control.positions is None
     ):
         raise InputError(
-            f"{control.name}: a control needs three recorded sequences, not"
+            f"{control.name}: a control needs three recorded drives, not"
             " map files"
         )
-    check_same_world(source.sequence, control.sequence)
+    check_same_world(source.drive, control.drive)
     on_source = _route_distance(control.positions, source.positions)
     on_target = _route_distance(control.positions, target.positions)
     if min(on_source, on_target) > _SAME_ROUTE:

@@ -3,7 +3,7 @@
 Source: "The City that Never Settles", equations 1 to 3. The following choices
 are open in the paper.
 
-- X is the map of a whole sequence in world coordinates, as the centroids of
+- X is the map of a whole drive in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.

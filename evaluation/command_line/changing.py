@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
+from evaluation.command_line.drive_notes import print_notes
 from evaluation.command_line.options import Align, AlignName, Json, LidarName
 from evaluation.command_line.result_rows import change_rows
-from evaluation.command_line.sequence_notes import print_notes
 
 
 def tcr(
@@ -30,12 +30,12 @@ def tcr(
 ) -> None:
     """Temporal change ratio of two drives or maps.
 
-    A and B are recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry,
+    A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
-    the directed ratios. Sequences in different world frames are aligned.
+    the directed ratios. Drives in different world frames are aligned.
     """
     from evaluation.change import drive_change as change
-    from evaluation.sequences import Sequence
+    from evaluation.drives import Drive
 
     paths = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
@@ -48,8 +48,8 @@ def tcr(
         alignment=alignments[0] if alignments else None,
     )
     for one in surveys:
-        if isinstance(one.sequence, Sequence):
-            print_notes(one.sequence)
+        if isinstance(one.drive, Drive):
+            print_notes(one.drive)
         ignored = one.voxels.num_ignored
         if ignored:
             terminal.note(

@@ -14,7 +14,7 @@ from evaluation.command_line.reporting import report, trend
 
 app = terminal.make_program(
     "cns-eval",
-    "Structural change and place recognition on LiDAR sequences.",
+    "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
 )
 app.command(

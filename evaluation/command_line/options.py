@@ -17,7 +17,7 @@ class ModeName(str, Enum):
 
 
 class AlignName(str, Enum):
-    """When sequences are aligned to one world."""
+    """When drives are aligned to one world."""
 
     AUTO = "auto"
     ALWAYS = "always"
@@ -27,7 +27,7 @@ class AlignName(str, Enum):
 Align = Annotated[
     AlignName,
     typer.Option(
-        help="Align sequences: those whose world frames differ, all, or none."
+        help="Align drives: those whose world frames differ, all, or none."
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base import terminal
+from evaluation.command_line.drive_notes import print_notes
 from evaluation.command_line.options import (
     Align,
     AlignName,
@@ -26,7 +27,6 @@ from evaluation.command_line.protocol_options import (
     with_protocol,
 )
 from evaluation.command_line.result_rows import recognition_rows
-from evaluation.command_line.sequence_notes import print_notes
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
@@ -87,18 +87,18 @@ def pr(
     """Place recognition of one drive in another.
 
     Measures how well the scans of QUERY find their place in DATABASE. Both are
-    recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Sequences in
+    recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in
     different world frames are aligned.
     """
     from cns_drake.base.errors import InputError
     from evaluation.alignment import in_one_world
+    from evaluation.drives import open_drive
     from evaluation.recognition import place_recognition
     from evaluation.recognition.overlap_table import (
         read_overlaps,
         write_overlaps,
     )
     from evaluation.recognition.overlap_truth import compared_frames
-    from evaluation.sequences import open_sequence
 
     protocol = replace(protocol, overlap=overlap_of(truth))
     for option, file in (
@@ -115,7 +115,7 @@ def pr(
         )
     chosen = _chosen_method(method, parameter, sensor_height)
     places, query_drive = (
-        open_sequence(path, lidar) for path in (database, query)
+        open_drive(path, lidar) for path in (database, query)
     )
     for drive in (places, query_drive):
         print_notes(drive)

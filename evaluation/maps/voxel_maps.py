@@ -1,4 +1,4 @@
-"""Maps of whole sequences: the points of all scans, thinned to voxels.
+"""Maps of whole drives: the points of all scans, thinned to voxels.
 
 Voxels are on a grid that is fixed in the world, since its place influences a
 coarse voxel map. The grid has multiples of the voxel size in x and y, and
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
 from evaluation.geometry.sorting import cell_order
 from evaluation.maps.voxel_table import SLOT, enter, locate, move
 
@@ -38,9 +38,9 @@ class VoxelMap:
         num_ignored: number of points left out as not finite.
 
     Example:
-        from evaluation import map_sequence, open_sequence
+        from evaluation import map_drive, open_drive
 
-        voxels = map_sequence(open_sequence(path))
+        voxels = map_drive(open_drive(path))
         print(voxels.centroids_W.shape)
     """
 
@@ -221,12 +221,12 @@ def voxelise(
     return accumulator.to_map(), ignored
 
 
-def map_sequence(
-    sequence: Sequence,
+def map_drive(
+    drive: Drive,
     voxel_size: float = VOXEL_SIZE,
     track: Track = silent,
 ) -> VoxelMap:
-    """Returns the world-frame map of all scans of a sequence.
+    """Returns the world-frame map of all scans of a drive.
 
     One pass over the scans, one in memory at a time. The default grid is
     the one on which structural change is defined.
@@ -235,17 +235,15 @@ def map_sequence(
         InputError: if a scan or a pose cannot be read.
 
     Example:
-        from evaluation import map_sequence, open_sequence
+        from evaluation import map_drive, open_drive
 
-        voxels = map_sequence(open_sequence("recordings/downtown_01"))
+        voxels = map_drive(open_drive("recordings/downtown_01"))
     """
     accumulator = VoxelAccumulator(voxel_size)
-    X_WS = sequence.X_WS
-    indices = track(
-        range(len(sequence)), f"mapping {sequence.name}", len(sequence)
-    )
+    X_WS = drive.X_WS
+    indices = track(range(len(drive)), f"mapping {drive.name}", len(drive))
     for index in indices:
-        accumulator.add(sequence.scan(index), X_WS[index])
+        accumulator.add(drive.scan(index), X_WS[index])
     return accumulator.to_map()
 
 

@@ -121,14 +121,14 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             candidate.
         """
 
-    def score_in_sequence(
+    def score_in_drive(
         self,
         queries: Sequence[Descriptor],
         database: Database,
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        """Compares the last of some queries, for methods that match sequences.
+        """Compares the last of some queries, for methods that match drives.
 
         Args:
             queries: of a drive, from its first to the present one.

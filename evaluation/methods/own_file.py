@@ -18,7 +18,7 @@ from evaluation.methods.method import Method
 # The methods of the interface, which the author may have written.
 _CALLED = (
     *("__init__", "describe", "describe_place", "describe_batch"),
-    *("build_database", "score", "score_in_sequence", "rerank"),
+    *("build_database", "score", "score_in_drive", "rerank"),
     *("relative_pose", "relative_poses"),
 )
 

@@ -82,7 +82,7 @@ def method_names() -> frozenset[str]:
 
 @cache
 def tcr_values() -> dict[tuple[str, str, str], float]:
-    """Returns (map, sequence, later sequence) -> TCR_sym."""
+    """Returns (map, drive, later drive) -> TCR_sym."""
     return {
         (row["map"], row["sequence_a"], row["sequence_b"]): float(
             row["tcr_sym"]
@@ -92,7 +92,7 @@ def tcr_values() -> dict[tuple[str, str, str], float]:
 
 
 def tcr_between(map_name: str, first: str, second: str) -> float:
-    """Returns the TCR_sym of two sequences, in either order."""
+    """Returns the TCR_sym of two drives, in either order."""
     earlier, later = sorted((first, second))
     return tcr_values()[map_name, earlier, later]
 

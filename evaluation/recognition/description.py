@@ -10,13 +10,13 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
+from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.sequences.sampling import gather, sample_frames
 
 # The role of a drive.
 Role = Literal["places", "queries"]
@@ -63,7 +63,7 @@ class DescribedDrive:
 
 
 def describe_drive(
-    sequence: Sequence,
+    drive: Drive,
     methods: Iterable[Method],
     roles: Set[Role],
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
@@ -76,7 +76,7 @@ def describe_drive(
     describes it once. Clouds are shared between methods.
 
     Args:
-        sequence: the drive.
+        drive: the drive.
         methods: to run.
         roles: of the drive.
         protocol: for the frames of places and queries, and their clouds.
@@ -88,13 +88,13 @@ def describe_drive(
         The descriptions by each method.
 
     Raises:
-        InputError: if the sequence cannot be read, it lacks a field that a
+        InputError: if the drive cannot be read, it lacks a field that a
             method needs, or no described cloud has a point within range.
     """
     describing = [
-        _Describing(method, sequence, roles, protocol) for method in methods
+        _Describing(method, drive, roles, protocol) for method in methods
     ]
-    frames = {role: _frames(sequence, role, protocol) for role in roles}
+    frames = {role: _frames(drive, role, protocol) for role in roles}
     wanted = np.unique(np.concatenate([*frames.values()])).tolist()
     # Number of merged scans of a cloud, of those before its frame, and fields
     # of its points.
@@ -103,10 +103,10 @@ def describe_drive(
     if visit is not None:
         kinds.add(single)
     num_points = 0
-    for frame in track(wanted, f"describing {sequence.name}", len(wanted)):
+    for frame in track(wanted, f"describing {drive.name}", len(wanted)):
         clouds = {
             (number, before, fields): gather(
-                sequence, frame, number, protocol.max_range, fields, before
+                drive, frame, number, protocol.max_range, fields, before
             )
             for number, before, fields in kinds
         }
@@ -117,19 +117,19 @@ def describe_drive(
             one.add(frame, clouds[one.kind])
     if num_points == 0:
         raise InputError(
-            f"{sequence.name}: no finite point within {protocol.max_range:g} m"
+            f"{drive.name}: no finite point within {protocol.max_range:g} m"
             f" of the LiDAR in any of {len(wanted)} scans"
         )
     return [one.finish() for one in describing]
 
 
 def _frames(
-    sequence: Sequence, role: Role, protocol: RetrievalProtocol
+    drive: Drive, role: Role, protocol: RetrievalProtocol
 ) -> np.ndarray:
     spacing = protocol.place_spacing
     if role == "queries":
         spacing = protocol.query_spacing
-    return sample_frames(sequence.X_WS[:, :3, 3], spacing)
+    return sample_frames(drive.X_WS[:, :3, 3], spacing)
 
 
 class _Describing:
@@ -138,7 +138,7 @@ class _Describing:
     def __init__(
         self,
         method: Method,
-        sequence: Sequence,
+        drive: Drive,
         roles: Set[Role],
         protocol: RetrievalProtocol,
     ):
@@ -151,11 +151,11 @@ class _Describing:
         self._waiting: list[tuple[int, np.ndarray]] = []
         scans = {}
         for role in ("places", "queries"):
-            frames = _frames(sequence, role, protocol)
+            frames = _frames(drive, role, protocol)
             scans[role] = DescribedScans(
-                frames, sequence.stamps_ns[frames], sequence.X_WS[frames]
+                frames, drive.stamps_ns[frames], drive.X_WS[frames]
             )
-        self._drive = DescribedDrive(sequence.name, **scans)
+        self._drive = DescribedDrive(drive.name, **scans)
         self._members = {
             role: set(scans[role].frames.tolist()) if role in roles else set()
             for role in scans

@@ -19,10 +19,10 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
+from evaluation.drives.sampling import gather, sample_frames
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
-from evaluation.sequences.sampling import gather, sample_frames
 
 # Number of points of a query's scan that are compared.
 _NUM_POINTS = 8192
@@ -44,8 +44,8 @@ class Seen(Protocol):
 
 
 def overlap_matrix(
-    database: Sequence,
-    query: Sequence,
+    database: Drive,
+    query: Drive,
     protocol: RetrievalProtocol,
     track: Track = silent,
     see: Callable[[int], Seen] | None = None,
@@ -65,7 +65,7 @@ def overlap_matrix(
             query.
 
     Raises:
-        InputError: if a sequence cannot be read.
+        InputError: if a drive cannot be read.
     """
 
     def see_scan(frame: int) -> Seen:
@@ -107,7 +107,7 @@ def overlap_matrix(
 
 
 def compared_frames(
-    database: Sequence, query: Sequence, protocol: RetrievalProtocol
+    database: Drive, query: Drive, protocol: RetrievalProtocol
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the frames of the queries (Q,), and of the places (D,)."""
     return (

@@ -9,7 +9,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
     Mode,
@@ -118,8 +118,8 @@ class PlaceRecognition:
 
 
 def run(
-    database: Sequence,
-    query: Sequence,
+    database: Drive,
+    query: Drive,
     method: Method,
     mode: Mode = "all",
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
@@ -141,7 +141,7 @@ def run(
         overlaps: (Q, D) for matches by overlap; by default those of the scans.
 
     Raises:
-        InputError: if a sequence cannot be read, the two are not of the same
+        InputError: if a drive cannot be read, the two are not of the same
             world, the method fails, or no query has a match.
     """
     retrieval = retrieve(

@@ -28,7 +28,7 @@ from evaluation.recognition.resampling import (
 
 _NEEDED = ("map", "db", "query", "method", "correct", "has_match", "score")
 # Columns of a table of queries that name the pair of drives.
-_KEYS = ("map", "db", "query", "cause", "level", "radius_told", "seed", "gate")
+_KEYS = ("map", "db", "query", "cause", "level", "seed", "gate")
 
 # Pair of drives -> method -> outcomes of its queries.
 Answers = Mapping[tuple[str, ...], Mapping[str, QueryOutcomes]]

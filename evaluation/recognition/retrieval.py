@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.sequence import Sequence, check_same_world
+from cns_drake.base.recordings.drive import Drive, check_same_world
 from evaluation.methods.method import Method
 from evaluation.recognition.description import (
     DescribedDrive,
@@ -38,7 +38,7 @@ class Retrieval:
     """Scores of all queries against all places, with the truth.
 
     Attributes:
-        query_frames: (Q,) frame of each query in its sequence.
+        query_frames: (Q,) frame of each query in its drive.
         database_frames: (D,) frame of each place.
         scores: (Q, D) float64, higher is more similar, NaN for a place that
             the method does not consider.
@@ -74,8 +74,8 @@ class Retrieval:
 
 
 def retrieve(
-    database: Sequence,
-    query: Sequence,
+    database: Drive,
+    query: Drive,
     method: Method,
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
@@ -95,13 +95,13 @@ def retrieve(
         overlaps: (Q, D) for matches by overlap; by default those of the scans.
 
     Raises:
-        InputError: if a sequence cannot be read, the two are not of the same
+        InputError: if a drive cannot be read, the two are not of the same
             world, or the method returns an invalid result.
 
     Example:
-        from evaluation import make_method, open_sequence, retrieve
+        from evaluation import make_method, open_drive, retrieve
 
-        database, query = map(open_sequence, ("cns/01", "cns/02"))
+        database, query = map(open_drive, ("cns/01", "cns/02"))
         found = retrieve(database, query, make_method("solid", {}))
     """
     check_same_world(database, query, across_maps=across_maps)

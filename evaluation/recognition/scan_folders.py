@@ -12,10 +12,10 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.drives.cropped_cloud import CroppedCloud
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
-from evaluation.sequences.cropped_cloud import CroppedCloud
 
 
 def write_scores(
@@ -32,7 +32,7 @@ def write_scores(
     Columns are `query`, `database` (file stems) and `score`, which is empty if
     the place is no candidate. Rows are sorted by the names of query and place.
     The file appears under its name only when it is complete. Methods that match
-    sequences take the queries as one sequence, in the order of names.
+    drives take the queries as one drive, in the order of names.
 
     Args:
         method: describes and compares.

@@ -44,7 +44,7 @@ def score_places(
     Raises:
         InputError: if the method returns anything else.
     """
-    found = method.score_in_sequence(
+    found = method.score_in_drive(
         queries, database, exhaustive=exhaustive or not is_known.all()
     )
     scores = _checked(method, "score", found, len(is_known))

@@ -11,7 +11,7 @@ from evaluation.recognition.rung_outcome import FAULTS
 from evaluation.report.ladder_rows import LadderRow, LadderRung, MeasuredRung
 from evaluation.report.tables import Table
 
-_KEYS = ("map", "db", "query", "cause", "level", "method", "radius_told")
+_KEYS = ("map", "db", "query", "cause", "level", "method", "gate")
 # The options of the protocol that all rungs share.
 _OPTIONS = ("query_spacing", "place_spacing", "max_range")
 

@@ -9,8 +9,8 @@ import re
 
 from cns_drake.base.errors import InputError, one_line
 from cns_drake.base.recordings.driven_way import driven_way
+from evaluation.drives import open_drive
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.sequences import open_sequence
 from evaluation.study.drive_source import DriveSource, RecordedDrive
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
@@ -150,7 +150,7 @@ def find_recordings(
         raise InputError(f"{folder}: no such folder")
     paths = _find_drives(folder)
     if not paths:
-        raise InputError(f"{folder}: no recorded sequence in it")
+        raise InputError(f"{folder}: no recorded drive in it")
     placed = {path: _place(path, lidar) for path in paths}
     found = [one for one in placed.values() if one is not None]
     if not found:
@@ -227,23 +227,21 @@ def _is_exported_drive(path: Path) -> bool:
 
 def _place(path: Path, lidar: str | None) -> RecordingInfo | None:
     """Returns a recording; None without its map and stage."""
-    sequence = open_sequence(path, lidar)
-    scenario = sequence.scenario or {}
+    drive = open_drive(path, lidar)
+    scenario = drive.scenario or {}
     way = driven_way(scenario)
     if {"map", "stage"} <= set(scenario):
         map_name = one_line(Path(str(scenario["map"])).name)
         stage = one_line(scenario["stage"])
     else:
-        match = _NAME.fullmatch(sequence.name)
+        match = _NAME.fullmatch(drive.name)
         if match is None:
             return None
         map_name, stage = match["map"], match["stage"]
     source = None
     if lidar is not None:
         source = RecordedDrive(path.absolute(), lidar)
-    return RecordingInfo(
-        sequence.name, path, map_name, stage, way, made_by=source
-    )
+    return RecordingInfo(drive.name, path, map_name, stage, way, made_by=source)
 
 
 def _make_city(

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter, Step
+from evaluation.drives.recent_scans import RecentScans
 from evaluation.recognition.description import (
     DescribedDrive,
     Role,
     describe_drive,
 )
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.sequences.recent_scans import RecentScans
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import is_current, write_part

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Protocol
 
 from cns_drake.base.errors import InputError
-from evaluation.sequences import Sequence, open_sequence
+from evaluation.drives import Drive, open_drive
 
 
 class DriveSource(Protocol):
     """Opens a drive; can be pickled."""
 
-    def __call__(self) -> Sequence:
+    def __call__(self) -> Drive:
         """Opens the drive.
 
         Its scans are read in increasing order, each once; a drive may thus
@@ -58,8 +58,8 @@ class RecordedDrive:
     path: Path
     lidar: str | None = None
 
-    def __call__(self) -> Sequence:
-        return open_sequence(self.path, self.lidar)
+    def __call__(self) -> Drive:
+        return open_drive(self.path, self.lidar)
 
     @property
     def group(self) -> None:

@@ -15,7 +15,8 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.sequence import Sequence as Drive
+from cns_drake.base.recordings.drive import Drive
+from evaluation.drives.sampling import within_range
 from evaluation.geometry.coinciding import CoincidingPoints
 from evaluation.maps.thinning import thin
 from evaluation.methods import MethodConfig
@@ -26,7 +27,6 @@ from evaluation.recognition.overlap_truth import sampled
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.seen_surfaces import SeenSurfaces
-from evaluation.sequences.sampling import within_range
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part

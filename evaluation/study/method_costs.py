@@ -9,9 +9,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.jobs.step import Reporter
+from evaluation.drives.sampling import gather
 from evaluation.recognition.costs import Cost, measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.sequences.sampling import gather
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part
@@ -60,18 +60,18 @@ class MeasureCosts(PartStep):
         }
 
     def make(self, reporter: Reporter) -> list[Cost]:
-        sequence = open_surveyed(self.source, self.surveys[1])
+        drive = open_surveyed(self.source, self.surveys[1])
         protocol = self.protocol
         costs = []
         with threadpool_limits(limits=1):
             for choice in reporter.track(self.methods, "", len(self.methods)):
                 method = choice.make()
                 number = protocol.scans(method)
-                last = max(len(sequence) - number, 0)
+                last = max(len(drive) - number, 0)
                 frames = np.linspace(0, last, _NUM_TRIALS).astype(int).tolist()
                 clouds = [
                     gather(
-                        sequence,
+                        drive,
                         frame,
                         number,
                         protocol.max_range,

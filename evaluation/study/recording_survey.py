@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Several
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from evaluation.maps.mapped_sequence import MappedSequence
+from evaluation.drives import Drive, PlacedDrive
+from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.methods import Method, MethodConfig
@@ -23,7 +23,6 @@ from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.sequences import PlacedDrive, Sequence
 
 
 @dataclass(frozen=True)
@@ -74,9 +73,9 @@ class RecordingSurvey:
 
 
 def survey_recording(
-    recording: Sequence,
+    recording: Drive,
     roles: Set[Role],
-    methods: Several[Method],
+    methods: Sequence[Method],
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
 ) -> RecordingSurvey:
@@ -95,7 +94,7 @@ def survey_recording(
         InputError: if it cannot be read, or holds no point.
     """
     frames, thumbnails = [], []
-    sequence = MappedSequence(
+    mapped = MappedDrive(
         recording,
         kept=max(map(protocol.scans, methods), default=1),
     )
@@ -108,19 +107,19 @@ def survey_recording(
     described = {}
     if roles:
         drives = describe_drive(
-            sequence, methods, roles, protocol, track, visit=keep_thumbnail
+            mapped, methods, roles, protocol, track, visit=keep_thumbnail
         )
         described = {
             method.name: drive
             for method, drive in zip(methods, drives, strict=True)
         }
-    coarse, fine = sequence.finish(track)
+    coarse, fine = mapped.finish(track)
     if len(coarse) == 0:
-        raise InputError(f"{sequence.name}: no scan holds a point")
+        raise InputError(f"{mapped.name}: no scan holds a point")
     drive = SurveyedDrive(
         placed=PlacedDrive.of(recording),
-        stamps_ns=sequence.stamps_ns,
-        X_WS=sequence.X_WS,
+        stamps_ns=mapped.stamps_ns,
+        X_WS=mapped.X_WS,
         coarse=coarse,
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,

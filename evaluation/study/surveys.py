@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.recordings.drive import Drive
+from evaluation.drives.moved import MovedDrive
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.sequences.moved import MovedSequence
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import is_current, read_part, write_part
@@ -60,7 +60,7 @@ class Survey(Step):
 
     def find(
         self,
-        drive: Sequence,
+        drive: Drive,
         methods: Iterable[MethodChoice],
         reporter: Reporter,
     ) -> RecordingSurvey:
@@ -138,7 +138,7 @@ class Survey(Step):
         )
 
 
-def open_surveyed(source: DriveSource, files: SurveyFiles) -> Sequence:
+def open_surveyed(source: DriveSource, files: SurveyFiles) -> Drive:
     """Opens a drive that has been surveyed.
 
     Its poses are those of the survey: a recording would be unpacked as a whole
@@ -149,4 +149,4 @@ def open_surveyed(source: DriveSource, files: SurveyFiles) -> Sequence:
     """
     drive = source()
     known: SurveyedDrive = read_part(files.drive)
-    return MovedSequence(drive, known.X_WS, drive.world_frame, drive.datum)
+    return MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)

@@ -15,12 +15,11 @@ from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.recordings.driven_way import driven_way
+from evaluation.drives import Drive, check_same_world, open_drive
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.sequences import Sequence as Recorded
-from evaluation.sequences import check_same_world, open_sequence
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.drive_source import DriveSource, RecordedDrive
 from evaluation.study.parts import read_part
@@ -82,19 +81,19 @@ def measure_trend(
             no place with the query.
     """
     methods = choose_methods(own_methods, settings)
-    query_drive = open_sequence(query, lidar)
+    query_drive = open_drive(query, lidar)
     names = {query_drive.name}
     if protocol.exclude_recent is not None:
         # For loop closure a drive may be its own database.
         names = set()
-    opened: dict[Path, Recorded] = {}
+    opened: dict[Path, Drive] = {}
     for path in (*databases, *controls):
-        sequence = open_sequence(path, lidar)
-        if sequence.name in names:
-            raise InputError(f"{path}: {sequence.name} is there twice")
-        names.add(sequence.name)
-        check_same_world(sequence, query_drive)
-        opened[path] = sequence
+        drive = open_drive(path, lidar)
+        if drive.name in names:
+            raise InputError(f"{path}: {drive.name} is there twice")
+        names.add(drive.name)
+        check_same_world(drive, query_drive)
+        opened[path] = drive
     serving = [opened[path] for path in controls]
     searched = {}
     for path in databases:

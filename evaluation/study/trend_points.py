@@ -8,10 +8,10 @@ from pathlib import Path
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change.tcr import temporal_change
+from evaluation.drives import check_same_world
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
-from evaluation.sequences import check_same_world
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part

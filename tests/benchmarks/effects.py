@@ -1,6 +1,6 @@
 """What effects add to a recording, and changes of the stage to its loading.
 
-    python tests/benchmarks/effects.py [SEQUENCE]
+    python tests/benchmarks/effects.py [DRIVE]
         [--rounds N] [--frames N] [--loads N] [--only NAME ...]
 
 Each variant of a recording has a process of its own. They take turns: so many
@@ -109,20 +109,20 @@ def _merge(values: dict, changes: Mapping) -> None:
 
 
 def record(
-    sequence: str, name: str, rounds: int, segment: int, turns: Connection
+    drive: str, name: str, rounds: int, segment: int, turns: Connection
 ) -> None:
     """Records a variant, a turn whenever it is asked for one.
 
     Args:
-        sequence: name or file of the scenario.
+        drive: name or file of the scenario.
         name: of the variant.
         rounds: number of turns, besides the first.
         segment: frames of a turn, at the default rate.
         turns: brings a word for each turn; takes the time of the processor
             after it [s].
     """
-    scenario = varied(load_scenario(sequence), name)
-    normal = frame_period(load_scenario(sequence).lidars)
+    scenario = varied(load_scenario(drive), name)
+    normal = frame_period(load_scenario(drive).lidars)
     step = round(segment * normal / frame_period(scenario.lidars))
     frames = (rounds + 1) * step
     # Ends of turns, each reported once.
@@ -144,16 +144,16 @@ def record(
         simulate(scenario, Path(folder), on_frame=on_frame)
 
 
-def most_rounds(sequence: str, segment: int) -> int:
+def most_rounds(drive: str, segment: int) -> int:
     """Returns the number of rounds to the end of the drive."""
-    scenario = load_scenario(sequence)
+    scenario = load_scenario(drive)
     frames = count_frames(scenario, plan_drive(scenario))
     # The first turn is not counted.
     return max(1, frames // segment - 1)
 
 
 def take_turns(
-    sequence: str, names: list[str], rounds: int, segment: int
+    drive: str, names: list[str], rounds: int, segment: int
 ) -> dict[str, np.ndarray]:
     """Returns the time of each turn of each variant [s]."""
     context = mp.get_context("spawn")
@@ -161,7 +161,7 @@ def take_turns(
     for name in names:
         ends[name], other = context.Pipe()
         context.Process(
-            target=record, args=(sequence, name, rounds, segment, other)
+            target=record, args=(drive, name, rounds, segment, other)
         ).start()
         other.close()
     spent: dict[str, list[float]] = {name: [] for name in names}
@@ -187,9 +187,9 @@ def print_ratios(spent: dict[str, np.ndarray], segment: int) -> None:
         print(text, flush=True)
 
 
-def print_loading(sequence: str, loads: int) -> None:
+def print_loading(drive: str, loads: int) -> None:
     """Prints how long a drive takes to load, without and with changes."""
-    plain = load_scenario(sequence)
+    plain = load_scenario(drive)
     variants = {"plain": plain, "changed": plain.with_transient(**TRANSIENT)}
     spent: dict[str, list[float]] = {name: [] for name in variants}
     for _ in range(loads + 1):
@@ -203,7 +203,7 @@ def print_loading(sequence: str, loads: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequence", nargs="?", default="metropolis_04")
+    parser.add_argument("drive", nargs="?", default="metropolis_04")
     parser.add_argument("--rounds", type=int, help="instead of all")
     parser.add_argument("--frames", type=int, default=20, help="to a turn")
     parser.add_argument("--loads", type=int, default=3)
@@ -218,14 +218,14 @@ def main() -> None:
         bases = {COMPARED[name] for name in options.only}
         wanted = {"ideal", *options.only, *bases}
         names = [name for name in names if name in wanted]
-    rounds = options.rounds or most_rounds(options.sequence, options.frames)
-    print(f"{options.sequence}: {rounds} turns of {options.frames} frames")
+    rounds = options.rounds or most_rounds(options.drive, options.frames)
+    print(f"{options.drive}: {rounds} turns of {options.frames} frames")
     print_ratios(
-        take_turns(options.sequence, names, rounds, options.frames),
+        take_turns(options.drive, names, rounds, options.frames),
         options.frames,
     )
     if options.loads:
-        in_process(print_loading, options.sequence, options.loads)
+        in_process(print_loading, options.drive, options.loads)
 
 
 if __name__ == "__main__":

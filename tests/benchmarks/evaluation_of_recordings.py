@@ -12,12 +12,12 @@ from pathlib import Path
 import resource
 import time
 
-from evaluation.maps.mapped_sequence import MappedSequence
-from evaluation.maps.voxel_maps import map_sequence
+from evaluation.drives import open_drive
+from evaluation.drives.sampling import gather
+from evaluation.maps.mapped_drive import MappedDrive
+from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
-from evaluation.sequences import open_sequence
-from evaluation.sequences.sampling import gather
 
 
 def measure(label: str, work: Callable, number: int = 1):
@@ -34,27 +34,27 @@ def main() -> None:
     parser.add_argument("database", type=Path)
     parser.add_argument("query", type=Path)
     arguments = parser.parse_args()
-    sequence = measure("open", lambda: open_sequence(arguments.query))
-    number = len(sequence)
-    measure("stamps and poses", lambda: sequence.X_WS, number)
+    drive = measure("open", lambda: open_drive(arguments.query))
+    number = len(drive)
+    measure("stamps and poses", lambda: drive.X_WS, number)
     sizes = measure(
         "read scans",
-        lambda: [len(sequence.scan(i)) for i in range(number)],
+        lambda: [len(drive.scan(i)) for i in range(number)],
         number,
     )
     print(f"{number} scans of {sum(sizes) / number:.0f} points")
     # Compiles, unless an earlier run has left the code on disk.
-    measure("map, first call", lambda: map_sequence(sequence), number)
-    voxels = measure("map", lambda: map_sequence(sequence), number)
+    measure("map, first call", lambda: map_drive(drive), number)
+    voxels = measure("map", lambda: map_drive(drive), number)
     print(f"{len(voxels)} voxels of {voxels.voxel_size} m")
     _, fine = measure(
         "map and cloud for pictures",
-        lambda: MappedSequence(sequence, kept=1).finish(),
+        lambda: MappedDrive(drive, kept=1).finish(),
         number,
     )
     print(f"{len(fine)} points for pictures")
     method = make_method("scan-context++", {})
-    clouds = [gather(sequence, i, 1, 100.0) for i in range(0, number, 20)]
+    clouds = [gather(drive, i, 1, 100.0) for i in range(0, number, 20)]
     places = measure(
         "describe places",
         lambda: [method.describe_place(cloud) for cloud in clouds],
@@ -81,8 +81,8 @@ def main() -> None:
     measure(
         "place recognition of the pair",
         lambda: run(
-            open_sequence(arguments.database),
-            open_sequence(arguments.query),
+            open_drive(arguments.database),
+            open_drive(arguments.query),
             method,
         ),
     )

@@ -1,11 +1,11 @@
 """How the cost of a frame grows with rays, triangles and moving objects.
 
     python tests/benchmarks/growth.py --output FIGURE.png
-        [--sequence NAME] [--rounds N]
+        [--drive NAME] [--rounds N]
 
 Rays: 16 to 128 rings and 512 to 2048 columns; of the caster alone, and of a
 whole recording (motion, points, messages, compression and file with it).
-Triangles: a stage's, of some of its structures drawn by lot up to all of
+Triangles: a stage's, of some of its structures drawn at random up to all of
 them, then with each triangle divided in four, up to four millions. Moving
 objects: 0 to 200 cars of 1280 triangles each. Times are medians of CPU time;
 exponents are slopes of straight lines through logarithms, for moving objects
@@ -99,12 +99,12 @@ def against_rays(geometries, poses, rounds: int) -> Series:
     return [(r * c, ms) for (r, c), ms in times.items()]
 
 
-def of_recordings(sequence: str, rounds: int) -> Series:
+def of_recordings(drive: str, rounds: int) -> Series:
     """Returns the number of rays and ms a frame of a whole recording."""
     result = []
     for rings, preset in PRESETS.items():
         for columns in COLUMNS:
-            scenario = load_scenario(sequence).with_lidar_preset(preset)
+            scenario = load_scenario(drive).with_lidar_preset(preset)
             lidars = {
                 name: lidar.model_copy(update={"columns": columns})
                 for name, lidar in scenario.lidars.items()
@@ -256,19 +256,19 @@ def draw(rays, recordings, triangles, objects, title: str, output: Path):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--sequence", default="metropolis_04")
+    parser.add_argument("--drive", default="metropolis_04")
     parser.add_argument("--rounds", type=int, default=7)
     arguments = parser.parse_args()
-    sequence, rounds = arguments.sequence, arguments.rounds
-    geometries = read_stage(sequence)
-    poses = sensor_poses(sequence, POSES)
-    print(f"{sequence}, {rounds} rounds, medians of CPU time")
+    drive, rounds = arguments.drive, arguments.rounds
+    geometries = read_stage(drive)
+    poses = sensor_poses(drive, POSES)
+    print(f"{drive}, {rounds} rounds, medians of CPU time")
     draw(
         against_rays(geometries, poses, rounds),
-        of_recordings(sequence, rounds),
+        of_recordings(drive, rounds),
         against_triangles(geometries, poses, rounds),
         against_objects(geometries, poses, rounds),
-        f"Cost of a frame, {sequence}, one thread",
+        f"Cost of a frame, {drive}, one thread",
         arguments.output,
     )
 

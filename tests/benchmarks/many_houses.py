@@ -59,7 +59,7 @@ class OsmFile:
 
 
 def draw_town(houses: int) -> OsmFile:
-    """Returns houses by lot, and the streets between their blocks."""
+    """Returns houses at random, and the streets between their blocks."""
     town, lot = OsmFile(), random.Random(1)
     side = math.ceil(math.sqrt(houses))
     for number in range(houses):

@@ -1,14 +1,14 @@
 """Memory of recordings: their peak, and whether long ones grow.
 
-    python tests/benchmarks/memory.py [SEQUENCE ...] [--frames N] [--long N]
+    python tests/benchmarks/memory.py [DRIVE ...] [--frames N] [--long N]
 
-Each sequence is recorded in a process of its own, whole unless told
-otherwise, and its peak of resident memory printed. Then a drive by lot
+Each drive is recorded in a process of its own, whole unless told
+otherwise, and its peak of resident memory printed. Then a drive at random
 through the first one's stage is recorded for 10,000 frames, with few columns,
 since growth does not come from rays, and a line fitted to the resident
 memory behind the first tenth.
 
-Aims: under 1.2 GB for any sequence of the dataset, and no growth. Linux only.
+Aims: under 1.2 GB for any drive of the dataset, and no growth. Linux only.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ import tempfile
 from processes import in_process
 
 # What it measures is imported in the processes that do it alone.
-SEQUENCES = ("metropolis_04",)
+DRIVES = ("metropolis_04",)
 COLUMNS = 32
-# Faster than any drive by lot is on average [m/s].
+# Faster than any drive at random is on average [m/s].
 SPEED = 20.0
 
 
-def print_peak(sequence: str, frames: int | None) -> None:
-    """Prints the peak of memory of recording a sequence."""
+def print_peak(drive: str, frames: int | None) -> None:
+    """Prints the peak of memory of recording a drive."""
     from cns_drake.scenarios.scenario_loading import load_scenario
 
-    scenario = load_scenario(sequence)
+    scenario = load_scenario(drive)
     _record(scenario.model_copy(update={"frames": frames}), lambda done: None)
-    print(f"{sequence}: peak {_resident('VmHWM'):.0f} MB", flush=True)
+    print(f"{drive}: peak {_resident('VmHWM'):.0f} MB", flush=True)
 
 
-def print_growth(sequence: str, frames: int) -> None:
+def print_growth(drive: str, frames: int) -> None:
     """Prints how the memory of a long recording grows."""
     import numpy as np
 
@@ -45,7 +45,7 @@ def print_growth(sequence: str, frames: int) -> None:
     from cns_drake.scenarios.scenario_files import map_folder
     from cns_drake.scenarios.scenario_loading import load_scenario
 
-    scenario = load_scenario(sequence)
+    scenario = load_scenario(drive)
     route = draw_route(
         load_road_network(map_folder(scenario).roads),
         SPEED * frames * FRAME_PERIOD,
@@ -72,7 +72,7 @@ def print_growth(sequence: str, frames: int) -> None:
     done, resident = np.array(seen).T
     slope = np.polyfit(done, resident, 1)[0]
     print(
-        f"{sequence}, {frames} frames of a drive by lot: {resident[0]:.1f} MB "
+        f"{drive}, {frames} frames of a drive at random: {resident[0]:.1f} MB "
         f"after {done[0]:.0f} frames, {resident[-1]:.1f} MB at the end, "
         f"{1000 * slope:+.3f} MB per 1,000 frames"
     )
@@ -100,13 +100,13 @@ def _resident(field: str) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequences", nargs="*", default=SEQUENCES)
+    parser.add_argument("sequences", nargs="*", default=DRIVES)
     parser.add_argument("--frames", type=int, help="instead of all")
     parser.add_argument("--long", type=int, default=10_000)
     arguments = parser.parse_args()
-    for sequence in arguments.sequences:
-        in_process(print_peak, sequence, arguments.frames)
-    in_process(print_growth, arguments.sequences[0], arguments.long)
+    for drive in arguments.drives:
+        in_process(print_peak, drive, arguments.frames)
+    in_process(print_growth, arguments.drives[0], arguments.long)
 
 
 if __name__ == "__main__":

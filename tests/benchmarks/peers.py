@@ -1,7 +1,7 @@
 """Ray casters on one stage: rays a second, and errors.
 
     pip install "cns-drake[benchmark]"
-    python tests/benchmarks/peers.py [SEQUENCE] [--rounds N] [--poses N]
+    python tests/benchmarks/peers.py [DRIVE] [--rounds N] [--poses N]
 
 The triangles of a stage, without curved shapes, which not every caster knows,
 and the same 32 x 1024 rays in float32 from poses along the drive, up to
@@ -89,12 +89,12 @@ class Stage:
 Caster = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def make_stage(sequence: str, num_poses: int, folder: Path) -> Stage:
-    """Returns a sequence's stage and rays; O is the middle of its poses."""
-    poses = sensor_poses(sequence, num_poses)
+def make_stage(drive: str, num_poses: int, folder: Path) -> Stage:
+    """Returns a drive's stage and rays; O is the middle of its poses."""
+    poses = sensor_poses(drive, num_poses)
     p_WO = np.round(np.mean([X_WS.translation() for X_WS in poses], axis=0))
     vertices, triangles, count = [], [], 0
-    for geometry in read_stage(sequence):
+    for geometry in read_stage(drive):
         if isinstance(geometry.surface, TriangleSurface):
             p_WVset = geometry.X_FG.multiply(geometry.surface.p_GVset.T).T
             vertices.append(p_WVset - p_WO)
@@ -356,15 +356,15 @@ def describe_errors(ranges: Sequence[np.ndarray], truth) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequence", nargs="?", default="metropolis_04")
+    parser.add_argument("drive", nargs="?", default="metropolis_04")
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--poses", type=int, default=4)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        stage = make_stage(arguments.sequence, arguments.poses, Path(folder))
+        stage = make_stage(arguments.drive, arguments.poses, Path(folder))
         rays = stage.directions.shape[0] * stage.directions.shape[1]
         print(
-            f"{arguments.sequence}: {len(stage.triangles)} triangles, "
+            f"{arguments.drive}: {len(stage.triangles)} triangles, "
             f"{rays} rays, {arguments.rounds} rounds, medians of CPU time"
         )
         casters = {}

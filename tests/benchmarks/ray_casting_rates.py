@@ -1,6 +1,6 @@
 """Rays a second: this project's caster, its limit, and Open3D.
 
-    python tests/benchmarks/ray_casting_rates.py [SEQUENCE ...] [--rounds N]
+    python tests/benchmarks/ray_casting_rates.py [DRIVE ...] [--rounds N]
 
 From sensor poses along the drive to ranges and the geometry that was hit,
 32 x 1024 rays a scan. The limit is a C program that calls Embree with
@@ -42,7 +42,7 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 
-SEQUENCES = ("metropolis_04", "downtown_04")
+DRIVES = ("metropolis_04", "downtown_04")
 POSES = 16
 CARS = 20
 # Rays that pass an edge this closely may differ [m].
@@ -61,9 +61,9 @@ def build_limit(folder: Path):
     return ctypes.CDLL(str(library)).cast_limit
 
 
-def benchmark(sequence: str, rounds: int, folder: Path) -> None:
-    geometries = read_stage(sequence)
-    poses = sensor_poses(sequence, POSES)
+def benchmark(drive: str, rounds: int, folder: Path) -> None:
+    geometries = read_stage(drive)
+    poses = sensor_poses(drive, POSES)
     pattern = make_beam_pattern("cns", 0.05)
     d_S = pattern.d_Sset[pattern.packet_order]
     reach = pattern.max_range
@@ -111,7 +111,7 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
     triangles = count_triangles(geometries)
     rays = POSES * pattern.num_beams
     base = times["cns-drake"]
-    print(f"{sequence}: {triangles} triangles, {rounds} rounds, medians")
+    print(f"{drive}: {triangles} triangles, {rounds} rounds, medians")
     for name, spent in times.items():
         print(
             f"  {name:<28} {1e3 * spent.wall / POSES:6.2f} ms a scan "
@@ -190,12 +190,12 @@ def _compare(scene, theirs, poses, d_S, cast, reach) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequences", nargs="*", default=SEQUENCES)
+    parser.add_argument("sequences", nargs="*", default=DRIVES)
     parser.add_argument("--rounds", type=int, default=9)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        for sequence in arguments.sequences:
-            benchmark(sequence, arguments.rounds, Path(folder))
+        for drive in arguments.drives:
+            benchmark(drive, arguments.rounds, Path(folder))
 
 
 if __name__ == "__main__":

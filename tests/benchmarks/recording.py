@@ -1,6 +1,6 @@
 """The whole pipeline against casting alone, and where its time goes.
 
-    python tests/benchmarks/recording.py [SEQUENCE ...]
+    python tests/benchmarks/recording.py [DRIVE ...]
         [--rounds N] [--frames N]
 
 A recording (motion, rays, points, labels, messages, compression, file) and
@@ -46,7 +46,7 @@ from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.odometry import OdometrySensor
 from cns_drake.simulation.simulation import simulate
 
-SEQUENCES = ("metropolis_04", "downtown_04")
+DRIVES = ("metropolis_04", "downtown_04")
 # Step -> what does it; of calls within calls, the innermost counts.
 STEPS = {
     "motion": (
@@ -79,18 +79,18 @@ class TakingTurns:
         cast: those of Open3D for the same rays [s].
     """
 
-    def __init__(self, sequence: str, scenario: Scenario, segment: int):
+    def __init__(self, drive: str, scenario: Scenario, segment: int):
         """Prepares Open3D.
 
         Args:
-            sequence: name or file of the scenario.
+            drive: name or file of the scenario.
             scenario: what is recorded.
             segment: frames to a turn.
         """
         self.recorded: list[np.ndarray] = []
         self.cast: list[np.ndarray] = []
         self._segment = segment
-        self._stage = Open3dStage(read_stage(sequence))
+        self._stage = Open3dStage(read_stage(drive))
         self._drive = plan_drive(scenario)
         (lidar,) = scenario.lidars.values()
         self._X_BS = sensor_pose(lidar)
@@ -157,11 +157,11 @@ class Stopwatch:
         return timed
 
 
-def take_turns(sequence: str, rounds: int, segment: int, label: str) -> None:
+def take_turns(drive: str, rounds: int, segment: int, label: str) -> None:
     """Prints how long a recording takes beside Open3D."""
-    scenario = load_scenario(sequence)
+    scenario = load_scenario(drive)
     scenario = scenario.model_copy(update={"frames": (rounds + 1) * segment})
-    turns = TakingTurns(sequence, scenario, segment)
+    turns = TakingTurns(drive, scenario, segment)
     with tempfile.TemporaryDirectory() as folder:
         simulate(
             scenario,
@@ -181,7 +181,7 @@ def take_turns(sequence: str, rounds: int, segment: int, label: str) -> None:
     )
 
 
-def print_shares(sequence: str, frames: int) -> None:
+def print_shares(drive: str, frames: int) -> None:
     """Prints the CPU time of each step of a recording."""
     watch = Stopwatch()
     clock = {}
@@ -193,7 +193,7 @@ def print_shares(sequence: str, frames: int) -> None:
         elif done == total:
             clock["end"] = time.process_time()
 
-    scenario = load_scenario(sequence)
+    scenario = load_scenario(drive)
     scenario = scenario.model_copy(update={"frames": frames + 1})
     with tempfile.TemporaryDirectory() as folder, watch.on(STEPS):
         simulate(scenario, Path(folder), on_frame=on_frame)
@@ -210,18 +210,18 @@ def print_shares(sequence: str, frames: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequences", nargs="*", default=SEQUENCES)
+    parser.add_argument("sequences", nargs="*", default=DRIVES)
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--frames", type=int, default=100, help="to a turn")
     arguments = parser.parse_args()
     rounds, frames = arguments.rounds, arguments.frames
     cores = os.sched_getaffinity(0)
-    for sequence in arguments.sequences:
-        print(f"{sequence}: {rounds} rounds of {frames} frames, medians")
+    for drive in arguments.drives:
+        print(f"{drive}: {rounds} rounds of {frames} frames, medians")
         for used in (cores, {min(cores)}):
             label = f"{len(used)} core{'s' * (len(used) > 1)}:"
-            in_process(take_turns, sequence, rounds, frames, label, cores=used)
-        in_process(print_shares, sequence, rounds * frames, cores={min(cores)})
+            in_process(take_turns, drive, rounds, frames, label, cores=used)
+        in_process(print_shares, drive, rounds * frames, cores={min(cores)})
 
 
 if __name__ == "__main__":

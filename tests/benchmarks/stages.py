@@ -27,15 +27,15 @@ from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import load_world
 
 
-def read_stage(sequence: str) -> list[PerceptionGeometry]:
-    """Returns the geometry of a sequence's stage."""
-    world = load_world(world_file(load_scenario(sequence)))
+def read_stage(drive: str) -> list[PerceptionGeometry]:
+    """Returns the geometry of a drive's stage."""
+    world = load_world(world_file(load_scenario(drive)))
     return read_perception_geometry(world.scene_graph.model_inspector())
 
 
-def sensor_poses(sequence: str, count: int) -> list[RigidTransform]:
+def sensor_poses(drive: str, count: int) -> list[RigidTransform]:
     """Returns poses X_WS of the LiDAR, evenly spread over a drive."""
-    trajectory = plan_drive(load_scenario(sequence))
+    trajectory = plan_drive(load_scenario(drive))
     times = np.linspace(0.0, trajectory.duration, count)
     X_BS = RigidTransform([0.0, 0.0, 1.6])
     return [trajectory.pose(t) @ X_BS for t in times]

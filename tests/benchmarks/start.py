@@ -1,6 +1,6 @@
 """How long commands take to start.
 
-    python tests/benchmarks/start.py [SEQUENCE] [--runs N]
+    python tests/benchmarks/start.py [DRIVE] [--runs N]
 
 `cns-drake --help` and `cns-drake list`, and from `cns-drake simulate` to the
 end of a recording of one frame, on the stage with the most triangles. The
@@ -43,7 +43,7 @@ def seconds(arguments: list[str], caches: Path) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequence", nargs="?", default="downtown_04")
+    parser.add_argument("drive", nargs="?", default="downtown_04")
     parser.add_argument("--runs", type=int, default=8)
     options = parser.parse_args()
     if options.runs < 2:
@@ -53,7 +53,7 @@ def main() -> None:
         for arguments in (
             ["--help"],
             ["list"],
-            ["simulate", options.sequence, "--frames=1", *writing],
+            ["simulate", options.drive, "--frames=1", *writing],
         ):
             caches = Path(folder, arguments[0])
             first, *repeated = (

@@ -12,7 +12,7 @@ from cns_drake.command_line import cli
 from cns_drake.scenarios.variation import Family
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
 from evaluation.command_line import cli as evaluation_cli
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 
 PAGES = documents.pages()
 CODES = [piece.text for page in PAGES for piece in documents.inline(page)]
@@ -128,9 +128,9 @@ def test_fields_of_points(short_recording):
     (example,) = (
         block.text
         for block in documents.fenced(page)
-        if "sequences.open(" in block.text
+        if "drives.open(" in block.text
     )
-    scan = open_sequence(short_recording).scan(0)
+    scan = open_drive(short_recording).scan(0)
     assert f"# NumPy: {' '.join(scan.dtype.names)}\n" in example
     topics = documents.read("docs/recordings.md").text
     assert f"{scan.dtype.itemsize} bytes a point" in topics

@@ -284,7 +284,7 @@ RECIPES = {
         after=("family drives",),
     ),
     "Python": Recipe(
-        "from evaluation import sequences",
+        "from evaluation import drives",
         changes=(_LAST,),
         after=("own city",),
         file="read.py",

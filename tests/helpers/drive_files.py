@@ -68,7 +68,7 @@ def write_recording(
     """Writes a rosbag2 folder; rotations of X_WBs are about z only.
 
     Args:
-        folder: created; its name becomes the sequence's.
+        folder: created; its name becomes the drive's.
         scans: structured arrays, in the sensor frame.
         X_WBs: poses of the vehicle (4, 4).
         p_BS: position of the sensor on the vehicle [m].

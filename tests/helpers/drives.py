@@ -10,7 +10,7 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
-from cns_drake.scenarios.shipped import shipped_sequences
+from cns_drake.scenarios.shipped import shipped_drives
 
 SPACING = 2.0
 NO_LIMIT = 100.0
@@ -95,8 +95,8 @@ def check_derivatives(trajectory, times, *, velocity_atol, acceleration_atol):
 
 
 def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
-    """Returns a shipped sequence with its lane path and trajectory."""
-    values = yaml.safe_load(shipped_sequences()[name].read_text())
+    """Returns a shipped drive with its lane path and trajectory."""
+    values = yaml.safe_load(shipped_drives()[name].read_text())
     scenario = Scenario.model_validate({"name": name, **values})
     network = load_road_network(map_folder(scenario).roads)
     path = make_lane_path(

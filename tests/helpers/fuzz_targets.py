@@ -15,7 +15,7 @@ from cns_drake.base.errors import InputError as ReadingError
 from cns_drake.city.generation.city_structures import make_city, meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
-from cns_drake.export.exporting import export_sequence
+from cns_drake.export.exporting import export_drive
 from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.pictures.stage_pictures import load_views
@@ -24,18 +24,18 @@ from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.repair import repair_mcap
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
+from cns_drake.scenarios.drive_table import drive_rows
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.sensor_making import make_pattern
-from cns_drake.scenarios.sequence_table import sequence_rows
 from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.simulation.scanning import save_scan, scan_world
 from cns_drake.simulation.simulation import simulate
-from evaluation import sequences
+from evaluation import drives
 from evaluation.clouds.cloud_files import read_cloud
 from helpers import (
     bent_drive,
@@ -160,7 +160,7 @@ def _load_roads(folder: Path) -> None:
 
 
 def _list_town(folder: Path) -> None:
-    sequence_rows(folder)
+    drive_rows(folder)
 
 
 def _write_city(folder: Path) -> None:
@@ -205,21 +205,21 @@ def _write_recording(folder: Path, **options) -> None:
     )
 
 
-def _read_sequence(path: Path):
-    """Reads all parts of a sequence and returns them."""
-    sequence = sequences.open(path)
+def _read_drive(path: Path):
+    """Reads all parts of a drive and returns them."""
+    drive = drives.open(path)
     return repr(
         (
-            len(sequence),
-            sequence.world_frame,
-            sequence.stamps_ns.tolist(),
-            sequence.X_WS.tolist(),
-            getattr(sequence, "odometry", None),
-            getattr(sequence, "imu", None),
-            sequence.scenario,
-            sequence.instances,
-            sequence.notes,
-            [(scan.dtype, scan.tobytes()) for scan in sequence],
+            len(drive),
+            drive.world_frame,
+            drive.stamps_ns.tolist(),
+            drive.X_WS.tolist(),
+            getattr(drive, "odometry", None),
+            getattr(drive, "imu", None),
+            drive.scenario,
+            drive.instances,
+            drive.notes,
+            [(scan.dtype, scan.tobytes()) for scan in drive],
         )
     )
 
@@ -227,7 +227,7 @@ def _read_sequence(path: Path):
 def _export(format_name: str):
     def write(folder: Path) -> None:
         drive = bent_drive.write_drive(folder / "rec" / "town_07")
-        export_sequence(drive, format_name, folder / format_name)
+        export_drive(drive, format_name, folder / format_name)
         shutil.rmtree(folder / "rec")
 
     return write
@@ -302,8 +302,8 @@ def _write_helipr(folder: Path) -> None:
     helipr_drive.write_drive(folder / "drive", ("Ouster",))
 
 
-def _read_drive(folder: Path):
-    return _read_sequence(folder / "drive")
+def _read_subfolder(folder: Path):
+    return _read_drive(folder / "drive")
 
 
 def _write_cityjson(folder: Path) -> None:
@@ -387,7 +387,7 @@ TARGETS = (
     Target("city", 0.3, _write_city, ("city.yaml", "roads.yaml"), _lay_out),
     Target(
         "mcap", 20, _write_recording, ("town_07/*",),
-        lambda folder: _read_sequence(folder / "town_07"),
+        lambda folder: _read_drive(folder / "town_07"),
         exact=True, only_bytes=True,
     ),
     Target("repair", 4, _write_source, ("source.mcap",), _repair),
@@ -397,11 +397,11 @@ TARGETS = (
     Target("clouds", 20, _write_clouds, ("*.*",), _read_clouds),
     Target(
         "kitti", 12, _export("kitti"), ("kitti/**/*",),
-        lambda folder: _read_sequence(folder / "kitti" / "sequences" / "07"),
+        lambda folder: _read_drive(folder / "kitti" / "sequences" / "07"),
     ),
     Target(
         "cns", 7, _export("cns"), ("cns/**/*",),
-        lambda folder: _read_sequence(folder / "cns" / "Town" / "07"),
+        lambda folder: _read_drive(folder / "cns" / "Town" / "07"),
     ),
     Target("cityjson", 8, _write_cityjson, ("city.*",), _read_cityjson),
     Target(
@@ -412,7 +412,7 @@ TARGETS = (
     # Targets with well-formed parts that contradict each other.
     Target(
         "false recording", 8, _write_recording, ("town_07/*.mcap",),
-        lambda folder: _read_sequence(folder / "town_07"),
+        lambda folder: _read_drive(folder / "town_07"),
         exact=True, mutate=contradictions.contradict,
     ),
     Target(
@@ -427,11 +427,11 @@ TARGETS = (
         "false kitti", 4, _export("kitti"),
         ("kitti/**/*.label", "kitti/**/*.bin", "kitti/**/poses.txt",
          "kitti/poses/*.txt", "kitti/**/times.txt"),
-        lambda folder: _read_sequence(folder / "kitti" / "sequences" / "07"),
+        lambda folder: _read_drive(folder / "kitti" / "sequences" / "07"),
         exact=True, mutate=contradictions.contradict_rows,
     ),
-    Target("mulran", 6, _write_mulran, ("drive/**/*",), _read_drive),
-    Target("helipr", 6, _write_helipr, ("drive/**/*",), _read_drive),
+    Target("mulran", 6, _write_mulran, ("drive/**/*",), _read_subfolder),
+    Target("helipr", 6, _write_helipr, ("drive/**/*",), _read_subfolder),
 )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def some_cells(seed, sizes=(60, 50, 40, 9, 20)):
-    """Returns a scan's cells by lot, layer by layer."""
+    """Returns a scan's cells at random, layer by layer."""
     rng = np.random.default_rng(seed)
     cells = [
         np.sort(rng.choice(256 * 256, size, replace=False)) for size in sizes

@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import yaml
 
-from cns_drake.scenarios.shipped import shipped_maps, shipped_sequences
+from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
@@ -60,15 +60,15 @@ def write_small_map(folder):
     return folder
 
 
-def scenario_values(map_folder, sequence="metropolis_04"):
-    """The fields of a shipped sequence, moved to another map."""
-    path = shipped_sequences()[sequence]
+def scenario_values(map_folder, drive="metropolis_04"):
+    """The fields of a shipped drive, moved to another map."""
+    path = shipped_drives()[drive]
     values = yaml.safe_load(path.read_text())
-    return values | {"map": str(map_folder), "name": sequence}
+    return values | {"map": str(map_folder), "name": drive}
 
 
 def write_town(folder, routes, frames):
-    """Writes a map with a sequence for each stage, on a given route."""
+    """Writes a map with a drive for each stage, on a given route."""
     write_small_map(folder)
     for stage, route in routes.items():
         values = scenario_values(folder, route) | {

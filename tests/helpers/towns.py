@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.points import from_xyz
-from evaluation.sequences import Sequence
+from evaluation.drives import Drive
 
 LIDAR_HEIGHT = 1.6
 _RANGE = 45.0
@@ -88,7 +88,7 @@ def make_scans(town, X_WS):
     return scans
 
 
-class TownDrive(Sequence):
+class TownDrive(Drive):
     """A drive with its scans in memory."""
 
     def __init__(self, name, scans, X_WS, frame="map", datum=None):

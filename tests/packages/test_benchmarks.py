@@ -82,7 +82,7 @@ for line in sys.stdin:
 IMPORTED = (
     "cns_drake.simulation.simulation",
     "cns_drake.command_line.simulating",
-    "evaluation.sequences",
+    "evaluation.drives",
 )
 
 

@@ -33,7 +33,7 @@ def private_imports(code):
             (module, name)
             for module, name in asked
             if module.split(".")[0] in PACKAGES
-            and (module, name) != ("evaluation", "sequences")
+            and (module, name) != ("evaluation", "drives")
             and name not in PUBLIC.get(module, ())
         ]
     return found
@@ -54,7 +54,7 @@ def test_importing_a_package_loads_nothing_heavy(package):
     [
         ("cns_drake.simulation.simulation", {"scipy.stats", "scipy.signal"}),
         ("evaluation.study.measurements", {"scipy.stats", "matplotlib"}),
-        ("cns_drake.scenarios.sequence_table", {"scipy", "numba", "pydrake"}),
+        ("cns_drake.scenarios.drive_table", {"scipy", "numba", "pydrake"}),
     ],
 )
 def test_programs_load_no_slow_library_that_they_do_not_need(module, slow):

@@ -61,7 +61,7 @@ LANDMARKS = _folders()
 
 
 def add_landmark(out: Assembly, archetype: str, height: float) -> None:
-    """Adds one of the models of a landmark, drawn by lot.
+    """Adds one of the models of a landmark, drawn at random.
 
     A model is stretched to the given lot and height.
 

@@ -1,7 +1,7 @@
 """First inputs of a city besides its roads.
 
 A user who has drawn `roads.yaml` gets a plan of districts, two stages and two
-sequences, as files to change at will.
+drives, as files to change at will.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def start_city(
 
     `city.yaml` gets a district for each block between the roads, `stages.yaml`
     a stage 01 without the buildings and trees in the east and a whole stage 02.
-    Each stage gets a sequence on a route drawn by lot.
+    Each stage gets a drive on a route drawn at random.
 
     Args:
         world: folder with `roads.yaml`.
@@ -95,8 +95,8 @@ def start_city(
     for k, stage in enumerate(("01", "02")):
         rng = np.random.default_rng([seed, k])
         write(
-            MapFolder(world).sequence(stage).name,
-            f"A drive through stage {stage}, on a route drawn by lot.",
+            MapFolder(world).drive(stage).name,
+            f"A drive through stage {stage}, on a route drawn at random.",
             partial(_drive, network, stage, rng),
         )
     return written

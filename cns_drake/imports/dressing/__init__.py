@@ -1,1 +1,1 @@
-"""Dressing: details for an imported city's bare shapes, by tags and by lot."""
+"""Details for an imported city's bare shapes, by tags and at random."""

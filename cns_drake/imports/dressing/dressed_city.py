@@ -39,7 +39,7 @@ from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.lots import lot_generator
 from cns_drake.imports.street_lanes import Street
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Walls that are farther from all drives have no windows, and roofs no
 # equipment [m].
@@ -125,7 +125,7 @@ class PlannedBuildings:
 
 def plan_buildings(
     structures: Sequence[Imported],
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
@@ -166,7 +166,7 @@ def _dressed(
     paths: BaseGeometry,
     seed: int,
 ) -> tuple[Model, Counter[str]]:
-    """Returns the model of a building, and counts of details added by lot.
+    """Returns the model of a building, and counts of details added at random.
 
     Args:
         some: the building.
@@ -190,7 +190,7 @@ def _dressed(
 
 def _plans(
     bare: Sequence[Bare],
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
     streets: Sequence[Street],
     ground: Ground,
     views: DriveViews,

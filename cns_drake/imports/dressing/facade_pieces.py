@@ -41,7 +41,7 @@ class Faces:
     Attributes:
         quads: material -> (K, 4, 3) arrays [m].
         triangles: material -> (M, 3, 3) arrays [m].
-        counts: kind of detail added by lot -> number.
+        counts: kind of detail added at random -> number.
     """
 
     quads: dict[str, list[np.ndarray]] = field(default_factory=dict)

@@ -24,7 +24,7 @@ from cns_drake.imports.foreign_city import Imported, make_imported
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_places import parts_of
 from cns_drake.imports.street_lanes import Street
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Within this distance of drives, sidewalks get kerbs, and missing ones are
 # added [m].
@@ -106,7 +106,7 @@ def _outer_edges(triangles: np.ndarray) -> np.ndarray:
 
 
 def near_drives(
-    structures: Sequence[Imported], drives: Sequence[Drive]
+    structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> list[Imported]:
     """Returns the structures near drives."""
     paths = MultiLineString([drive.path for drive in drives])
@@ -121,7 +121,7 @@ def near_drives(
 def missing_sidewalks(
     structures: Sequence[Imported],
     streets: Sequence[Street],
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
 ) -> Iterator[Imported]:
     """Yields sidewalks of streets near drives whose tags do not mention any.
 

@@ -20,7 +20,7 @@ from cns_drake.imports.foreign_city import Imported, make_imported
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.osm_places import parts_of
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Half of the width of a street of unknown width, and width of its sidewalks
 # [m].
@@ -34,7 +34,9 @@ _MM = 0.001
 
 
 def guessed_streets(
-    structures: Sequence[Imported], drives: Sequence[Drive], ground: Ground
+    structures: Sequence[Imported],
+    drives: Sequence[WaypointDrive],
+    ground: Ground,
 ) -> Iterator[Imported]:
     """Yields a carriageway and sidewalks on the ground below drives.
 

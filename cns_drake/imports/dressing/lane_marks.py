@@ -11,7 +11,7 @@ from shapely.geometry import LineString, MultiLineString
 
 from cns_drake.imports.foreign_city import Imported, Rgb, make_imported
 from cns_drake.imports.street_lanes import Street
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Streets get marks if they are this near to drives, and at least this wide [m].
 _WITHIN, _LEAST_WIDTH = 80.0, 6.0
@@ -23,7 +23,7 @@ _WHITE: Rgb = (0.86, 0.86, 0.84)
 
 
 def lane_marks(
-    streets: Sequence[Street], drives: Sequence[Drive]
+    streets: Sequence[Street], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
     """Yields the middle lines of the larger streets near drives.
 

@@ -24,7 +24,7 @@ from cns_drake.imports.extrusions import flat_surface
 from cns_drake.imports.foreign_city import Imported, make_imported
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_places import parts_of
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Widest gap that is paved [m], and least area of one [m^2].
 _WIDEST, _LEAST_AREA = 3.0, 0.05
@@ -36,7 +36,7 @@ _MM = 0.001
 
 
 def paved_gaps(
-    structures: Sequence[Imported], drives: Sequence[Drive]
+    structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
     """Yields sidewalks in the gaps near drives.
 

@@ -1,4 +1,4 @@
-"""Small things along streets: those of the file, and others by lot."""
+"""Small things along streets: those of the file, and others at random."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from cns_drake.imports.foreign_city import Imported, Thing
 from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.lots import lot_generator
 from cns_drake.imports.street_lanes import Street
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Things farther from all drives are left out [m].
 _THINGS_WITHIN = 100.0
-# Lamps by lot: their distance, and the range in which a lamp of the file
+# Lamps at random: their distance, and the range in which a lamp of the file
 # replaces one [m].
 _LAMP_EVERY, _LAMP_NEAR = 27.0, 35.0
 _SMALL_EVERY = 22.0
@@ -55,7 +55,7 @@ def dress_streets(
     structures: Sequence[Imported],
     things: Sequence[Thing],
     streets: Sequence[Street],
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
     ground: Ground,
     seed: int,
 ) -> StreetThings:
@@ -97,7 +97,7 @@ def dress_streets(
 
 
 def _rows(
-    streets: Sequence[Street], drives: Sequence[Drive]
+    streets: Sequence[Street], drives: Sequence[WaypointDrive]
 ) -> Iterator[tuple[str, LineString, float, tuple[bool, bool]]]:
     """Yields name, middle, half width, and whether cars park, of streets.
 

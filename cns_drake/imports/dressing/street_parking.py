@@ -1,4 +1,4 @@
-"""Cars parked along streets and in car parks, by lot."""
+"""Cars parked along streets and in car parks, at random."""
 
 from __future__ import annotations
 

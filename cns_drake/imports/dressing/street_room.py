@@ -20,7 +20,7 @@ from cns_drake.imports.dressing.round_parts import without_curves
 from cns_drake.imports.dressing.upper_sides import UpperSides, turned_up
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Least distance of all objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
@@ -58,7 +58,7 @@ class StreetRoom:
     def __init__(
         self,
         structures: Sequence[Imported],
-        drives: Sequence[Drive],
+        drives: Sequence[WaypointDrive],
         ground: Ground,
         found: StreetThings,
     ):

@@ -1,4 +1,4 @@
-"""The look of a building: from its tags, or else by lot."""
+"""The look of a building: from its tags, or else at random."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from shapely.geometry import LineString
 
 from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Distance of the places on drives from which walls are looked at [m].
 _SPACING = 4.0
@@ -32,7 +32,7 @@ class DriveViews:
 
     def __init__(
         self,
-        drives: Sequence[Drive],
+        drives: Sequence[WaypointDrive],
         ground: Ground,
         solids: np.ndarray,
     ):

@@ -29,7 +29,7 @@ from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 _TERRAIN = "TINRelief"
 
@@ -42,7 +42,7 @@ class Dressing:
         city: dressed.
         origins: name of a structure -> `dressed` or `lot`; all others are as
             the file has them.
-        facts: counts of parts from the file and by lot, to be written.
+        facts: counts of parts from the file and at random, to be written.
         is_paved: whether ground of unknown kind is paved.
     """
 
@@ -68,7 +68,7 @@ def _is_street(one: Imported) -> bool:
 def _laid(
     staged: StagedCity,
     city: ForeignCity,
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
     ground: Ground,
     is_paved: bool,
 ) -> list[Imported]:
@@ -86,7 +86,7 @@ def _laid(
 def dress_city(
     staged: StagedCity,
     city: ForeignCity,
-    drives: Sequence[Drive],
+    drives: Sequence[WaypointDrive],
     ground: Ground,
     seed: int,
 ) -> Dressing:

@@ -14,8 +14,8 @@ from cns_drake.imports.opendrive.lane_bands import LaneBand
 from cns_drake.imports.opendrive.lane_kinds import DRIVEN
 from cns_drake.imports.waypoint_drives import (
     LONGEST,
-    Drive,
     Obstacle,
+    WaypointDrive,
     steerable_drive,
 )
 
@@ -92,14 +92,14 @@ class BandGraph(WayGraph):
             last = place
         return True
 
-    def drive(self, way: Sequence[int]) -> Drive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
         line = np.concatenate([self._lines[k] for k in way])
         points = _resampled(_forwards(line))[: int(LONGEST / _SPACING) + 1]
         limits = [limit for k in way for _, limit in self._bands[k].road.limits]
-        found: Drive | Obstacle = Obstacle(points[0, :2])
+        found: WaypointDrive | Obstacle = Obstacle(points[0, :2])
         for window in _SMOOTHING:
             found = steerable_drive(_smoothed(points, window))
-            if isinstance(found, Drive):
+            if isinstance(found, WaypointDrive):
                 return replace(found, limit=min(limits, default=None))
         return found
 
@@ -111,7 +111,7 @@ class BandGraph(WayGraph):
         return np.array([way[int(np.argmin(distances))]])
 
 
-def find_lane_drives(bands: Sequence[LaneBand]) -> list[Drive]:
+def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
     """Returns two drives that share a part, or one, or none.
 
     Args:

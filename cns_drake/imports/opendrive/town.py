@@ -38,7 +38,7 @@ from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 # Height of sidewalks by default [m].
 _KERB = 0.1
@@ -74,7 +74,7 @@ class Town:
     city: City
     stages: Stages
     streets: ImportedStreets
-    drives: list[Drive]
+    drives: list[WaypointDrive]
     lanes: str | None
     kinds: dict[str, int]
     faults: ImportFaults
@@ -272,10 +272,10 @@ def _kinds(
         "objects": sum("object" in one.tags for one in things),
         "bridges": sum(one.semantic_class == "road" for one in decks),
         "roads with marks": len(marks),
-        "buildings, drawn by lot": sum(
+        "buildings, drawn at random": sum(
             one.semantic_class == "building" for one in generated
         ),
-        "plants, drawn by lot": sum(
+        "plants, drawn at random": sum(
             one.semantic_class == "vegetation" for one in generated
         ),
     }

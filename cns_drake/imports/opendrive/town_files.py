@@ -145,8 +145,8 @@ def _write_facts(draft: Path, source: Path, town: Town) -> None:
         },
     }
     comment = (
-        "# Where the roads of this map come from; all else is drawn by lot. A"
-        " place of the\n# map plus the origin is one of the source [m].\n"
+        "# Where the roads of this map come from; all else is drawn at random."
+        "\n# A place of the map plus the origin is one of the source [m].\n"
     )
     text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
     (draft / "import.yaml").write_text(comment + text, "utf-8")

@@ -22,8 +22,8 @@ def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
     """Returns the key of one frame of one sensor."""
     # A spawn key holds no negative numbers; frames before time zero do exist.
     spawn_key = (2 * abs(frame) + (frame < 0), *sensor_name.encode())
-    sequence = np.random.SeedSequence(seed, spawn_key=spawn_key)
-    return sequence.generate_state(1, np.uint64)[0]
+    drive = np.random.SeedSequence(seed, spawn_key=spawn_key)
+    return drive.generate_state(1, np.uint64)[0]
 
 
 @compiled

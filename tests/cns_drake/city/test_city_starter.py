@@ -15,7 +15,7 @@ from cns_drake.city.plan.stages import load_stages
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow
 
@@ -118,15 +118,15 @@ def test_it_is_listed_and_driven(town, tmp_path):
         cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
-    sequence = open_sequence(tmp_path / "town_02")
+    drive = open_drive(tmp_path / "town_02")
     # The vehicle's LiDAR is vertically above the first point of its path.
     start = plan_drive(load_scenario(town / "sequence_02.yaml")).pose(0.0)
     np.testing.assert_allclose(
-        sequence.X_WS[0][:3, 3],
+        drive.X_WS[0][:3, 3],
         np.add(start.translation(), [0, 0, 1.6]),
         atol=1e-9,
     )
-    assert len(sequence.scan(1)) > 10_000
+    assert len(drive.scan(1)) > 10_000
 
 
 def test_roads_that_cannot_be_used_are_named(tmp_path):

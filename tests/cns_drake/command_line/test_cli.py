@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from cns_drake.__main__ import main
-from cns_drake.scenarios.shipped import recordable_sequences
+from cns_drake.scenarios.shipped import recordable_drives
 
 pytestmark = pytest.mark.slow
 
@@ -68,7 +68,7 @@ def files(tmp_path_factory, small_map):
     return folder
 
 
-def test_list_names_the_sequences():
+def test_list_names_the_drives():
     result = run("list")
     assert result.returncode == 0
     assert "metropolis_01" in result.stdout
@@ -166,7 +166,7 @@ def test_diagram_script_has_options():
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (["simulate", "atlantis_01"], "unknown sequence 'atlantis_01'"),
+        (["simulate", "atlantis_01"], "unknown drive 'atlantis_01'"),
         (["simulate", "{files}/none.yaml"], "none.yaml: no such"),
         (["simulate", "{files}/typo.yaml"], "typo.yaml: stge: "),
         (["simulate", "{files}/type.yaml"], "type.yaml: frames: "),
@@ -255,12 +255,12 @@ def assert_one_line(result, fault):
     assert errors == [last]
 
 
-def test_every_sequence_has_a_script_that_names_it():
+def test_every_drive_has_a_script_that_names_it():
     scripts = {
         path.stem: path.read_text()
         for path in DIAGRAMS.glob("*.py")
         if "run_script" in path.read_text()
     }
-    assert scripts.keys() == recordable_sequences().keys()
+    assert scripts.keys() == recordable_drives().keys()
     for name, text in scripts.items():
         assert f'run_script("{name}", __doc__)' in text

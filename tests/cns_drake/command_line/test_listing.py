@@ -1,16 +1,16 @@
-"""The table of sequences: complete in files, legible in narrow terminals."""
+"""The table of drives: complete in files, legible in narrow terminals."""
 
 import re
 import sys
 
 import pytest
 
-from cns_drake.command_line.listing import list_sequences, table_lines
-from cns_drake.scenarios.sequence_table import SequenceRow
-from cns_drake.scenarios.shipped import recordable_sequences
+from cns_drake.command_line.listing import list_drives, table_lines
+from cns_drake.scenarios.drive_table import DriveRow
+from cns_drake.scenarios.shipped import recordable_drives
 
 ROWS = [
-    SequenceRow(
+    DriveRow(
         sequence=f"a_town_with_a_name_{k}",
         map="a_town_with_a_name",
         stage="01",
@@ -29,7 +29,7 @@ ROWS = [
 def test_all_columns_are_there_without_a_terminal():
     heading, _, last = table_lines(ROWS, None)
     assert heading.split() == [
-        *("sequence", "map", "stage", "length", "time"),
+        *("drive", "map", "stage", "length", "time"),
         *("frames", "structures", "triangles"),
     ]
     assert re.split("  +", last) == [
@@ -41,12 +41,12 @@ def test_all_columns_are_there_without_a_terminal():
 @pytest.mark.parametrize(
     ("width", "columns"),
     [
-        (120, "sequence map stage length time frames structures triangles"),
-        (80, "sequence stage length time frames structures triangles"),
-        (65, "sequence stage length time frames triangles"),
-        (50, "sequence length time frames"),
-        (30, "sequence length"),
-        (10, "sequence"),
+        (120, "drive map stage length time frames structures triangles"),
+        (80, "drive stage length time frames structures triangles"),
+        (65, "drive stage length time frames triangles"),
+        (50, "drive length time frames"),
+        (30, "drive length"),
+        (10, "drive"),
     ],
 )
 def test_columns_give_way_but_not_names(width, columns):
@@ -63,19 +63,19 @@ def test_columns_give_way_but_not_names(width, columns):
 
 
 @pytest.mark.parametrize("width", [60, 80])
-def test_shipped_sequences_fit_the_terminal(width, capsys, monkeypatch):
+def test_shipped_drives_fit_the_terminal(width, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    list_sequences()
+    list_drives()
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= width
     names = [line.split()[0] for line in lines[1:]]
-    assert sorted(names) == sorted(recordable_sequences())
+    assert sorted(names) == sorted(recordable_drives())
     assert "triangles" in lines[0]
 
 
 def test_the_terminal_does_not_narrow_what_is_piped(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "20")
-    list_sequences()
+    list_drives()
     for line in capsys.readouterr().out.splitlines():
         assert len(re.split("  +", line)) == 8

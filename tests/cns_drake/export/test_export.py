@@ -17,8 +17,8 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.errors import InputError as ReadingError
-from cns_drake.export.exporting import export_sequence
-from evaluation import sequences
+from cns_drake.export.exporting import export_drive
+from evaluation import drives
 from evaluation.study.collection import find_recordings, group_cities
 
 
@@ -30,14 +30,14 @@ def drive(tmp_path_factory):
 @pytest.fixture(scope="module")
 def kitti(drive, tmp_path_factory):
     output = tmp_path_factory.mktemp("exports") / "kitti"
-    assert export_sequence(drive, "kitti", output) == output / "sequences/07"
+    assert export_drive(drive, "kitti", output) == output / "sequences/07"
     return output
 
 
 @pytest.fixture(scope="module")
 def cns(drive, tmp_path_factory):
     output = tmp_path_factory.mktemp("exports") / "cns"
-    assert export_sequence(drive, "cns", output) == output / "Town/07"
+    assert export_drive(drive, "cns", output) == output / "Town/07"
     return output
 
 
@@ -57,8 +57,8 @@ XYZI = ("x", "y", "z", "intensity")
 
 
 def test_kitti_reads_back(drive, kitti):
-    recorded = sequences.open(drive)
-    read = sequences.open(kitti / "sequences/07")
+    recorded = drives.open(drive)
+    read = drives.open(kitti / "sequences/07")
     assert_same_drive(read, recorded, (*XYZI, "label", "instance"))
     since_start = recorded.stamps_ns - recorded.stamps_ns[0]
     np.testing.assert_array_equal(read.stamps_ns, since_start)
@@ -68,7 +68,7 @@ def test_kitti_reads_back(drive, kitti):
 def test_kitti_has_its_poses_where_semantic_kitti_has_them(drive, kitti):
     """Beside calib.txt: X_S0S = inv(Tr) X_C0C Tr, as its tools read them."""
     folder = kitti / "sequences/07"
-    expected = sequences.open(drive).X_WS
+    expected = drives.open(drive).X_WS
     expected = np.linalg.inv(expected[0]) @ expected
     X_CS = np.eye(4)
     for line in (folder / "calib.txt").read_text().splitlines():
@@ -86,9 +86,9 @@ def test_kitti_has_its_poses_where_semantic_kitti_has_them(drive, kitti):
 
 def test_tum_by_plain_means(drive, tmp_path):
     """The vehicle drives as recorded, and the LiDAR stands fixed on it."""
-    folder = export_sequence(drive, "tum", tmp_path / "tum")
+    folder = export_drive(drive, "tum", tmp_path / "tum")
     assert folder == tmp_path / "tum/town_07"
-    recorded = sequences.open(drive)
+    recorded = drives.open(drive)
     vehicle = np.loadtxt(folder / "base_link.tum")
     lidar = np.loadtxt(folder / "lidar.tum")
     assert vehicle.shape == lidar.shape == (NUM_SCANS, 8)
@@ -123,7 +123,7 @@ def test_tum_by_plain_means(drive, tmp_path):
 def test_kitti_by_the_loader_of_kiss_icp(drive, kitti):
     from kiss_icp.datasets.kitti import KITTIOdometryDataset
 
-    recorded = sequences.open(drive)
+    recorded = drives.open(drive)
     dataset = KITTIOdometryDataset(kitti, "07")
     # The program corrects an error of KITTI's own sensor, which bends our
     # scans.
@@ -146,7 +146,7 @@ def test_kitti_by_the_loader_of_kiss_icp(drive, kitti):
 
 
 def test_labels_as_semantic_kitti_has_them(drive, kitti):
-    for i, scan in enumerate(sequences.open(drive)):
+    for i, scan in enumerate(drives.open(drive)):
         stored = np.fromfile(
             kitti / f"sequences/07/labels/{i:06d}.label", dtype=np.uint32
         )
@@ -172,15 +172,15 @@ def test_camera_axes_are_right_down_forward(kitti):
 
 
 def test_cns_reads_back(drive, cns):
-    recorded = sequences.open(drive)
-    read = sequences.open(cns / "Town/07")
+    recorded = drives.open(drive)
+    read = drives.open(cns / "Town/07")
     assert_same_drive(read, recorded, XYZI)
     np.testing.assert_array_equal(read.stamps_ns, recorded.stamps_ns)
 
 
 def test_cns_by_plain_means(drive, cns):
     """gt.csv has the vehicle's poses, transformation_lidar.yaml the LiDAR's."""
-    recorded = sequences.open(drive)
+    recorded = drives.open(drive)
     rows = np.loadtxt(cns / "Town/07/gt.csv", delimiter=",")
     mount = yaml.safe_load((cns / "transformation_lidar.yaml").read_text())
     np.testing.assert_allclose(mount["translation"], P_BS, atol=1e-12)
@@ -200,7 +200,7 @@ def test_cns_by_plain_means(drive, cns):
 def test_pcd_by_open3d(drive, cns):
     import open3d
 
-    recorded = sequences.open(drive)
+    recorded = drives.open(drive)
     for stamp_ns, scan in zip(recorded.stamps_ns, recorded, strict=True):
         if len(scan) == 0:
             continue
@@ -215,9 +215,9 @@ def test_pcd_by_open3d(drive, cns):
 
 
 def test_imu_of_a_simulated_drive(short_recording, tmp_path):
-    drive = export_sequence(short_recording, "cns", tmp_path / "cns")
-    recorded = sequences.open(short_recording)
-    read = sequences.open(drive)
+    drive = export_drive(short_recording, "cns", tmp_path / "cns")
+    recorded = drives.open(short_recording)
+    read = drives.open(drive)
     np.testing.assert_array_equal(read.imu, recorded.imu)
     assert len(read.imu) == 40
     np.testing.assert_allclose(read.X_WS, recorded.X_WS, atol=1e-9)
@@ -229,7 +229,7 @@ def test_imu_of_a_simulated_drive(short_recording, tmp_path):
 
 
 def test_same_recording_gives_same_bytes(drive, kitti, tmp_path):
-    export_sequence(drive, "kitti", tmp_path / "again")
+    export_drive(drive, "kitti", tmp_path / "again")
     files = [path for path in kitti.rglob("*") if path.is_file()]
     assert len(files) == 1 + 1 + 6 + 2 * NUM_SCANS
     for path in files:
@@ -265,21 +265,21 @@ def test_several_drives_share_a_folder(drive, tmp_path):
     other = write_drive(tmp_path / "recordings" / "town_08")
     output = tmp_path / "output"
     for recording in (drive, other):
-        export_sequence(recording, "cns", output)
+        export_drive(recording, "cns", output)
     assert sorted(p.name for p in (output / "Town").iterdir()) == ["07", "08"]
     moved = write_drive(tmp_path / "recordings" / "town_09", p_BS=(0, 0, 2))
     with pytest.raises(InputError, match=r"lidar\.yaml: differs.*mount"):
-        export_sequence(moved, "cns", output)
+        export_drive(moved, "cns", output)
     assert not (output / "Town/09").exists()
 
 
 def test_a_drive_is_not_replaced(drive, tmp_path):
-    drive_folder = export_sequence(drive, "kitti", tmp_path / "output")
+    drive_folder = export_drive(drive, "kitti", tmp_path / "output")
     (drive_folder / "times.txt").write_text("mine")
     with pytest.raises(
         InputError, match="sequences/07: this drive is there already"
     ):
-        export_sequence(drive, "kitti", tmp_path / "output")
+        export_drive(drive, "kitti", tmp_path / "output")
     assert (drive_folder / "times.txt").read_text() == "mine"
 
 
@@ -292,7 +292,7 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     (tmp_path / "marked/export.yaml").write_text("format: [")
     (tmp_path / "foreign").mkdir()
     (tmp_path / "foreign/export.yaml").write_text("format: [cns]")
-    export_sequence(
+    export_drive(
         drive, "kitti" if format_name == "cns" else "cns", tmp_path / "other"
     )
     before = sorted(tmp_path.rglob("*"))
@@ -304,7 +304,7 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
         ("other", "the folder holds"),
     ):
         with pytest.raises(InputError, match=fault):
-            export_sequence(drive, format_name, tmp_path / folder)
+            export_drive(drive, format_name, tmp_path / folder)
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -320,7 +320,7 @@ def test_an_interrupted_export_has_no_final_name(drive, tmp_path, format_name):
             raise StopError
 
     with pytest.raises(StopError):
-        export_sequence(drive, format_name, tmp_path / "out", on_frame=stop)
+        export_drive(drive, format_name, tmp_path / "out", on_frame=stop)
     left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
     assert left == ["export.yaml"]
     # A killed export leaves its part file, which no other export uses.
@@ -328,7 +328,7 @@ def test_an_interrupted_export_has_no_final_name(drive, tmp_path, format_name):
     part = final / "07.part"
     part.mkdir(parents=True)
     (part / "scrap").write_text("")
-    drive_folder = export_sequence(drive, format_name, tmp_path / "out")
+    drive_folder = export_drive(drive, format_name, tmp_path / "out")
     assert drive_folder.parent == final
     assert not part.exists()
     assert not (drive_folder / "scrap").exists()
@@ -350,7 +350,7 @@ def test_a_full_disk_leaves_nothing_half(
 
     monkeypatch.setattr(type(tmp_path), "write_bytes", write_bytes)
     with pytest.raises(InputError, match=r"07\.part: No space left"):
-        export_sequence(drive, format_name, tmp_path / "out")
+        export_drive(drive, format_name, tmp_path / "out")
     left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
     assert left == ["export.yaml"]
 
@@ -367,7 +367,7 @@ def test_a_report_finds_exports(tmp_path, format_name, depth):
                 "scenario.json": {"map": "town", "stage": f"s{number}"}
             },
         )
-        export_sequence(recording, format_name, tmp_path / "in" / depth)
+        export_drive(recording, format_name, tmp_path / "in" / depth)
     (tmp_path / "in" / "notes").mkdir()
     (city,) = group_cities(find_recordings(tmp_path / "in"))
     assert city.name == "town"
@@ -381,11 +381,11 @@ def test_one_of_several_lidars(drive, tmp_path):
     rear = write_drive(
         tmp_path / "recordings" / "town_01", lidar_topic="/rear/points"
     )
-    export_sequence(rear, "kitti", tmp_path / "rear", lidar="rear")
+    export_drive(rear, "kitti", tmp_path / "rear", lidar="rear")
     with pytest.raises(
         InputError, match=r"no topic /side/points .*/rear/points"
     ):
-        export_sequence(rear, "kitti", tmp_path / "side", lidar="side")
+        export_drive(rear, "kitti", tmp_path / "side", lidar="side")
     assert not (tmp_path / "side").exists()
 
 
@@ -431,13 +431,13 @@ def test_two_lidars_share_a_kitti_folder(tmp_path):
     add_topic(recording / "town_07_0.mcap", "/lidar/points", "/rear/points")
     output = tmp_path / "kitti"
     for lidar, number in (("lidar", "07"), ("rear", "107")):
-        drive = export_sequence(recording, "kitti", output, lidar=lidar)
+        drive = export_drive(recording, "kitti", output, lidar=lidar)
         assert drive == output / "sequences" / number
         assert (output / f"poses/{number}.txt").is_file()
         with pytest.raises(InputError, match="is there already"):
-            export_sequence(recording, "kitti", output, lidar=lidar)
+            export_drive(recording, "kitti", output, lidar=lidar)
     names = [
-        sequences.open(drive).name for drive in sorted(drive.parent.iterdir())
+        drives.open(drive).name for drive in sorted(drive.parent.iterdir())
     ]
     assert names == ["town_07", "town_07_rear"]
 
@@ -449,7 +449,7 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path):
             attachments={"scenario.json": {"map": place}},
         )
         with pytest.raises(InputError, match="cannot be the name of a folder"):
-            export_sequence(drive, "cns", tmp_path / "out" / "deep")
+            export_drive(drive, "cns", tmp_path / "out" / "deep")
         shutil.rmtree(tmp_path / "recordings")
     assert not (tmp_path / "out").exists()
 
@@ -460,16 +460,16 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
     recording = write_drive(tmp_path / "town_07")
     path = recording / "town_07_0.mcap"
     messages, attachments = read_messages(path.read_bytes())
-    whole = sequences.open(path).X_WS
+    whole = drives.open(path).X_WS
     for one in messages:
         if one.topic == "/odometry":
             for name in "xyzw":
                 quat = one.body.pose.pose.orientation
                 setattr(quat, name, 3.0 * getattr(quat, name))
     path.write_bytes(write_messages(messages, attachments))
-    folder = export_sequence(path, format_name, tmp_path / "out")
+    folder = export_drive(path, format_name, tmp_path / "out")
     if format_name == "cns":
-        exported = sequences.open(folder)
+        exported = drives.open(folder)
         np.testing.assert_allclose(exported.X_WS, whole, atol=1e-12)
     else:
         rows = np.loadtxt(folder / "base_link.tum")
@@ -478,17 +478,17 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
         setattr(messages[-2].body.pose.pose.orientation, name, 0.0)
     path.write_bytes(write_messages(messages, attachments))
     with pytest.raises(InputError, match="quaternion"):
-        export_sequence(path, format_name, tmp_path / "new")
+        export_drive(path, format_name, tmp_path / "new")
     assert not list((tmp_path / "new").glob("*/*"))
 
 
 def test_folders_without_a_recording(kitti, tmp_path):
     for path in (tmp_path, tmp_path / "missing", kitti / "sequences/07"):
         with pytest.raises(InputError, match=f"{path}: no recording"):
-            export_sequence(path, "cns", tmp_path / "out")
+            export_drive(path, "cns", tmp_path / "out")
     (tmp_path / "broken.mcap").write_text("no mcap")
     with pytest.raises(InputError, match=r"broken\.mcap: not an MCAP file"):
-        export_sequence(tmp_path / "broken.mcap", "cns", tmp_path / "out")
+        export_drive(tmp_path / "broken.mcap", "cns", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -504,19 +504,19 @@ class TestReadingKittiExports:
         for name in ("first_pose.txt", "scenario.yaml", "structures.json"):
             (folder / name).unlink()
         shutil.rmtree(folder / "labels")
-        sequence = sequences.open(folder)
-        assert sequence.name == "07"
-        assert sequence.world_frame == "kitti/07"
-        assert sequence.scenario is None
-        assert sequence.instances is None
-        assert sequence.scan(0).dtype.names == XYZI
-        np.testing.assert_allclose(sequence.X_WS[0], np.eye(4), atol=1e-12)
+        drive = drives.open(folder)
+        assert drive.name == "07"
+        assert drive.world_frame == "kitti/07"
+        assert drive.scenario is None
+        assert drive.instances is None
+        assert drive.scan(0).dtype.names == XYZI
+        np.testing.assert_allclose(drive.X_WS[0], np.eye(4), atol=1e-12)
 
     def test_labels_that_are_too_few(self, folder):
         path = folder / "labels/000001.label"
         path.write_bytes(path.read_bytes()[:-4])
         with pytest.raises(ReadingError, match=r"60 points, but 59 in .*label"):
-            sequences.open(folder).scan(1)
+            drives.open(folder).scan(1)
 
     @pytest.mark.parametrize(
         "text", ["[1]", "a: [", "name: ../../x", "name: 'a b'", "\0"]
@@ -524,16 +524,16 @@ class TestReadingKittiExports:
     def test_scenario(self, folder, text):
         (folder / "scenario.yaml").write_text(text)
         with pytest.raises(ReadingError, match=r"scenario\.yaml: [^\n]*$"):
-            sequences.open(folder)
+            drives.open(folder)
 
     @pytest.mark.parametrize("text", ["{}x", "7", json.dumps([{"name": "a"}])])
     def test_structures(self, folder, text):
         (folder / "structures.json").write_text(text)
         with pytest.raises(ReadingError, match=r"structures\.json: [^\n]*$"):
-            _ = sequences.open(folder).instances
+            _ = drives.open(folder).instances
 
     @pytest.mark.parametrize("text", ["1 2 3", "", "1 " * 12])
     def test_first_pose(self, folder, text):
         (folder / "first_pose.txt").write_text(text)
         with pytest.raises(ReadingError, match=r"first_pose\.txt: "):
-            sequences.open(folder)
+            drives.open(folder)

@@ -154,7 +154,7 @@ def test_a_solid_inside_out_is_turned_back(tmp_path):
     assert "reversed" in read.faults.rows()[0][0]
 
 
-def test_a_sequence_has_vertices_of_each_feature(tmp_path):
+def test_a_drive_has_vertices_of_each_feature(tmp_path):
     lines = []
     for k in range(3):
         city = CityWriter()

@@ -12,7 +12,7 @@ from cns_drake.imports.import_ground import ground_of
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.staged_city import stage_city
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def shops(tmp_path):
     line = city.streets[0].line
     x = np.linspace(line[0, 0], line[-1, 0], 81)
     path = np.column_stack([x, np.full(81, line[0, 1])])
-    return city, Drive(path, path)
+    return city, WaypointDrive(path, path)
 
 
 def low_floors(structures):

@@ -1,4 +1,4 @@
-"""Walls of the file get details from tags and by lot."""
+"""Walls of the file get details from tags and at random."""
 
 import csv
 from dataclasses import replace
@@ -33,8 +33,8 @@ from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.staged_city import stage_city
-from cns_drake.imports.waypoint_drives import Drive
-from cns_drake.scenarios.sequence_table import write_table
+from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.scenarios.drive_table import write_table
 
 # The digest of an import before dressing existed.
 PLAIN = "100f7a75c0f44113"
@@ -62,7 +62,7 @@ def surfaces(one):
 
 
 def dressed(city, path=STREET, seed=0):
-    drives = [Drive(path, path)]
+    drives = [WaypointDrive(path, path)]
     ground = ground_of(city.structures)
     planned = plan_buildings(city.structures, drives, (), ground, seed)
     result = planned.dressed()
@@ -215,7 +215,7 @@ def test_a_lower_house_has_the_colours_of_the_whole_one(row):
     city = type(row)(row.structures, row.origin, "", ImportFaults())
     staged, growth = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
     assert growth.lower
-    drives = [Drive(STREET, STREET)]
+    drives = [WaypointDrive(STREET, STREET)]
     ground = ground_of(staged.kept)
     found = plan_buildings(staged.kept, drives, (), ground, 0).dressed()
     new = {o.structure.name: o for o in found.buildings.values()}
@@ -257,9 +257,13 @@ def test_a_house_behind_one_that_always_stands_has_no_windows(
     path = STREET * [0.2, 1.0] + low[:2] + [40.0, 6.0]
     always = city.structures if is_lasting else city.structures[1:]
     result = plan_buildings(
-        city.structures, [Drive(path, path)], (), ground_of(city.structures),
-        0, always,
-    ).dressed()  # fmt: skip
+        city.structures,
+        [WaypointDrive(path, path)],
+        (),
+        ground_of(city.structures),
+        0,
+        always,
+    ).dressed()
     after = {o.structure.name: o for o in result.buildings.values()}
     has_glass = "glass" in surfaces(after[f"building_w{behind}"])
     assert has_glass is not is_lasting

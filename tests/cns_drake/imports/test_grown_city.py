@@ -1,4 +1,4 @@
-"""First stages by lot, and stages by years, of small towns."""
+"""First stages at random, and stages by years, of small towns."""
 
 import csv
 import re

@@ -21,7 +21,7 @@ from cns_drake.imports.import_report import ImportOptions
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
 from evaluation.clouds.cloud_files import read_cloud
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow
 
@@ -136,7 +136,7 @@ def test_points_have_their_building(blocks, tmp_path):
     scenario = folder / "sequence_03.yaml"
     result = run("simulate", scenario, "--frames", "1", "--output", tmp_path)
     assert result.exit_code == 0, result.output
-    scan = open_sequence(tmp_path / "blocks_03").scan(0)
+    scan = open_drive(tmp_path / "blocks_03").scan(0)
     assert set(np.unique(scan["label"])) == {50, 72}
     with (folder / "structures.csv").open() as stream:
         names = {int(r["instance"]): r["name"] for r in csv.DictReader(stream)}

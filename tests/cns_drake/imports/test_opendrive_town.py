@@ -32,10 +32,10 @@ from cns_drake.imports.opendrive.lane_drives import find_lane_drives
 from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
+from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.scenarios.sequence_table import write_table
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 
 ARM = 12.0
 R = ARM - 1.75
@@ -340,7 +340,7 @@ def test_the_command_from_end_to_end(source, tmp_path):
         "simulate", scenario, "--frames", "2", "--output", tmp_path / "rec"
     )
     assert result.exit_code == 0, result.output
-    scan = open_sequence(tmp_path / "rec" / "town_02").scan(0)
+    scan = open_drive(tmp_path / "rec" / "town_02").scan(0)
     # Road below the car, at the height of the wheels.
     below = np.hypot(scan["x"], scan["y"]) < 6.0
     road_ = below & (scan["label"] == 40)

@@ -10,7 +10,7 @@ from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.imports.import_report import DriveOn
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_traffic import lanes_of_streets
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
@@ -58,7 +58,7 @@ ROUTE = np.array([(-86, -71.7), (0, -71.7), (86, -71.7)])
 
 def lanes_of(path, tmp_path, side=DriveOn.RIGHT, added=()):
     city = import_openstreetmap(path, None)
-    drive = Drive(ROUTE, ROUTE)
+    drive = WaypointDrive(ROUTE, ROUTE)
     text = lanes_of_streets(
         city.streets,
         city.street_places,
@@ -253,7 +253,7 @@ def test_no_lane_without_a_round_trip(tmp_path):
 
 def test_no_lanes_without_streets_near_the_drives(tmp_path):
     city = import_openstreetmap(write_blocks(tmp_path / "a.osm"), None)
-    drive = Drive(ROUTE + 5000.0, ROUTE + 5000.0)
+    drive = WaypointDrive(ROUTE + 5000.0, ROUTE + 5000.0)
     for streets in ((), city.streets):
         found = lanes_of_streets(
             streets,

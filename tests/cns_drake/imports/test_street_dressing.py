@@ -1,4 +1,4 @@
-"""Streets get furniture from the file, then by lot, away from the drives."""
+"""Streets get furniture from the file, then at random, away from the drives."""
 
 from itertools import combinations
 
@@ -24,7 +24,7 @@ from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_things import object_of
 from cns_drake.imports.staged_city import stage_city
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 WIDTH = 9.0
 
@@ -50,7 +50,7 @@ def origin(city):
 def drive_of(city, y=2.25):
     x = np.linspace(-95, 95, 96)
     path = np.column_stack([x, np.full(96, y)]) + origin(city)
-    return Drive(path, path)
+    return WaypointDrive(path, path)
 
 
 def dressed(city, seed=0):

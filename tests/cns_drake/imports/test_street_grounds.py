@@ -12,13 +12,13 @@ from cns_drake.imports.dressing.paved_gaps import paved_gaps
 from cns_drake.imports.import_ground import ground_of
 from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.imports.waypoint_drives import WaypointDrive
 
 
 def straight_drive(y=0.0, start=-80.0, end=70.0):
     x = np.linspace(start, end, 81)
     path = np.column_stack([x, np.full(81, y)])
-    return Drive(path, path)
+    return WaypointDrive(path, path)
 
 
 def outline(one):
@@ -41,7 +41,7 @@ def test_narrow_gaps_between_walks_and_roads_are_paved(tmp_path):
     city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, True)
     origin = city.streets[0].line.mean(axis=0)
     path = straight_drive().path + origin
-    found = list(paved_gaps(city.structures, [Drive(path, path)]))
+    found = list(paved_gaps(city.structures, [WaypointDrive(path, path)]))
     area = shapely.union_all([outline(one) for one in found])
     area = shapely.transform(area, lambda xy: xy - origin)
     # The other walk is 4.5 m away from the carriageway.
@@ -59,7 +59,7 @@ def test_narrow_gaps_between_walks_and_roads_are_paved(tmp_path):
         assert one.structure.semantic_class == "sidewalk"
         np.testing.assert_allclose(one.triangles[..., 2], 0.12)
     far = path + np.array([0.0, 500.0])
-    assert not list(paved_gaps(city.structures, [Drive(far, far)]))
+    assert not list(paved_gaps(city.structures, [WaypointDrive(far, far)]))
 
 
 @pytest.mark.parametrize(("gap", "is_paved"), [(0.15, True), (0.06, False)])
@@ -73,7 +73,7 @@ def test_joints_of_walks_are_paved(tmp_path, gap, is_paved):
     city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, True)
     origin = city.streets[0].line.mean(axis=0)
     path = straight_drive(start=-50.0, end=50.0).path + origin
-    found = list(paved_gaps(city.structures, [Drive(path, path)]))
+    found = list(paved_gaps(city.structures, [WaypointDrive(path, path)]))
     area = shapely.union_all([outline(one) for one in found])
     area = shapely.transform(area, lambda xy: xy - origin)
     joint = box(-55, 9.0, 55, 9.0 + gap)
@@ -108,7 +108,9 @@ def test_streets_are_laid_on_the_ground_below_drives(tmp_path, has_terrain):
     path = drive.path - low[:2]
     made = list(
         guessed_streets(
-            found.structures, [Drive(path, path)], ground_of(found.structures)
+            found.structures,
+            [WaypointDrive(path, path)],
+            ground_of(found.structures),
         )
     )
     by_kind = {"Road": [], "Sidewalk": []}

@@ -11,7 +11,7 @@ from cns_drake.pictures.aerial_pictures import (
     view_from_above,
 )
 from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.scenarios.shipped import shipped_sequences
+from cns_drake.scenarios.shipped import shipped_drives
 
 pytestmark = pytest.mark.slow
 
@@ -32,7 +32,7 @@ def test_drives_are_drawn_over_their_stages(tmp_path):
     folder = write_small_map(tmp_path / "boxes")
     scenarios = {}
     for stage in ("01", "04"):
-        source = shipped_sequences()[f"metropolis_{stage}"]
+        source = shipped_drives()[f"metropolis_{stage}"]
         values = yaml.safe_load(source.read_text()) | {"map": "."}
         path = folder / f"sequence_{stage}.yaml"
         path.write_text(yaml.safe_dump(values))

@@ -10,7 +10,7 @@ import pytest
 
 from cns_drake import load_scenario
 from cns_drake.pictures.drive_page import (
-    Drive,
+    DriveRecord,
     make_drive_page,
     moving_frames,
 )
@@ -70,7 +70,7 @@ def make_page(folder, other_stage=None):
     world = stage(folder, "here", GROUND, HALL, KIOSK, vehicle=vehicle)
     X_WBs = [X_WB_at(frame) for frame in range(NUM_FRAMES)]
     grid = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1)
-    drive = Drive(
+    drive = DriveRecord(
         PERIOD,
         X_WBs,
         dict.fromkeys(moving_frames(world), X_WBs),
@@ -146,7 +146,7 @@ def test_page_of_a_shipped_drive_is_small():
         for frame in np.linspace(0, len(X_WBs) - 1, _MAX_SCANS)
     ]
     motion = rng.normal(size=(len(X_WBs), 7))
-    drive = Drive(
+    drive = DriveRecord(
         FRAME_PERIOD,
         X_WBs,
         dict.fromkeys(moving_frames(world), X_WBs),

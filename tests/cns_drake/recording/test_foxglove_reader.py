@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from evaluation import sequences
+from evaluation import drives
 
 NODE = ROOT / "tests" / "node"
 POINT_FIELDS = ("x", "y", "z", "intensity", "ring", "t", "label", "instance")
@@ -77,13 +77,13 @@ def test_metadata_and_attachments(found, short_recording):
 
 
 def test_scans_are_those_that_we_read(found, short_recording):
-    sequence = sequences.open(short_recording)
+    drive = drives.open(short_recording)
     messages = found["topics"]["/lidar/points"]["messages"]
-    assert len(messages) == len(sequence) == 40
+    assert len(messages) == len(drive) == 40
     for i, message in enumerate(messages):
-        scan = sequence.scan(i)
+        scan = drive.scan(i)
         content = message["content"]
-        stamp_ns = int(sequence.stamps_ns[i])
+        stamp_ns = int(drive.stamps_ns[i])
         assert message["sequence"] == i
         assert int(message["logTime"]) == stamp_ns
         assert to_ns(content["header"]["stamp"]) == stamp_ns
@@ -94,7 +94,7 @@ def test_scans_are_those_that_we_read(found, short_recording):
 
 
 def test_poses_are_those_that_we_read(found, short_recording):
-    odometry = sequences.open(short_recording).odometry
+    odometry = drives.open(short_recording).odometry
     for topic, pick in (
         ("/odometry", lambda m: m["pose"]["pose"].values()),
         ("/tf", lambda m: m["transforms"][0]["transform"].values()),

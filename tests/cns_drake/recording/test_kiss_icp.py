@@ -11,7 +11,7 @@ import pytest
 from cns_drake.base import poses
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulation import simulate
-from evaluation import sequences
+from evaluation import drives
 
 pytestmark = pytest.mark.slow
 
@@ -46,9 +46,9 @@ def test_kiss_icp_finds_the_drive(recording, tmp_path, capsys):
     estimated = Pipeline(dataset, config=config).run()
     stamps = np.array(dataset.get_frames_timestamps())
 
-    sequence = sequences.open(recording)
-    np.testing.assert_allclose(stamps, sequence.stamps_ns * 1e-9, atol=1e-6)
-    exact = poses.inverse(sequence.X_WS[0]) @ sequence.X_WS
+    drive = drives.open(recording)
+    np.testing.assert_allclose(stamps, drive.stamps_ns * 1e-9, atol=1e-6)
+    exact = poses.inverse(drive.X_WS[0]) @ drive.X_WS
     steps = np.diff(exact[:, :3, 3], axis=0)
     length = np.linalg.norm(steps, axis=1).sum()
     assert length > 30.0

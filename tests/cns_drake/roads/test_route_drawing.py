@@ -1,4 +1,4 @@
-"""Routes by lot: legal, long enough, and the same for the same seed."""
+"""Routes at random: legal, long enough, and the same for the same seed."""
 
 import numpy as np
 import pytest

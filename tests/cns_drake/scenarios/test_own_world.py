@@ -24,7 +24,7 @@ SPEEDS = {
 
 @pytest.fixture
 def yard(tmp_path):
-    """A folder with a world, waypoints and a sequence of them."""
+    """A folder with a world, waypoints and a drive of them."""
     folder = tmp_path / "yard"
     folder.mkdir()
     visuals = [

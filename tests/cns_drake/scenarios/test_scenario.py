@@ -18,12 +18,12 @@ from cns_drake.scenarios.scenario_files import (
 )
 from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
 from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
-from cns_drake.scenarios.shipped import recordable_sequences
+from cns_drake.scenarios.shipped import recordable_drives
 from cns_drake.scenarios.weather_config import WeatherConfig
 
 
-def test_shipped_sequences_load():
-    names = recordable_sequences().keys()
+def test_shipped_drives_load():
+    names = recordable_drives().keys()
     assert {"metropolis_01", "metropolis_04"} <= names
     for name in names:
         scenario = load_scenario(name)
@@ -176,7 +176,7 @@ def test_files_that_are_no_scenario(tmp_path, text, fault):
     assert "\n" not in str(caught.value)
 
 
-def test_unknown_sequence_names_the_known_ones():
+def test_unknown_drive_names_the_known_ones():
     with pytest.raises(InputError, match=r"'metropolis_99'; .*metropolis_04"):
         load_scenario("metropolis_99")
 

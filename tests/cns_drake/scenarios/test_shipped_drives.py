@@ -9,17 +9,17 @@ from shapely import contains, distance, linestrings, points, polygons, prepare
 from cns_drake.recording.frame_clock import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.road_surface import RoadSurface
+from cns_drake.scenarios.drive_facts import drive_facts
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.scenario_loading import make_scenario
-from cns_drake.scenarios.sequence_facts import sequence_facts
-from cns_drake.scenarios.shipped import shipped_sequences
+from cns_drake.scenarios.shipped import shipped_drives
+from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.sequences.sampling import sample_frames
 
 pytestmark = pytest.mark.slow
 
-SHIPPED = sorted(shipped_sequences())
+SHIPPED = sorted(shipped_drives())
 # Queries of the later drive that have a match in the earlier one, from the
 # paper's Table II (true positives over recall at 1).
 QUERIES_WITH_MATCH = {
@@ -182,7 +182,7 @@ def test_plans_are_the_drives(drives):
 
 def test_facts_are_those_of_the_drive(drives):
     scenario, _, trajectory = drives["suburbia_02"]
-    facts = sequence_facts(scenario)
+    facts = drive_facts(scenario)
     assert facts.length == trajectory.length
     assert facts.duration == trajectory.duration
     assert facts.frames == frames_within(trajectory.duration)
@@ -190,7 +190,7 @@ def test_facts_are_those_of_the_drive(drives):
     assert (facts.frames - 1) * FRAME_PERIOD <= facts.duration
     assert facts.frames * FRAME_PERIOD > facts.duration
     values = scenario.model_dump() | {"frames": 30}
-    assert sequence_facts(make_scenario(values, "test")).frames == 30
+    assert drive_facts(make_scenario(values, "test")).frames == 30
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.recording import bag_writer
 from cns_drake.simulation.simulation import simulate
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow
 
@@ -40,7 +40,7 @@ def test_scans_read_are_those_recorded(scenario, recorded, tmp_path, num_read):
     run = simulate(scenario, tmp_path, reader=read)
     assert contents(run.folder) == contents(recorded)
     (drive,) = drives
-    expected = open_sequence(recorded)
+    expected = open_drive(recorded)
     assert len(scans) == num_read
     for k, scan in enumerate(scans):
         np.testing.assert_array_equal(scan, expected.scan(k))

@@ -11,7 +11,7 @@ import pytest
 from cns_drake.ray_casting import embree_hierarchy
 from cns_drake.scene import kept_worlds
 from cns_drake.simulation import kept_scenes
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import DriveSimulation
 
 FRAMES = (0, 7, 3)
 
@@ -37,8 +37,8 @@ def built(monkeypatch):
 
 
 def scans(drive):
-    sequence = drive()
-    return [sequence.scan(frame).tobytes() for frame in FRAMES]
+    opened = drive()
+    return [opened.scan(frame).tobytes() for frame in FRAMES]
 
 
 @pytest.fixture(params=["plain", "traffic", "snow"])
@@ -54,7 +54,7 @@ def drive(request, tmp_path):
     scenario = tiny_scenario(
         tmp_path, world=None, map=str(town), stage="04", frames=8, **changes
     )
-    return SimulatedDrive(scenario)
+    return DriveSimulation(scenario)
 
 
 def test_scans_are_those_of_a_scene_built_alone(drive, built):
@@ -88,7 +88,7 @@ def test_forked_processes_share_it(drive):
 
 def test_no_thread_starts(tmp_path):
     """A forked process would lack it."""
-    drive = SimulatedDrive(tiny_scenario(tmp_path))
+    drive = DriveSimulation(tiny_scenario(tmp_path))
     before = psutil.Process().num_threads()
     drive.load()
     assert len(kept_scenes._kept) == 1
@@ -97,7 +97,7 @@ def test_no_thread_starts(tmp_path):
 
 def test_a_changed_stage_is_built_anew(tmp_path):
     scenario = tiny_scenario(tmp_path, frames=8)
-    drive = SimulatedDrive(scenario)
+    drive = DriveSimulation(scenario)
     drive.load()
     before = scans(drive)
     drive.load()
@@ -115,7 +115,7 @@ def test_few_scenes_are_kept(tmp_path, monkeypatch):
     drives = []
     for k in range(3):
         (tmp_path / str(k)).mkdir()
-        drives.append(SimulatedDrive(tiny_scenario(tmp_path / str(k))))
+        drives.append(DriveSimulation(tiny_scenario(tmp_path / str(k))))
         drives[-1].load()
     assert len(kept_scenes._kept) == 2
     for drive in drives:
@@ -124,7 +124,7 @@ def test_few_scenes_are_kept(tmp_path, monkeypatch):
 
 
 def test_a_world_in_which_something_can_move_has_none(tmp_path):
-    drive = SimulatedDrive(tiny_scenario(tmp_path, frames=8))
+    drive = DriveSimulation(tiny_scenario(tmp_path, frames=8))
     file = tmp_path / "tiny.sdf"
     text = file.read_text()
     file.write_text(text.replace("<static>true</static>", ""))

@@ -17,8 +17,8 @@ from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.station import make_station
-from evaluation.sequences import open_sequence
-from evaluation.sequences.deskewing import deskew
+from evaluation.drives import open_drive
+from evaluation.drives.deskewing import deskew
 
 # A tilted sensor off the vehicle's middle, so that no transform is trivial.
 MOUNT = {"xyz": [1.2, -0.4, 1.7], "rpy_deg": [3.0, -2.0, 40.0]}
@@ -228,28 +228,28 @@ def swept_recording(small_map, tmp_path_factory):
 def test_recorded_poses_deskew(swept_recording, frame):
     """`deskew` finds the poses of the trajectory."""
     scenario, folder = swept_recording
-    sequence = open_sequence(folder)
+    drive = open_drive(folder)
     trajectory = plan_drive(scenario)
     X_BS = sensor_pose(scenario.lidars["lidar"])
     time = frame * FRAME_PERIOD
     X_WS = trajectory.pose(time) @ X_BS
-    p_W = to_world(sequence.scan(frame), trajectory, X_BS, time)
-    found = deskew(sequence, frame)
+    p_W = to_world(drive.scan(frame), trajectory, X_BS, time)
+    found = deskew(drive, frame)
     error = np.linalg.norm(
         positions(found) - (X_WS.inverse() @ p_W.T).T, axis=1
     )
     # The last turn is extrapolated.
     assert error.max() < (5e-4 if frame < 129 else 5e-3)
     for field in ("t", "ring", "intensity"):
-        np.testing.assert_array_equal(found[field], sequence.scan(frame)[field])
-    moved = np.abs(positions(found) - positions(sequence.scan(frame))).max()
+        np.testing.assert_array_equal(found[field], drive.scan(frame)[field])
+    moved = np.abs(positions(found) - positions(drive.scan(frame))).max()
     assert frame == 0 or moved > 0.05
 
 
 def test_files_state_their_distortion(swept_recording, short_recording):
-    (note,) = open_sequence(swept_recording[1]).notes
+    (note,) = open_drive(swept_recording[1]).notes
     assert "taken while the LiDAR moved" in note
-    assert open_sequence(short_recording).notes == ()
+    assert open_drive(short_recording).notes == ()
 
 
 def test_swept_pose_is_where_the_vehicle_is(small_map):

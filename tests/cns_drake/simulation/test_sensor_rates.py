@@ -11,8 +11,8 @@ from rosbags.highlevel import AnyReader
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.recordings.mcap_sequence import McapSequence
-from cns_drake.export.exporting import export_sequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
+from cns_drake.export.exporting import export_drive
 from cns_drake.recording.frame_clock import START_NS
 from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.scenario_loading import load_scenario
@@ -108,16 +108,16 @@ def test_samples_go_on_between_frames_and_after_the_last(tmp_path):
 
 def test_samples_enclose_every_scan(recording):
     for lidar in LIDARS:
-        sequence = McapSequence(recording, lidar)
-        first, last = sequence.imu["stamp_ns"][[0, -1]]
-        for stamp_ns, scan in zip(sequence.stamps_ns, sequence, strict=True):
+        drive = McapDrive(recording, lidar)
+        first, last = drive.imu["stamp_ns"][[0, -1]]
+        for stamp_ns, scan in zip(drive.stamps_ns, drive, strict=True):
             assert first <= stamp_ns
             assert stamp_ns + scan["t"].max() <= last
 
 
 def test_turns_take_their_time(recording):
     for lidar, config in LIDARS.items():
-        t_ns = McapSequence(recording, lidar).scan(1)["t"]
+        t_ns = McapDrive(recording, lidar).scan(1)["t"]
         # The last of eight columns, of which some return nothing.
         assert 0.7e9 / config["rate"] < t_ns.max() < 1e9 / config["rate"]
 
@@ -128,7 +128,7 @@ def test_layouts_hold_the_same_points(recording, tmp_path):
     }
     plain = simulate(make(tmp_path, lidars=lidars), tmp_path / "out").folder
     for lidar in ("rear", "slow"):
-        one, other = (McapSequence(p, lidar) for p in (recording, plain))
+        one, other = (McapDrive(p, lidar) for p in (recording, plain))
         assert len(one) == len(other) > 3
         for scan, expected in zip(one, other, strict=True):
             assert len(scan) > 10
@@ -162,8 +162,8 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
 
 def test_a_shorter_run_begins_alike(scenario, recording, tmp_path):
     short = scenario.model_copy(update={"frames": 5})
-    cut = McapSequence(simulate(short, tmp_path).folder)
-    whole = McapSequence(recording)
+    cut = McapDrive(simulate(short, tmp_path).folder)
+    whole = McapDrive(recording)
     # The recording ends when the longest of its scans is complete.
     assert len(cut.imu) == round(0.6 * 400) + 1
     np.testing.assert_array_equal(cut.imu, whole.imu[: len(cut.imu)])
@@ -176,7 +176,7 @@ def test_errors_are_those_of_kalibrs_file(recording, tmp_path):
     """Differences from the drive without noise have Kalibr's statistics."""
     imu = {"rate": 400}
     ideal = simulate(make(tmp_path, imu=imu), tmp_path / "out").folder
-    noisy, exact = (McapSequence(p).imu for p in (recording, ideal))
+    noisy, exact = (McapDrive(p).imu for p in (recording, ideal))
     for name, density in (("specific_force", 0.01), ("angular_velocity", 5e-3)):
         errors = noisy[name] - exact[name]
         expected = density * np.sqrt(400)
@@ -206,9 +206,9 @@ def test_messages_have_their_variances(recording):
 def test_kalibrs_file_travels_with_the_recording(recording, tmp_path):
     expected = KALIBR | {"update_rate": 400.0, "rostopic": "/imu/data"}
     assert yaml.safe_load((recording / "imu.yaml").read_text()) == expected
-    assert yaml.safe_load(McapSequence(recording).kalibr) == expected
+    assert yaml.safe_load(McapDrive(recording).kalibr) == expected
     for layout in ("cns", "kitti", "tum"):
-        drive = export_sequence(recording, layout, tmp_path / layout)
+        drive = export_drive(recording, layout, tmp_path / layout)
         assert yaml.safe_load((drive / "imu.yaml").read_text()) == expected
 
 

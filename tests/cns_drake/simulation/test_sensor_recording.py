@@ -31,7 +31,7 @@ from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.sensors.lidar_view import add_lidar_view
 from cns_drake.sensors.odometry import add_odometry
 from cns_drake.simulation.sensor_recording import add_mcap_recorder
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 
 RATE, PERIOD, RADIUS = 0.7, 0.1, 2.0
 X_PL = RigidTransform(RollPitchYaw(0.1, -0.2, 0.3), [0.2, 0.1, 0.5])
@@ -181,11 +181,11 @@ def test_places_of_the_sensors(ride):
 
 def test_the_evaluation_reads_it(ride):
     """All points lie on the wall, once they are in the world."""
-    sequence = open_sequence(ride[0])
-    for k in range(len(sequence)):
-        scan = sequence.scan(k)
+    drive = open_drive(ride[0])
+    for k in range(len(drive)):
+        scan = drive.scan(k)
         p_S = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
-        X_WS = sequence.X_WS[k]
+        X_WS = drive.X_WS[k]
         p_W = p_S @ X_WS[:3, :3].T + X_WS[:3, 3]
         offset = np.abs(p_W - [9.0, 0.0, 0.0]) / [0.5, 15.0, 3.0]
         np.testing.assert_allclose(offset.max(axis=1), 1.0, atol=1e-4)

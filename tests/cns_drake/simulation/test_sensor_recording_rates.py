@@ -10,7 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
 from cns_drake.sensors.imu import add_imu
 from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
 from cns_drake.sensors.lidar_adding import add_lidar
@@ -65,7 +65,7 @@ class Falling:
 
 
 def stamps(folder, lidar):
-    return (McapSequence(folder, lidar).stamps_ns / 1e9).tolist()
+    return (McapDrive(folder, lidar).stamps_ns / 1e9).tolist()
 
 
 def test_every_sensor_has_its_rate(tmp_path):
@@ -77,17 +77,17 @@ def test_every_sensor_has_its_rate(tmp_path):
     assert stamps(tmp_path / "fall", "fast") == pytest.approx(
         0.05 * np.arange(9)
     )
-    sequence = McapSequence(tmp_path / "fall", "fast")
-    assert sequence.imu["stamp_ns"].tolist() == list(
+    drive = McapDrive(tmp_path / "fall", "fast")
+    assert drive.imu["stamp_ns"].tolist() == list(
         range(0, 400_000_001, 5_000_000)
     )
-    times = sequence.odometry["stamp_ns"] / 1e9
+    times = drive.odometry["stamp_ns"] / 1e9
     np.testing.assert_allclose(times, 0.025 * np.arange(17))
     # It falls by g t^2 / 2 and feels nothing.
     np.testing.assert_allclose(
-        sequence.odometry["position"][:, 2], -0.5 * 9.81 * times**2, atol=1e-3
+        drive.odometry["position"][:, 2], -0.5 * 9.81 * times**2, atol=1e-3
     )
-    np.testing.assert_allclose(sequence.imu["specific_force"], 0.0, atol=1e-9)
+    np.testing.assert_allclose(drive.imu["specific_force"], 0.0, atol=1e-9)
 
 
 def test_a_period_is_of_all_that_have_no_rate(tmp_path):
@@ -99,14 +99,14 @@ def test_a_period_is_of_all_that_have_no_rate(tmp_path):
     assert stamps(tmp_path / "fall", "fast") == pytest.approx(
         [0.0, 0.1, 0.2, 0.3, 0.4]
     )
-    assert len(McapSequence(tmp_path / "fall", "fast").imu) == 21
+    assert len(McapDrive(tmp_path / "fall", "fast").imu) == 21
 
 
 def test_noise_is_that_of_its_model(tmp_path):
     falling = Falling()
     imu = falling.add_imu(rate=100, noise=NOISE)
     falling.record(tmp_path / "fall", 3.0, period=0.2, imu=imu)
-    found = McapSequence(tmp_path / "fall", "slow").imu
+    found = McapDrive(tmp_path / "fall", "slow").imu
     errors = ImuErrors(NOISE, 100)
     expected = np.array([errors.at(k) for k in range(301)])
     np.testing.assert_allclose(

@@ -8,9 +8,9 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 from evaluation.study.recording_survey import survey_recording
 
 
@@ -28,8 +28,8 @@ def check_same(simulated, recorded, frames):
 
 
 def test_scans_and_poses_are_those_of_a_recording(short_recording):
-    recorded = open_sequence(short_recording)
-    source = SimulatedDrive(load_scenario(short_recording / "scenario.yaml"))
+    recorded = open_drive(short_recording)
+    source = DriveSimulation(load_scenario(short_recording / "scenario.yaml"))
     simulated = pickle.loads(pickle.dumps(source))()
     check_same(simulated, recorded, [0, 1, 2, 17, 39])
     keys = ("map", "stage", "route")
@@ -49,15 +49,15 @@ def test_scans_and_poses_are_those_of_a_recording(short_recording):
 def test_noise_and_motion_distortion_too(tmp_path):
     """A frame's noise depends on its number only, in any order."""
     scenario = tiny_scenario(tmp_path)
-    recorded = open_sequence(simulate(scenario, tmp_path / "out").folder)
-    simulated = SimulatedDrive(scenario)()
+    recorded = open_drive(simulate(scenario, tmp_path / "out").folder)
+    simulated = DriveSimulation(scenario)()
     assert len(simulated) == FRAMES
     check_same(simulated, recorded, [40, 0, 41, FRAMES - 1, 40])
 
 
 def test_scans_of_a_still_world_in_any_order(tmp_path):
     """The time stands still there: only the sensor's pose differs."""
-    source = SimulatedDrive(
+    source = DriveSimulation(
         tiny_scenario(
             tmp_path, lidars={"lidar": {"preset": "vlp-16", "columns": 64}}
         )
@@ -84,18 +84,18 @@ def test_calibrated_returns_in_fog_too(tmp_path):
             }
         },
     )
-    recorded = open_sequence(simulate(scenario, tmp_path / "out").folder)
-    simulated = SimulatedDrive(scenario)()
+    recorded = open_drive(simulate(scenario, tmp_path / "out").folder)
+    simulated = DriveSimulation(scenario)()
     check_same(simulated, recorded, [2, 0, 3])
     clear = scenario.with_returns("ideal")
-    assert len(SimulatedDrive(clear)().scan(0)) != len(simulated.scan(0))
+    assert len(DriveSimulation(clear)().scan(0)) != len(simulated.scan(0))
 
 
 def test_identity_differs_by_scenario_and_world(tmp_path):
     scenario = tiny_scenario(tmp_path)
-    source = SimulatedDrive(scenario)
-    other = SimulatedDrive(scenario.model_copy(update={"seed": 5}))
-    assert source.identity() == SimulatedDrive(scenario).identity()
+    source = DriveSimulation(scenario)
+    other = DriveSimulation(scenario.model_copy(update={"seed": 5}))
+    assert source.identity() == DriveSimulation(scenario).identity()
     assert source.identity() != other.identity()
     before = source.identity()
     sdf = tmp_path / "tiny.sdf"
@@ -106,4 +106,4 @@ def test_identity_differs_by_scenario_and_world(tmp_path):
 def test_too_many_frames_are_refused(tmp_path):
     scenario = tiny_scenario(tmp_path, frames=100_000)
     with pytest.raises(InputError, match="frames: 100000 is too many"):
-        SimulatedDrive(scenario)()
+        DriveSimulation(scenario)()

@@ -13,7 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.sensors.lidar_adding import add_lidar
 from cns_drake.sensors.odometry import add_odometry
 from cns_drake.simulation.sensor_recording import add_mcap_recorder
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 
 PERIOD = 0.125  # Exact, so that every frame falls where it is said.
 
@@ -67,7 +67,7 @@ class Drive:
         return self.lidar.GetOutputPort("scan").Eval(context).copy()
 
     def recorded_frames(self):
-        stamps = open_sequence(self.folder).stamps_ns * 1e-9
+        stamps = open_drive(self.folder).stamps_ns * 1e-9
         return (stamps / PERIOD).tolist()
 
 
@@ -117,7 +117,7 @@ def test_a_clock_may_jump_ahead(drive):
         simulator.AdvanceTo(101 * PERIOD)
     assert drive.recorded_frames() == [2, 3, 100, 101]
     # The fixed frames are there, though frame 0 is not.
-    assert open_sequence(drive.folder).X_WS.shape == (4, 4, 4)
+    assert open_drive(drive.folder).X_WS.shape == (4, 4, 4)
 
 
 def test_nothing_is_recorded_in_silence_to_nowhere(drive):

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.recordings.mcap_sequence import McapSequence
-from cns_drake.export.marked_sequence import MarkedSequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
+from cns_drake.export.marked_drive import MarkedDrive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scenarios.scenario_loading import make_scenario
-from cns_drake.simulation.simulated_drive import SimulatedSequence
+from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.stage_loading import load_stage
 from evaluation.change.tcr import temporal_change
@@ -60,8 +60,8 @@ def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
         simulate(changed, tmp_path / name)
     first, second = (recorded(tmp_path / n) for n in ("first", "second"))
     assert first.read_bytes() == second.read_bytes()
-    recording, survey = McapSequence(first, None), SimulatedSequence(changed)
-    plain = SimulatedSequence(scenario)
+    recording, survey = McapDrive(first, None), SimulatedDrive(changed)
+    plain = SimulatedDrive(scenario)
     for index in range(3):
         scan = recording.scan(index)
         assert np.array_equal(scan, survey.scan(index))
@@ -81,8 +81,8 @@ def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
 
 def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
     """TCR of a cause is that of replacing the points on its instances alone."""
-    changed = SimulatedSequence(scenario.with_transient(parked_cars=1.0))
-    plain = SimulatedSequence(scenario)
+    changed = SimulatedDrive(scenario.with_transient(parked_cars=1.0))
+    plain = SimulatedDrive(scenario)
     causes = np.array(
         [
             entry.instance
@@ -135,7 +135,7 @@ def test_what_came_is_absent_in_another_stage(tmp_path):
     scenario = tiny_scenario(tmp_path, frames=2, **place)
     simulate(scenario.with_transient(parked_cars=1.0), tmp_path / "out")
     folder = next((tmp_path / "out").iterdir())
-    marked = MarkedSequence(folder, None, "02")
+    marked = MarkedDrive(folder, None, "02")
     scan = marked.scan(0)
     names = {k: entry["name"] for k, entry in marked.instances.items()}
     parked = [k for k, name in names.items() if name.startswith("parked_")]

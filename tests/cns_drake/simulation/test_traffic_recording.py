@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.recordings.mcap_sequence import McapSequence
-from cns_drake.export.exporting import export_sequence
+from cns_drake.base.recordings.mcap_drive import McapDrive
+from cns_drake.export.exporting import export_drive
 from cns_drake.scene.semantics import MOVING_IDS
 from cns_drake.simulation.simulation import simulate
 
@@ -58,7 +58,7 @@ def recording(scenario, tmp_path_factory):
 def moving(recording):
     """Instance -> label of the moving objects in all scans."""
     found = {}
-    for scan in McapSequence(recording):
+    for scan in McapDrive(recording):
         rows = scan[scan["label"] >= min(MOVING_IDS.values())]
         found.update(
             zip(rows["instance"].tolist(), rows["label"].tolist(), strict=True)
@@ -113,7 +113,7 @@ def test_a_page_moves_vehicles_and_walkers(scenario, tmp_path):
     drawn, moved = objects(commands), tracks(commands)
     names = {
         str(number): one["name"]
-        for number, one in McapSequence(folder).instances.items()
+        for number, one in McapDrive(folder).instances.items()
     }
     boxes = read_boxes(folder)
     first, last = boxes[0], boxes[-1]
@@ -163,8 +163,8 @@ def test_kitti_has_moving_labels_and_instances(recording, moving, tmp_path):
     assert {252, 254} < set(moving.values())
     assert max(moving.values()) > 255
     assert min(moving) > 300
-    folder = export_sequence(recording, "kitti", tmp_path)
-    drive = McapSequence(recording)
+    folder = export_drive(recording, "kitti", tmp_path)
+    drive = McapDrive(recording)
     names = {i: one["class"] for i, one in drive.instances.items()}
     for instance, label in moving.items():
         assert label == MOVING_IDS[names[instance]]

@@ -28,7 +28,7 @@ from cns_drake.simulation.simulation import simulate
 from cns_drake.studies.recording_jobs import record_all
 from cns_drake.studies.recording_step import is_recorded
 from evaluation.change.drive_change import compare, survey
-from evaluation.sequences import open_sequence
+from evaluation.drives import open_drive
 from evaluation.study import trend_databases
 
 pytestmark = pytest.mark.slow
@@ -128,8 +128,8 @@ def test_damaged_files_are_no_recording(tmp_path, name, damage):
     assert not is_recorded(scenario, tmp_path / "output")
 
 
-def test_two_sequences_of_one_name(scenarios, tmp_path):
-    with pytest.raises(InputError, match="short: 2 sequences"):
+def test_two_drives_of_one_name(scenarios, tmp_path):
+    with pytest.raises(InputError, match="short: 2 drives"):
         record_all([scenarios[0]] * 2, tmp_path, ONE)
 
 
@@ -213,8 +213,8 @@ def test_families_on_other_cities_share_them(town, tmp_path, monkeypatch):
     output.rename(moved)
     member = load_scenario(moved / "scenarios" / f"{names[1]}.yaml")
     assert is_recorded(member.model_copy(update={"frames": FRAMES}), moved)
-    again = open_sequence(simulate(member, tmp_path).folder)
-    before = open_sequence(moved / names[1])
+    again = open_drive(simulate(member, tmp_path).folder)
+    before = open_drive(moved / names[1])
     assert len(again) == len(before) == FRAMES
     for scan, scan_before in zip(again, before, strict=True):
         np.testing.assert_array_equal(scan, scan_before)

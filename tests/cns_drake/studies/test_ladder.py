@@ -14,7 +14,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.scenario_traffic import load_ways
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies import distractors, ladder
 from cns_drake.studies.distractors import distracting_drives
 from cns_drake.studies.ladder import climb_ladder
@@ -164,11 +164,11 @@ def test_what_a_map_lacks(query_drive, town):
 @pytest.mark.slow
 def test_queries_lie_at_the_same_places_on_every_rung(query_drive):
     (plain, *rungs), _ = plan_rungs(query_drive, Extent(levels=(4,)))
-    expected = SimulatedDrive(plain.drives.query)().X_WS
+    expected = DriveSimulation(plain.drives.query)().X_WS
     for rung in rungs:
         if rung.cause in ("weather", "returns", "sensor"):
             np.testing.assert_array_equal(
-                SimulatedDrive(rung.drives.query)().X_WS, expected
+                DriveSimulation(rung.drives.query)().X_WS, expected
             )
 
 
@@ -176,8 +176,8 @@ def test_the_other_carriageway(query_drive):
     (plain, rung), _ = plan_rungs(
         query_drive, Extent(causes={"viewpoint"}, levels=(4,))
     )
-    query = SimulatedDrive(plain.drives.query)().X_WS
-    database = SimulatedDrive(rung.drives.database)().X_WS
+    query = DriveSimulation(plain.drives.query)().X_WS
+    database = DriveSimulation(rung.drives.database)().X_WS
     X_QD = np.linalg.inv(query) @ database
     np.testing.assert_allclose(X_QD[:, :3, 3] - [[1.25, 6, 0]], 0, atol=1e-9)
     np.testing.assert_allclose(X_QD[:, 0, 0], -1.0, atol=1e-9)
@@ -189,8 +189,8 @@ def test_lateral_offsets_widen_the_radius(query_drive, level, left):
     (plain, rung), _ = plan_rungs(
         query_drive, Extent(causes={"lateral"}, levels=(level,))
     )
-    query = SimulatedDrive(plain.drives.query)().X_WS
-    database = SimulatedDrive(rung.drives.database)().X_WS
+    query = DriveSimulation(plain.drives.query)().X_WS
+    database = DriveSimulation(rung.drives.database)().X_WS
     X_QD = np.linalg.inv(query) @ database
     np.testing.assert_allclose(X_QD[:, :3, 3] - [[1.25, left, 0]], 0, atol=1e-9)
     radius = rung.drives.radius(7.5)

@@ -15,7 +15,7 @@ from cns_drake.studies.levels import (
 LEVELS = {("town", 0): "a", ("town", 1): "b", ("city", 0): "c"}
 LEVELS |= {("city", 1): "d"}
 HEADER = (
-    *("map", "cause", "level", "method", "radius_told", "drives"),
+    *("map", "cause", "level", "method", "gate", "drives"),
     *("auc", "auc_low", "auc_high"),
 )
 
@@ -74,7 +74,7 @@ def test_one_map_is_enough(tmp_path):
     found = read_results([write(tmp_path / "city.csv", kept)], LEVELS)
     assert [row[0] for row in level_table(found).rows] == ["city"] * 3
     path = write(tmp_path / "less.csv", kept[:-1])
-    with pytest.raises(InputError, match="level 1 of city, radius_told 1: 0"):
+    with pytest.raises(InputError, match="level 1 of city, gate 1: 0"):
         read_results([path], LEVELS)
 
 
@@ -101,8 +101,8 @@ def test_a_method_in_two_tables_must_be_equal(tmp_path):
         (2, 7, "0.9999", None),
         (2, 7, "1.5", "line 4: auc"),
         (3, 6, "good", "line 5: not a number"),
-        (4, 4, "1", "level 0 of city, radius_told 0: 0 rows instead of 1"),
-        (5, 1, "snow", "level 0 of city, radius_told 1: 0 rows"),
+        (4, 4, "1", "level 0 of city, gate 0: 0 rows instead of 1"),
+        (5, 1, "snow", "level 0 of city, gate 1: 0 rows"),
     ],
 )
 def test_faults_are_named(tmp_path, row, column, value, fault):

@@ -10,7 +10,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction
 from cns_drake.studies.recording_step import Record
@@ -26,13 +26,13 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def town(tmp_path_factory):
-    """Folder of a map with two sequences of a few frames."""
+    """Folder of a map with two drives of a few frames."""
     routes = {"01": "metropolis_01", "04": "metropolis_04"}
     return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 3)
 
 
 @pytest.fixture(scope="module")
-def sequences(town):
+def drives(town):
     return [load_scenario(town / f"sequence_{k}.yaml") for k in ("01", "04")]
 
 
@@ -58,8 +58,8 @@ def planned(monkeypatch):
     return runs
 
 
-def test_planned_files_are_the_written_ones(sequences, tmp_path):
-    scenarios = [*sequences, *control_drives(sequences)]
+def test_planned_files_are_the_written_ones(drives, tmp_path):
+    scenarios = [*drives, *control_drives(drives)]
     for scenario in scenarios:
         simulate(scenario, tmp_path)
     expected = [recording_info(one, tmp_path, False) for one in scenarios]
@@ -82,7 +82,7 @@ def test_planned_files_are_the_written_ones(sequences, tmp_path):
 
 
 def test_everything_is_planned_before_anything_runs(
-    town, sequences, planned, tmp_path, capsys
+    town, drives, planned, tmp_path, capsys
 ):
     cluster = Cluster(3)
     arguments = ([str(town)], tmp_path, cluster)
@@ -104,11 +104,11 @@ def test_everything_is_planned_before_anything_runs(
     outputs = [job.step.output for job in jobs.values()]
     assert len(set(outputs)) == len(outputs)
     assert all(output.is_absolute() for output in outputs)
-    # Finished recordings are kept; sequences still need their pages.
-    for scenario in (*sequences, *control_drives(sequences)):
+    # Finished recordings are kept; drives still need their pages.
+    for scenario in (*drives, *control_drives(drives)):
         simulate(scenario, tmp_path)
     page = tmp_path / "pages" / "town_01.html"
-    Record(sequences[0], tmp_path, page=page).run(Reporter())
+    Record(drives[0], tmp_path, page=page).run(Reporter())
     reproduction.reproduce_maps(*arguments)
     assert names & planned[1].keys() == {"town_04"}
     assert planned[1]["pages"] == {"town_01": "../pages/town_01.html"}
@@ -163,16 +163,16 @@ def test_quick_gives_the_same_tables(tmp_path):
     assert {row["control"] for row in rows} == {"town_01_stage_04"}
 
 
-def test_quick_reads_existing_recordings(town, sequences, planned, tmp_path):
-    simulate(sequences[0], tmp_path)
+def test_quick_reads_existing_recordings(town, drives, planned, tmp_path):
+    simulate(drives[0], tmp_path)
     reproduction.reproduce_maps([str(town)], tmp_path, Cluster(), quick=True)
     (jobs,) = planned
     recordings = jobs.pop("recordings")
-    (control,) = control_drives(sequences)
+    (control,) = control_drives(drives)
     assert recordings.keys() == {"town_01", "town_04", control.name}
     assert recordings["town_01"].made_by is None
-    assert recordings["town_04"].made_by == SimulatedDrive(sequences[1])
-    assert recordings[control.name].made_by == SimulatedDrive(control)
+    assert recordings["town_04"].made_by == DriveSimulation(drives[1])
+    assert recordings[control.name].made_by == DriveSimulation(control)
     assert not recordings.keys() & jobs.keys()
 
 

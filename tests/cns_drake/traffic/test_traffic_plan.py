@@ -28,9 +28,9 @@ def roads(name):
     return network, graph, make_walkways(network, graph)
 
 
-def ego(sequence):
-    """Returns a drive along a sequence's route at 12 m/s."""
-    scenario = load_scenario(sequence)
+def ego(drive):
+    """Returns a drive along a drive's route at 12 m/s."""
+    scenario = load_scenario(drive)
     network = roads(scenario.map)[0]
     path = make_lane_path(network, scenario.route, 0.5)
     along = path.spacing * np.arange(len(path.points))
@@ -46,8 +46,8 @@ def ego(sequence):
     return at
 
 
-def plan(sequence, number, duration, seed=1):
-    _, graph, walkways = roads(load_scenario(sequence).map)
+def plan(drive, number, duration, seed=1):
+    _, graph, walkways = roads(load_scenario(drive).map)
     return plan_traffic(
         graph,
         walkways,
@@ -55,7 +55,7 @@ def plan(sequence, number, duration, seed=1):
         walkers=number,
         seed=seed,
         duration=duration,
-        ego=ego(sequence),
+        ego=ego(drive),
         ego_box=BOX,
     )
 

@@ -28,9 +28,9 @@ from cns_drake.base.points import xyz
 from evaluation.alignment import align, in_one_world
 from evaluation.change.drive_change import survey_in_one_world
 from evaluation.change.tcr import temporal_change
-from evaluation.maps.voxel_maps import map_sequence
-from evaluation.sequences import Sequence
-from evaluation.sequences.mulran import MulranSequence
+from evaluation.drives import Drive
+from evaluation.drives.mulran import MulranDrive
+from evaluation.maps.voxel_maps import map_drive
 
 pytestmark = pytest.mark.slow
 
@@ -60,9 +60,9 @@ def drives():
     return Drives()
 
 
-def change(first: Sequence, second: Sequence) -> float:
+def change(first: Drive, second: Drive) -> float:
     """Returns the TCR_sym of two drives."""
-    maps = [map_sequence(one, 5.0).centroids_W for one in (first, second)]
+    maps = [map_drive(one, 5.0).centroids_W for one in (first, second)]
     return temporal_change(*maps).symmetric
 
 
@@ -167,12 +167,10 @@ def test_heights_start_at_the_ground(drives):
     recorded = rigid([0.0, 0.0, 61.3], 0.0) @ drives.X_first
     result = align(drives.first(recorded, frame="utm"), drives.second())
     assert result.report.ground == pytest.approx(61.3, abs=0.05)
-    for sequence in (result.first, result.second):
+    for drive in (result.first, result.second):
         # Other drives in the frame of the first one keep their heights.
-        assert sequence.world_frame not in ("utm", "map")
-        np.testing.assert_allclose(
-            sequence.X_WS[:, 2, 3], LIDAR_HEIGHT, atol=0.05
-        )
+        assert drive.world_frame not in ("utm", "map")
+        np.testing.assert_allclose(drive.X_WS[:, 2, 3], LIDAR_HEIGHT, atol=0.05)
 
 
 def test_another_town(drives):
@@ -297,7 +295,7 @@ def test_mulran_and_helipr(capsys, tmp_path, drives, truth):
         stamps_ns,
         rigid(UTM, 0.0)[None].repeat(50, 0),
     )
-    X_WS = MulranSequence(mulran).X_WS[0]
+    X_WS = MulranDrive(mulran).X_WS[0]
     X_BS = rigid([0, 0, 0], 0)
     X_BS[:3, :3] = X_WS[:3, :3]
     X_BS[:3, 3] = X_WS[:3, 3] - (UTM - [350_000, 4_020_000, 0])

@@ -38,7 +38,7 @@ def test_a_submap_is_consistent():
     ground = points[np.abs(points[:, 2]) < 0.3]
     assert len(ground) > 1000
     assert np.abs(ground[:, 2]).mean() < 0.02
-    one = drive.sequence.scan(int(drive.frames[index]))
+    one = drive.drive.scan(int(drive.frames[index]))
     assert len(surface.points) > len(one)
     assert np.hypot(*surface.points[:, :2].T).max() < 60.5
 

@@ -50,7 +50,7 @@ def test_a_recording_maps_like_its_points(tmp_path, drives):
     np.save(tmp_path / "late.npy", TOWN["late"])
     from_file = survey(tmp_path / "late.npy")
     assert from_file.name == "late.npy"
-    assert from_file.sequence is None
+    assert from_file.drive is None
     recorded = drives["late", "south"].voxels
     # The drive sees only near parts completely; these must agree.
     near = np.abs(from_file.voxels.centroids_W[:, 0] - 50.0) < 30.0
@@ -132,7 +132,7 @@ def test_control_on_a_third_route(tmp_path, drives):
         shifted.name,
         shifted.voxels,
         shifted.positions + np.array([0.0, 3.0, 0.0]),
-        shifted.sequence,
+        shifted.drive,
     )
     a, b = drives["early", "south"], drives["late", "north"]
     compare(a, b, shifted)

@@ -60,7 +60,7 @@ def test_bad_input(capsys, towns, tmp_path):
         capsys,
         ["pr", town, towns / "town_01.npy", "--method", "scan-context++"],
         "town_01.npy",
-        "not a recorded sequence",
+        "not a recorded drive",
     )
 
 

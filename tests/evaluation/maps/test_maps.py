@@ -3,12 +3,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base.points import from_xyz
+from evaluation.drives import open_drive
 from evaluation.maps.voxel_maps import (
     VoxelAccumulator,
-    map_sequence,
+    map_drive,
     voxelise,
 )
-from evaluation.sequences import open_sequence
 
 
 def reference_map(points, voxel_size):
@@ -206,10 +206,10 @@ def test_map_of_a_recording(tmp_path):
         shown.append((description, total))
         return items
 
-    voxels = map_sequence(open_sequence(path), track=track)
+    voxels = map_drive(open_drive(path), track=track)
     assert shown == [("mapping s", 6)]
     assert_is(voxels, reference_map(np.concatenate(world), 5.0))
-    again = map_sequence(open_sequence(path))
+    again = map_drive(open_drive(path))
     assert again.centroids_W.tobytes() == voxels.centroids_W.tobytes()
 
 

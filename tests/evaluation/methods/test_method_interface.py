@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.scan_folders import write_scores
-from evaluation.sequences import open_sequence
 
 
 def record(folder, heights, y=0.0):
@@ -19,7 +19,7 @@ def record(folder, heights, y=0.0):
         for height in heights
     ]
     X_WBs = [yaw_pose(10.0 * i, y, 0.0, 0.0) for i in range(len(heights))]
-    return open_sequence(write_recording(folder, scans, X_WBs))
+    return open_drive(write_recording(folder, scans, X_WBs))
 
 
 class Highest(Method):
@@ -124,13 +124,13 @@ def test_places_described_in_another_way_stay_apart(drives):
 
 
 def test_earlier_queries_are_passed(drives):
-    class Sequences(Highest):
-        def score_in_sequence(self, queries, database, *, exhaustive=False):
+    class Drives(Highest):
+        def score_in_drive(self, queries, database, *, exhaustive=False):
             seen.append(len(queries))
             return self.score(queries[0], database)
 
     seen = []
-    scores = retrieve(*drives, Sequences()).scores
+    scores = retrieve(*drives, Drives()).scores
     assert seen == [1, 2, 3, 4, 5, 6]
     # All queries score as the first does.
     np.testing.assert_array_equal(scores, np.tile(scores[0], (6, 1)))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.gate import (
     NUM_GATED,
@@ -18,7 +19,6 @@ from evaluation.recognition.gate import (
 )
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.sequences import open_sequence
 
 RADIUS = 8.0
 FULL, NONE = (1.0 - SOFTNESS) * RADIUS, (1.0 + SOFTNESS) * RADIUS
@@ -155,7 +155,7 @@ class Line(Method):
 def record(folder, xs):
     scans = [make_scan(np.array([[5.0, 0.0, float(x)]])) for x in xs]
     X_WBs = [yaw_pose(x, 0.0, 0.0, 0.0) for x in xs]
-    return open_sequence(write_recording(folder, scans, X_WBs))
+    return open_drive(write_recording(folder, scans, X_WBs))
 
 
 def test_a_pair_of_drives(tmp_path):
@@ -217,7 +217,7 @@ def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
 
 @pytest.mark.parametrize("name", ["ring++", "scan-context++", "solid"])
 def test_shipped_methods_take_part(name, towns):
-    drive = open_sequence(towns / "town_01")
+    drive = open_drive(towns / "town_01")
     method = make_method(name, {})
     shut = run(drive, drive, method, protocol=RetrievalProtocol(gate=True))
     assert shut.metrics.recall_at_1 == 1.0

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
-from evaluation.sequences import open_sequence
 
 # Beams are a degree apart and miss the borders of cells.
 AZIMUTH, ELEVATION = np.radians(
@@ -135,7 +135,7 @@ def rooms(tmp_path_factory):
 
 def test_one_room_is_seen_as_a_whole_from_anywhere(rooms):
     protocol = RetrievalProtocol(query_spacing=5.0)
-    found = overlap_matrix(*map(open_sequence, rooms), protocol)
+    found = overlap_matrix(*map(open_drive, rooms), protocol)
     assert found.shape == (3, 3)
     # Only parts above or below the other's field of view are missing.
     assert found[:2, :2].min() > 0.85
@@ -146,7 +146,7 @@ def test_one_room_is_seen_as_a_whole_from_anywhere(rooms):
 
 
 def test_a_match_is_what_shows_the_same(rooms, capsys, tmp_path):
-    database, query = map(open_sequence, rooms)
+    database, query = map(open_drive, rooms)
     method = make_method("solid", {})
     protocol = RetrievalProtocol(overlap=0.5, query_spacing=5.0)
     result = run(database, query, method, protocol=protocol)

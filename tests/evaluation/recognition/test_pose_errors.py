@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.metrics import evaluate
 from evaluation.recognition.place_recognition import run
@@ -15,7 +16,6 @@ from evaluation.recognition.pose_errors import (
     pose_metrics,
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.sequences import open_sequence
 
 
 def random_pose(rng):
@@ -116,7 +116,7 @@ def record(folder, places):
         for place in places
     ]
     X_WBs = [yaw_pose(x, y, 0.0, 0.1 * turn) for x, y, turn in places]
-    return open_sequence(write_recording(folder, scans, X_WBs))
+    return open_drive(write_recording(folder, scans, X_WBs))
 
 
 def test_a_method_with_exact_poses(tmp_path):

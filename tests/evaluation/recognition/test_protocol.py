@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import (
@@ -13,7 +14,6 @@ from evaluation.recognition.protocol import (
     protocol_values,
 )
 from evaluation.recognition.retrieval import retrieve
-from evaluation.sequences import open_sequence
 
 
 class Means(Method):
@@ -42,7 +42,7 @@ def record(folder, xs):
         for x in xs
     ]
     X_WBs = [yaw_pose(x, 0.0, 0.0, 0.0) for x in xs]
-    return open_sequence(write_recording(folder, scans, X_WBs))
+    return open_drive(write_recording(folder, scans, X_WBs))
 
 
 @pytest.fixture

@@ -3,17 +3,17 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
+from evaluation.drives.sampling import (
+    gather,
+    sample_frames,
+    within_range,
+)
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import retrieve
-from evaluation.sequences import open_sequence
-from evaluation.sequences.sampling import (
-    gather,
-    sample_frames,
-    within_range,
-)
 
 
 def line(xs):
@@ -91,7 +91,7 @@ def record_line(folder, xs, **options):
     """Drives along x; the scan at x shows one point at height x."""
     scans = [make_scan(np.array([[5.0, 0.0, float(x)]])) for x in xs]
     X_WBs = [yaw_pose(x, 0.0, 0.0, 0.0) for x in xs]
-    return open_sequence(write_recording(folder, scans, X_WBs, **options))
+    return open_drive(write_recording(folder, scans, X_WBs, **options))
 
 
 def test_retrieval_from_two_drives(tmp_path):
@@ -131,7 +131,7 @@ def test_merged_scans_are_in_the_frame_of_the_place(tmp_path):
         make_scan(((post - X[:3, 3]) @ X[:3, :3])[None] - [[0.0, 0.0, 1.6]])
         for X in X_WBs
     ]
-    sequence = open_sequence(write_recording(tmp_path / "s", scans, X_WBs))
+    drive = open_drive(write_recording(tmp_path / "s", scans, X_WBs))
     # The frame, its scans, those of them before it, and those there are.
     for frame, number, before, there in (
         (0, 1, 0, 1),
@@ -142,7 +142,7 @@ def test_merged_scans_are_in_the_frame_of_the_place(tmp_path):
         (1, 4, 2, 3),
         (4, 6, 3, 4),
     ):
-        cloud = gather(sequence, frame, number, 100.0, (), before)
+        cloud = gather(drive, frame, number, 100.0, (), before)
         assert len(cloud) == there
         expected = (post - X_WBs[frame][:3, 3]) @ X_WBs[frame][:3, :3]
         expected -= [0.0, 0.0, 1.6]
@@ -154,7 +154,7 @@ def test_merged_scans_are_in_the_frame_of_the_place(tmp_path):
 def test_a_centred_place_has_as_many_scans_before_as_after(tmp_path):
     X_WBs = [yaw_pose(5.0 * i, 0.0, 0.0, 0.0) for i in range(9)]
     scans = [make_scan(np.array([[10.0, 0.0, 0.0]]))] * 9
-    sequence = open_sequence(write_recording(tmp_path / "s", scans, X_WBs))
+    drive = open_drive(write_recording(tmp_path / "s", scans, X_WBs))
     seen = []
 
     class Centred(OddOneOut):
@@ -166,8 +166,8 @@ def test_a_centred_place_has_as_many_scans_before_as_after(tmp_path):
             return super().describe(points)
 
     protocol = RetrievalProtocol(query_spacing=20.0)
-    (drive,) = describe_drive(sequence, [Centred()], {"queries"}, protocol)
-    assert drive.queries.frames.tolist() == [0, 4, 8]
+    (described,) = describe_drive(drive, [Centred()], {"queries"}, protocol)
+    assert described.queries.frames.tolist() == [0, 4, 8]
     assert seen == [2, 4, 3]
 
 
@@ -214,7 +214,7 @@ def test_a_drive_that_saw_nothing(tmp_path):
     poses = [yaw_pose(20.0 * i, 0.0, 0.0, 0.0) for i in range(3)]
     far = np.array([[300.0, 0.0, 0.0]])
     write_recording(tmp_path / "blind", [make_scan(far)] * 3, poses)
-    blind = open_sequence(tmp_path / "blind")
+    blind = open_drive(tmp_path / "blind")
     with pytest.raises(InputError, match=r"blind: no finite point .* 3 scans"):
         retrieve(blind, blind, make_method("solid", {}))
 

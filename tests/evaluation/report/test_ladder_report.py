@@ -122,7 +122,7 @@ def test_every_number_follows_from_the_queries(climbed):
     queries = list(
         csv.DictReader(io.StringIO(ladder_query_table(climbed).to_csv()))
     )
-    keys = ("map", "db", "query", "cause", "level", "method", "radius_told")
+    keys = ("map", "db", "query", "cause", "level", "method", "gate")
     assert list(rows[0])[:12] == [
         *keys,
         "auc",

@@ -6,6 +6,7 @@ from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
+from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.fault_kinds import (
     FAULT_KINDS,
@@ -18,7 +19,6 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.report.fault_tables import fault_numbers, fault_table
-from evaluation.sequences import open_sequence
 from evaluation.study.fault_evidence import find_evidence
 
 HEIGHT = 1.6
@@ -73,7 +73,7 @@ def write(folder, scans, table, places):
             {"instance": k, "name": TABLE[k][0], "class": TABLE[k][1]}
             for k in table
         ]
-    return open_sequence(
+    return open_drive(
         write_recording(folder, made, X_WBs, attachments=attachments)
     )
 

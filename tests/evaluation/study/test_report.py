@@ -105,7 +105,7 @@ def test_what_cannot_be_placed_is_left_out(tmp_path):
 def test_no_recordings_or_too_many(tmp_path):
     with pytest.raises(InputError, match="no such folder"):
         find_cities(tmp_path / "none")
-    with pytest.raises(InputError, match="no recorded sequence"):
+    with pytest.raises(InputError, match="no recorded drive"):
         find_cities(tmp_path)
     drive(tmp_path / "first", "01", "a")
     drive(tmp_path / "second", "01", "a")

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from cns_drake.base.jobs.step import Reporter
+from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.sequences import open_sequence
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.described_drives import DescribeDrive
 from evaluation.study.drive_source import RecordedDrive
@@ -30,7 +30,7 @@ class Once:
     path: object
 
     def __call__(self):
-        recorded = open_sequence(self.path)
+        recorded = open_drive(self.path)
         read, scan = [], recorded.scan
 
         def once(index):
@@ -91,8 +91,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
         (choice.name, gated) for choice in METHODS for gated in (False, True)
     ]
     database, query = (
-        open_sequence(folder / name)
-        for name in ("metropolis_01", "metropolis_04")
+        open_drive(folder / name) for name in ("metropolis_01", "metropolis_04")
     )
     for one in found:
         alone = run(
@@ -118,8 +117,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
 
 def test_the_best_match_agrees_with_the_matrix_of_overlaps(folder, tmp_path):
     database, query = (
-        open_sequence(folder / name)
-        for name in ("metropolis_01", "metropolis_04")
+        open_drive(folder / name) for name in ("metropolis_01", "metropolis_04")
     )
     matrix = overlap_matrix(database, query, PROTOCOL)
     apart = np.linalg.norm(

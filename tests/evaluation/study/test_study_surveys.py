@@ -9,9 +9,9 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change import drive_change
+from evaluation.drives import Drive, open_drive
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.sequences import Sequence, open_sequence
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.drive_source import RecordedDrive
 from evaluation.study.measurements import RecognisePlaces
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 BOTH = frozenset({"places", "queries"})
 
 
-class OnTheFly(Sequence):
+class OnTheFly(Drive):
     """A drive whose scans can be read once, in order."""
 
     def __init__(self, recorded):
@@ -59,7 +59,7 @@ class OnTheFly(Sequence):
 class Source:
     """Opens a drive on the fly, and counts how often."""
 
-    recorded: Sequence
+    recorded: Drive
     seed: int = 0
     opened: list = field(default_factory=list)
 
@@ -105,7 +105,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def recorded(folder):
-    return open_sequence(folder)
+    return open_drive(folder)
 
 
 @pytest.fixture

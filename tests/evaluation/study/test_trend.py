@@ -10,10 +10,10 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from evaluation.change.drive_change import compare, survey
+from evaluation.drives import open_drive
 from evaluation.methods import known_methods, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.sequences import open_sequence
 from evaluation.study import trend_databases, trend_points
 from evaluation.study.trend import smooth, smooth_band, write_trend
 from evaluation.study.trend_databases import measure_trend
@@ -60,8 +60,8 @@ def test_the_numbers_are_those_of_the_single_commands(folder, points):
         for point in points:
             if point.database == name and point.method != "btc":
                 outcome = run(
-                    open_sequence(folder / name),
-                    open_sequence(query),
+                    open_drive(folder / name),
+                    open_drive(query),
                     make_method(point.method, {}),
                 )
                 assert point.tcr_sym == change.symmetric
@@ -114,8 +114,8 @@ def test_the_kept_share_comes_from_the_control(folder, tmp_path, monkeypatch):
         if point.method == "btc":
             continue
         unchanged = run(
-            open_sequence(control),
-            open_sequence(folder / "metropolis_04"),
+            open_drive(control),
+            open_drive(folder / "metropolis_04"),
             make_method(point.method, {}),
             protocol=RetrievalProtocol(radius=6.0),
         )

@@ -1,0 +1,214 @@
+"""The interface of every recorded drive, in any format."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+
+
+class Drive(abc.ABC):
+    """The scans of one LiDAR on one drive, and where they were taken.
+
+    Frames: world W (shared by all drives of a place), LiDAR S.
+
+    A scan is read on each access and not kept, so a drive may be larger than
+    memory.
+
+    Attributes:
+        name: short name for tables and messages, e.g. `metropolis_04`.
+        world_frame: name of W as the recording states it.
+
+    Example:
+        from evaluation import open_drive
+
+        drive = open_drive("recordings/downtown_01")
+        print(len(drive), drive.X_WS[0], drive.scan(0).dtype)
+    """
+
+    name: str
+    world_frame: str
+
+    @abc.abstractmethod
+    def __len__(self) -> int:
+        """The number of scans N."""
+
+    @property
+    @abc.abstractmethod
+    def stamps_ns(self) -> np.ndarray:
+        """(N,) int64 time of each scan [ns], strictly increasing."""
+
+    @property
+    @abc.abstractmethod
+    def X_WS(self) -> np.ndarray:
+        """(N, 4, 4) float64 pose of the LiDAR at each scan's stamp."""
+
+    @abc.abstractmethod
+    def scan(self, index: int) -> np.ndarray:
+        """Returns one scan.
+
+        Args:
+            index: 0 <= index < N.
+
+        Returns:
+            Structured array, one record per return, with at least `x`, `y`
+            and `z` [m], expressed in S.
+
+        Raises:
+            InputError: if the scan cannot be read.
+        """
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        """Yields the scans in order, reading one at a time."""
+        for index in range(len(self)):
+            yield self.scan(index)
+
+    @property
+    def odometry(self) -> np.ndarray | None:
+        """Motion of the vehicle, (M,) of `ODOMETRY_DTYPE`, if recorded."""
+        return None
+
+    @property
+    def imu(self) -> np.ndarray | None:
+        """Measurements of the IMU, (M,) of `IMU_DTYPE`, if recorded."""
+        return None
+
+    @property
+    def datum(self) -> str | None:
+        """Name of the survey grid (datum) of W, if any.
+
+        Two drives with one datum but different world frames differ by the
+        error of their positioning, at most some ten metres.
+        """
+        return None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A note for the user on how the recording was read."""
+        return ()
+
+    @property
+    def scenario(self) -> Mapping | None:
+        """The scenario of a simulated drive, if recorded.
+
+        Keys used here: `map`, `stage`, and those of `driven_way`.
+        """
+        return None
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        """Instance id -> structure `name`, `class` and `label`, if recorded.
+
+        The id and the label are those of the scans' points.
+        """
+        return None
+
+
+def index_instances(table: Any, source: str) -> dict[int, Mapping]:
+    """Returns a recording's table of structures by instance id.
+
+    Args:
+        table: as JSON: a list of objects with at least an `instance`.
+        source: where it comes from, for messages.
+
+    Raises:
+        InputError: if it is no such table.
+    """
+    try:
+        return {entry["instance"]: entry for entry in table}
+    except (TypeError, KeyError) as error:
+        raise InputError(
+            f"{source}: no list of entries with an instance"
+        ) from error
+
+
+class Placed(Protocol):
+    """Anything with poses in a named world frame; see `Drive`."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def world_frame(self) -> str: ...
+
+    @property
+    def scenario(self) -> Mapping | None: ...
+
+
+@dataclass(frozen=True)
+class PlacedDrive:
+    """The world frame and the map of a drive that is closed again.
+
+    Attributes:
+        name: of the drive.
+        world_frame: name of the frame of its poses.
+        scenario: its `map`, if it names one.
+    """
+
+    name: str
+    world_frame: str
+    scenario: Mapping | None
+
+    @classmethod
+    def of(cls, drive: Drive) -> PlacedDrive:
+        """Returns the world frame and the map of a drive."""
+        scenario = drive.scenario
+        if scenario is not None:
+            scenario = {k: v for k, v in scenario.items() if k == "map"}
+        return cls(drive.name, drive.world_frame, scenario)
+
+
+def check_same_world(
+    first: Placed, second: Placed, *, across_maps: bool = False
+) -> None:
+    """Refuses two drives whose poses cannot be compared.
+
+    Args:
+        first: a drive.
+        second: another one.
+        across_maps: their maps may differ, if they share a frame.
+
+    Raises:
+        InputError: if their world frames or their maps differ by name.
+    """
+    frames = first.world_frame, second.world_frame
+    if frames[0] != frames[1]:
+        advice = ""
+        if any(frame.startswith("kitti/") for frame in frames):
+            advice = (
+                " (a first_pose.txt in a drive's folder says where in the map"
+                " its first scan was taken)"
+            )
+        raise InputError(
+            f"{second.name}: poses in frame {frames[1]!r}, those of"
+            f" {first.name} in {frames[0]!r}{advice}"
+        )
+    if not across_maps:
+        check_same_map(first, second)
+
+
+def check_same_map(first: Placed, second: Placed) -> None:
+    """Refuses two drives whose maps have different names.
+
+    Raises:
+        InputError: if their maps differ by name.
+    """
+    maps = [_map_name(drive) for drive in (first, second)]
+    if None not in maps and maps[0] != maps[1]:
+        raise InputError(
+            f"{second.name}: a drive through {maps[1]}, but {first.name} is "
+            f"one through {maps[0]}"
+        )
+
+
+def _map_name(drive: Placed) -> str | None:
+    """Returns the last part of the map's name, which may be a path."""
+    if drive.scenario is None or "map" not in drive.scenario:
+        return None
+    return Path(str(drive.scenario["map"])).name

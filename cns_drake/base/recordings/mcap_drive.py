@@ -1,0 +1,431 @@
+"""Drives recorded as MCAP by cns-drake (or by others on the same topics)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base import points as point_arrays
+from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import parse_json
+from cns_drake.base.recordings import mcap_messages, ros_types
+from cns_drake.base.recordings.drive import Drive, index_instances
+from cns_drake.base.recordings.mcap_file import McapFile
+from cns_drake.base.recordings.motion import IMU_DTYPE, ODOMETRY_DTYPE
+from cns_drake.base.recordings.point_cloud2 import to_points, to_records
+from cns_drake.base.recordings.point_layouts import from_layout
+from cns_drake.base.recordings.static_transforms import (
+    StaticTransforms,
+    checked_poses,
+)
+
+_LIDAR_TOPIC = "/lidar/points"
+_ODOMETRY_TOPIC = "/odometry"
+_IMU_TOPIC = "/imu/data"
+_TF_STATIC_TOPIC = "/tf_static"
+_KALIBR = "imu.yaml"
+# Messages that lie in a file this much later than others of their time are not
+# late but of a clock that was set back [s].
+_LATEST = 1.0
+
+
+class McapDrive(Drive):
+    """A recording on the topics /lidar/points, /odometry and /tf_static.
+
+    Without `/lidar/points` the only topic of point clouds takes its place;
+    of several LiDARs, `lidar` chooses one. The topic /imu/data is optional, and
+    so is /<lidar>/labels with `label` and `instance` of the same points.
+    Scan i is the i-th message of that topic by log time. Its pose is
+    that of the `/odometry` message with exactly the same stamp, composed
+    with the sensor's place on the vehicle from `/tf_static`; nothing is
+    interpolated.
+
+    Contradictions are refused: two poses for one stamp, two mounts of a sensor,
+    a frame that changes during the drive.
+
+    Opening reads the file's index. The first use of stamps or poses takes one
+    pass over the file; a scan takes one chunk.
+    """
+
+    def __init__(self, path: Path, lidar: str | None = None):
+        """Opens a recording.
+
+        Args:
+            path: the .mcap file, or the folder that holds it.
+            lidar: name of the LiDAR; its scans are on the topic
+                /<lidar>/points.
+
+        Raises:
+            InputError: if there is no complete recording at `path`, or no
+                such LiDAR in it.
+        """
+        self._file = McapFile(_mcap_path(Path(path)))
+        self._path = self._file.path
+        self.name = _drive_name(Path(path))
+        self._lidar_topic = self._find_lidar_topic(lidar)
+        self._message_types = {
+            self._lidar_topic: ros_types.POINT_CLOUD,
+            _ODOMETRY_TOPIC: ros_types.ODOMETRY,
+            _TF_STATIC_TOPIC: ros_types.TF,
+        }
+        labels = self._lidar_topic.removesuffix("points") + "labels"
+        self._labels_topic = labels if labels in self._file.topics else None
+        if self._labels_topic is not None:
+            self._message_types[labels] = ros_types.POINT_CLOUD
+        if _IMU_TOPIC in self._file.topics:
+            self._message_types[_IMU_TOPIC] = ros_types.IMU
+        for topic, message_type in self._message_types.items():
+            self._check_topic(topic, message_type)
+        self._scans = self._file.locate(self._lidar_topic)
+
+    def __len__(self) -> int:
+        return len(self._scans)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._track[0]
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._track[1]
+
+    @property
+    def lidar_names(self) -> tuple[str, ...]:
+        """Names of the LiDARs; first the one that is read by default."""
+        clouds = self._cloud_topics()
+        clouds.sort(key=lambda topic: topic != _LIDAR_TOPIC)
+        return tuple(map(_lidar_name, clouds))
+
+    @property
+    def lidar_name(self) -> str:
+        """Name of the LiDAR whose scans are read."""
+        return _lidar_name(self._lidar_topic)
+
+    @property
+    def world_frame(self) -> str:  # type: ignore[override]  # Read late.
+        return self._first(_ODOMETRY_TOPIC).header.frame_id
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        notes = []
+        for topic in (self._lidar_topic, _ODOMETRY_TOPIC):
+            back = self._file.step_back_ns(topic) * 1e-9
+            if back > _LATEST:
+                notes.append(
+                    f"{self._path}: {topic}: the clock goes back by {back:.3g}"
+                    " s; messages are read in the order of their log times"
+                )
+        lidars = (self.scenario or {}).get("lidars")
+        lidar = (
+            lidars.get(self.lidar_name) if isinstance(lidars, dict) else None
+        )
+        if isinstance(lidar, dict) and lidar.get("motion_distortion"):
+            notes.append(
+                f"{self._path}: taken while the LiDAR moved, and used as taken"
+                " (evaluation.drives.deskewing takes the motion out)"
+            )
+        return tuple(notes)
+
+    @property
+    def scenario(self) -> Mapping | None:
+        scenario = self._json("scenario.json")
+        if scenario is not None and not isinstance(scenario, dict):
+            raise InputError(
+                f"{self._path}: attachment scenario.json: not a JSON object"
+            )
+        return scenario
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        table = self._json("structures.json")
+        if table is None:
+            return None
+        return index_instances(
+            table, f"{self._path}: attachment structures.json"
+        )
+
+    def scan(self, index: int) -> np.ndarray:
+        if not 0 <= index < len(self):
+            raise IndexError(f"scan {index} of {len(self)}")
+        message = self._message(self._lidar_topic, self._scans[index])
+        try:
+            points = to_points(message)
+            point_arrays.check_near(points, point_arrays.FARTHEST_RETURN)
+            return from_layout(points, self._labels(index, message))
+        except ValueError as error:
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: scan {index} at"
+                f" {mcap_messages.stamp_ns(message.header)} ns: {error}"
+            ) from error
+
+    def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
+        """Returns the labels of a scan that has a topic for them.
+
+        Raises:
+            ValueError: if the labels are not those of that scan.
+        """
+        topic = self._labels_topic
+        if topic is None:
+            return None
+        places = self._file.locate(topic)
+        if len(places) != len(self):
+            raise ValueError(f"{topic}: {len(places)} for {len(self)} scans")
+        message = self._message(topic, places[index])
+        if message.header.stamp != cloud.header.stamp:
+            raise ValueError(
+                f"{topic}: number {index} has another stamp than the scan"
+            )
+        return to_records(message)
+
+    @property
+    def kalibr(self) -> str | None:
+        """Kalibr's file of the IMU's noise, if the IMU has noise.
+
+        Raises:
+            InputError: if it is no text.
+        """
+        data = self._file.attachment(_KALIBR)
+        try:
+            return None if data is None else data.decode()
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"{self._path}: attachment {_KALIBR}: no text"
+            ) from error
+
+    @property
+    def odometry(self) -> np.ndarray:
+        return self._stamps_and_odometry[1]
+
+    @cached_property
+    def imu(self) -> np.ndarray | None:
+        if _IMU_TOPIC not in self._message_types:
+            return None
+        rows = np.zeros(len(self._file.locate(_IMU_TOPIC)), IMU_DTYPE)
+        first = self._first(_IMU_TOPIC).header
+
+        def take(position: int, data: memoryview) -> None:
+            message = self._decode(_IMU_TOPIC, data)
+            self._check_frame(
+                _IMU_TOPIC,
+                mcap_messages.stamp_ns(message.header),
+                message.header.frame_id,
+                first.frame_id,
+            )
+            rows[position] = mcap_messages.imu_row(message)
+
+        self._file.visit(self._file.locate(_IMU_TOPIC), take)
+        self._check_agreement(_IMU_TOPIC, rows)
+        return rows
+
+    @cached_property
+    def _track(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (N,) [ns] and poses (N, 4, 4) of the scans."""
+        stamps_ns, odometry = self._stamps_and_odometry
+        rows = {stamp: i for i, stamp in enumerate(odometry["stamp_ns"])}
+        missing = [
+            index for index, stamp in enumerate(stamps_ns) if stamp not in rows
+        ]
+        if missing:
+            raise InputError(
+                f"{self._path}: {_ODOMETRY_TOPIC}: no pose with the stamp"
+                f" {stamps_ns[missing[0]]} of scan {missing[0]}"
+                f" ({len(missing)} of {len(self)} scans have none)"
+            )
+        matching = odometry[[rows[stamp] for stamp in stamps_ns]]
+        X_WB = checked_poses(
+            matching["position"], matching["quat_xyzw"], str(self._path)
+        )
+        return stamps_ns, X_WB @ self.X_BS
+
+    @cached_property
+    def _stamps_and_odometry(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (N,) of the scans, and the odometry, in one pass."""
+        num_scans = len(self)
+        places = self._file.locate(_ODOMETRY_TOPIC)
+        stamps_ns = np.zeros(num_scans, np.int64)
+        odometry = np.zeros(len(places), ODOMETRY_DTYPE)
+        lidar_frame = self._first(self._lidar_topic).header.frame_id
+        vehicle_frames = _vehicle_frames(self._first(_ODOMETRY_TOPIC))
+
+        def take(position: int, data: memoryview) -> None:
+            if position < num_scans:
+                header = self._cloud_header(data)
+                stamps_ns[position] = header.stamp_ns
+                topic, frame, first = (
+                    self._lidar_topic,
+                    header.frame_id,
+                    lidar_frame,
+                )
+                stamp_ns = header.stamp_ns
+            else:
+                message = self._decode(_ODOMETRY_TOPIC, data)
+                row = mcap_messages.odometry_row(message)
+                odometry[position - num_scans] = row
+                topic, frame, first = (
+                    _ODOMETRY_TOPIC,
+                    _vehicle_frames(message),
+                    vehicle_frames,
+                )
+                stamp_ns = row[0]
+            self._check_frame(topic, stamp_ns, frame, first)
+
+        self._file.visit(np.concatenate([self._scans, places]), take)
+        disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
+        if len(disorder):
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: the stamp of scan"
+                f" {disorder[0] + 1} is not later than the one before"
+            )
+        self._check_agreement(_ODOMETRY_TOPIC, odometry)
+        return stamps_ns, odometry
+
+    @cached_property
+    def X_BS(self) -> np.ndarray:
+        """Pose of the LiDAR on the vehicle B, (4, 4), from /tf_static."""
+        return self._mount(self._first(self._lidar_topic))
+
+    @cached_property
+    def X_BI(self) -> np.ndarray | None:
+        """Pose of the IMU on the vehicle B, (4, 4); None without an IMU."""
+        if _IMU_TOPIC not in self._message_types:
+            return None
+        return self._mount(self._first(_IMU_TOPIC))
+
+    def _mount(self, message: Any) -> np.ndarray:
+        """Returns the pose of a sensor's frame, that of its message, in B."""
+        base = self._first(_ODOMETRY_TOPIC).child_frame_id
+        return self._transforms.pose(base, message.header.frame_id)
+
+    @cached_property
+    def _transforms(self) -> StaticTransforms:
+        messages = (
+            self._message(_TF_STATIC_TOPIC, place)
+            for place in self._file.locate(_TF_STATIC_TOPIC)
+        )
+        return StaticTransforms(messages, f"{self._path}: {_TF_STATIC_TOPIC}")
+
+    def _first(self, topic: str) -> Any:
+        return self._message(topic, self._file.locate(topic)[0])
+
+    def _message(self, topic: str, place: np.void) -> Any:
+        return self._decode(topic, self._file.read(place))
+
+    def _decode(self, topic: str, data: memoryview) -> Any:
+        try:
+            return mcap_messages.decode(data, self._message_types[topic])
+        except ValueError as error:
+            raise InputError(f"{self._path}: {topic}: {error}") from error
+
+    def _cloud_header(self, data: memoryview) -> mcap_messages.CloudHeader:
+        try:
+            return mcap_messages.read_cloud_header(data)
+        except ValueError as error:
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: {error}"
+            ) from error
+
+    def _check_frame(
+        self, topic: str, stamp_ns: int, frame: str, first: str
+    ) -> None:
+        """Refuses a message whose frame differs from the first one's."""
+        if frame != first:
+            raise InputError(
+                f"{self._path}: {topic}: at {stamp_ns} ns in frame {frame!r},"
+                f" at first in {first!r}"
+            )
+
+    def _check_agreement(self, topic: str, rows: np.ndarray) -> None:
+        """Refuses two different messages with one stamp."""
+        order = np.argsort(rows["stamp_ns"], kind="stable")
+        twice = np.flatnonzero(np.diff(rows["stamp_ns"][order]) == 0)
+        for one, other in zip(order[twice], order[twice + 1], strict=True):
+            for name in rows.dtype.names or ():
+                old, new = rows[name][one], rows[name][other]
+                if not np.array_equal(old, new, equal_nan=True):
+                    raise InputError(
+                        f"{self._path}: {topic}: {name} at"
+                        f" {rows['stamp_ns'][one]} ns: {old} and {new}"
+                    )
+
+    def _find_lidar_topic(self, lidar: str | None) -> str:
+        """Returns the named LiDAR's topic, /lidar/points, or the only one."""
+        clouds = self._cloud_topics()
+        if lidar is not None:
+            wanted = f"/{lidar}/points"
+        elif _LIDAR_TOPIC in self._file.topics or len(clouds) != 1:
+            wanted = _LIDAR_TOPIC
+        else:
+            wanted = clouds[0]
+        if wanted not in self._file.topics and clouds:
+            raise InputError(
+                f"{self._path}: no topic {wanted} (point clouds:"
+                f" {' '.join(clouds)})"
+            )
+        return wanted
+
+    def _cloud_topics(self) -> list[str]:
+        return [
+            topic
+            for topic, kinds in self._file.topics.items()
+            if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
+            and not topic.endswith("/labels")
+        ]
+
+    def _check_topic(self, topic: str, message_type: str) -> None:
+        found = self._file.topics.get(topic)
+        if found is None:
+            raise InputError(f"{self._path}: no topic {topic}")
+        if found != [f"{message_type} in cdr"]:
+            raise InputError(
+                f"{self._path}: {topic}: {' and '.join(found)} instead of"
+                f" {message_type} in cdr"
+            )
+        if len(self._file.locate(topic)) == 0:
+            raise InputError(f"{self._path}: {topic}: no message")
+
+    def _json(self, name: str) -> Any:
+        data = self._file.attachment(name)
+        if data is None:
+            return None
+        try:
+            return parse_json(data)
+        except ValueError as error:
+            raise InputError(
+                f"{self._path}: attachment {name}: {error}"
+            ) from error
+
+
+def holds_mcap(path: Path) -> bool:
+    """Returns whether `path` is an .mcap file or a folder with one."""
+    if path.is_dir():
+        return any(path.glob("*.mcap"))
+    return path.suffix == ".mcap"
+
+
+def _mcap_path(path: Path) -> Path:
+    if not path.is_dir():
+        return path
+    files = sorted(path.glob("*.mcap"))
+    if len(files) != 1:
+        raise InputError(f"{path}: {len(files)} .mcap files instead of one")
+    return files[0]
+
+
+def _drive_name(path: Path) -> str:
+    resolved = path.resolve()
+    # rosbag2 numbers the files of a recording: <name>_0.mcap.
+    return (
+        resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
+    )
+
+
+def _lidar_name(topic: str) -> str:
+    return topic.strip("/").split("/")[0]
+
+
+def _vehicle_frames(message: Any) -> str:
+    return f"{message.header.frame_id} -> {message.child_frame_id}"

@@ -1,0 +1,139 @@
+"""One drive, run from a diagram script or the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from cns_drake.base import terminal
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.progress_bars import print_note, show_progress
+from cns_drake.command_line.frame_progress import frame_progress
+from cns_drake.command_line.options import (
+    Frames,
+    Graphviz,
+    LidarPreset,
+    Output,
+    Overwrite,
+    Recording,
+)
+
+if TYPE_CHECKING:
+    from cns_drake.scenarios.weather_config import WeatherConfig
+    from cns_drake.simulation.run_progress import Run
+
+
+def run_drive(
+    name_or_file: str,
+    output: Path,
+    *,
+    frames: int | None = None,
+    lidar: str | None = None,
+    returns: Literal["ideal", "calibrated"] | None = None,
+    weather: WeatherConfig | None = None,
+    traffic: int | None = None,
+    transient: Mapping[str, float | str] | None = None,
+    recording: Path | None = None,
+    graphviz: Path | None = None,
+    overwrite: bool = False,
+) -> Run:
+    """Runs a drive on all cores with progress on stderr; see `simulate`.
+
+    Args:
+        name_or_file: a shipped drive or a scenario file.
+        output: the folder of recordings.
+        frames: record only so many frames.
+        lidar: preset that replaces the scenario's LiDARs.
+        returns: `ideal` or `calibrated`, in place of the scenario's.
+        weather: in place of the scenario's.
+        traffic: how many vehicles, and how many walkers, in place of the
+            scenario's.
+        transient: switches of the section `transient`, and their values.
+        recording: where to save a web page of the drive.
+        graphviz: where to save the Diagram as Graphviz text.
+        overwrite: replace an existing recording.
+
+    Raises:
+        InputError: an argument cannot be used.
+
+    Example:
+        from pathlib import Path
+
+        from cns_drake import run_drive
+
+        run_drive("downtown_01", Path("recordings"), frames=20)
+    """
+    with uninterrupted():  # Slow to import, not needed for `--help`.
+        from cns_drake.base.processors import num_cores
+        from cns_drake.scenarios.rates import frame_period
+        from cns_drake.scenarios.scenario_loading import load_scenario
+        from cns_drake.simulation.simulation import simulate
+
+    scenario = load_scenario(name_or_file)
+    if lidar is not None:
+        scenario = scenario.with_lidar_preset(lidar)
+    if returns is not None:
+        scenario = scenario.with_returns(returns, weather)
+    if traffic is not None:
+        scenario = scenario.with_traffic(traffic)
+    if transient:
+        scenario = scenario.with_transient(**transient)
+    if frames is not None:
+        scenario = scenario.model_copy(update={"frames": frames})
+    with show_progress() as progress:
+        task = progress.add_task(scenario.name, total=None, note="loading")
+        on_frame = frame_progress(progress, task, frame_period(scenario.lidars))
+        run = simulate(
+            scenario,
+            output,
+            page_file=recording,
+            graphviz_file=graphviz,
+            overwrite=overwrite,
+            num_threads=num_cores(),
+            on_frame=on_frame,
+            on_note=lambda text: print_note(progress, text),
+        )
+    print(
+        f"{run.folder}: {run.num_frames} frames, {run.simulated_s:.2f} s "
+        f"simulated in {run.wall_s:.2f} s "
+        f"({run.real_time_factor:.1f} times real time)"
+    )
+    return run
+
+
+def run_script(name: str, description: str) -> None:
+    """The command line of a diagram script.
+
+    Args:
+        name: the drive.
+        description: the script's docstring, shown by `--help`.
+
+    Example:
+        from cns_drake import run_script
+
+        run_script("downtown_01", "Downtown before it was built up.")
+    """
+
+    def script(
+        output: Output = Path("recordings"),
+        frames: Frames = None,
+        lidar: LidarPreset = None,
+        recording: Recording = None,
+        graphviz: Graphviz = None,
+        overwrite: Overwrite = False,
+    ) -> None:
+        run_drive(
+            name,
+            output,
+            frames=frames,
+            lidar=lidar,
+            recording=recording,
+            graphviz=graphviz,
+            overwrite=overwrite,
+        )
+
+    app = terminal.plain_app(add_completion=False)
+    epilog = terminal.example(f"python diagrams/{name}.py --frames 200")
+    app.command(help=description, epilog=epilog)(script)
+    terminal.run(app, "cns-drake")

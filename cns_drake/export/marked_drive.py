@@ -1,0 +1,135 @@
+"""A recording with marks on points that another stage lacks."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.base.recordings.mcap_drive import McapDrive
+from cns_drake.base.recordings.scenario_file import read_scenario
+from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.semantics import moving_id
+from cns_drake.scene.structure_table import load_structure_table
+from cns_drake.scene.world import load_world, structures_in
+
+
+class MarkedDrive(McapDrive):
+    """A recording compared with another stage of its map.
+
+    A structure is absent there if no visual of that stage is part of it; a
+    lower building is present. Points on absent structures get SemanticKITTI's
+    labels of moving objects; all other labels are as recorded. In the table of
+    structures, absent ones get `"absent_in": <stage>`.
+    """
+
+    def __init__(self, path: Path, lidar: str | None, stage: str):
+        """Opens a recording and loads the other stage.
+
+        Args:
+            path: the .mcap file, or the folder that holds it.
+            lidar: see `McapDrive`.
+            stage: the other stage's name, as in `stage_<stage>.sdf`.
+
+        Raises:
+            InputError: if the recording cannot be read, was not taken in a
+                map's stage or has no structures, the map is missing, has other
+                structures by now, or lacks that stage.
+        """
+        super().__init__(path, lidar)
+        self._stage = stage
+        recorded = super().instances
+        if recorded is None:
+            raise InputError(f"{path}: has no list of structures")
+        folder = self._map_folder()
+        self._check_structures(folder.structures, recorded)
+        standing = structures_in(load_world(_world_file(folder, stage)))
+        self._absent = {
+            instance: entry
+            for instance, entry in recorded.items()
+            if entry.get("name") not in standing
+        }
+
+    @property
+    def instances(self) -> Mapping[int, Mapping]:
+        recorded = super().instances or {}
+        return {
+            instance: {**entry, "absent_in": self._stage}
+            if instance in self._absent
+            else entry
+            for instance, entry in recorded.items()
+        }
+
+    def scan(self, index: int) -> np.ndarray:
+        """Reads scan i; its labels are uint16."""
+        recorded = super().scan(index)
+        names = recorded.dtype.names or ()
+        if not {"label", "instance"} <= set(names):
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: scan {index}: no field "
+                "label, or no field instance"
+            )
+        points = np.empty(
+            len(recorded),
+            [
+                (name, np.uint16 if name == "label" else recorded.dtype[name])
+                for name in names
+            ],
+        )
+        for name in names:
+            points[name] = recorded[name]
+        for label, instances in self._absent_by_label.items():
+            points["label"][np.isin(points["instance"], instances)] = label
+        return points
+
+    @cached_property
+    def _absent_by_label(self) -> dict[int, list[int]]:
+        groups = defaultdict(list)
+        for instance, entry in self._absent.items():
+            label = moving_id(entry.get("class", ""))
+            groups[label].append(instance)
+        return groups
+
+    def _map_folder(self) -> MapFolder:
+        place = (self.scenario or {}).get("map")
+        if not isinstance(place, str):
+            raise InputError(f"{self._path}: not recorded in a stage of a map")
+        if place in shipped_maps():
+            return MapFolder(shipped_maps()[place])
+        # The recording has the map's name; the file beside it has its folder.
+        beside = read_scenario(self._path.parent) or {}
+        folder = self._path.parent / str(beside.get("map", place))
+        if not folder.is_dir():
+            raise InputError(f"{self._path}: map: {folder}: no such folder")
+        return MapFolder(folder)
+
+    def _check_structures(
+        self, table: Path, recorded: Mapping[int, Mapping]
+    ) -> None:
+        """Checks that the names still belong to the recorded structures."""
+        for listed in load_structure_table(table):
+            entry = recorded.get(listed.instance, {})
+            if (entry.get("name"), entry.get("class")) != (
+                listed.name,
+                listed.semantic_class,
+            ):
+                raise InputError(
+                    f"{table}: {listed.name}: not the structure "
+                    f"{listed.instance} of {self.name}: the map has changed "
+                    "since"
+                )
+
+
+def _world_file(folder: MapFolder, stage: str) -> Path:
+    stages = folder.stages()
+    if stage not in stages:
+        raise InputError(
+            f"{folder.path}: no stage '{stage}'; it has: "
+            f"{', '.join(stages) or 'none'}"
+        )
+    return stages[stage]

@@ -1,0 +1,200 @@
+"""The figures of a folder's drives, kept beside them in a table.
+
+Planning a drive and reading a stage take seconds; a listing should not. Each
+row of `sequences.csv` therefore has a checksum of its input files, and is
+measured anew when they have changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+import csv
+from dataclasses import astuple, dataclass, fields
+import io
+from pathlib import Path
+import zlib
+
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
+    complete_part,
+    user_errors,
+    write_part,
+)
+from cns_drake.base.map_folder import MapFolder, drive_name
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    map_folder,
+    world_file,
+)
+from cns_drake.scenarios.scenario_loading import read_scenario_file
+
+
+@dataclass(frozen=True)
+class DriveRow:
+    """A drive and its figures.
+
+    Attributes:
+        sequence: the drive's name.
+        map: the map's name.
+        stage: the city's stage.
+        title: of the drive.
+        checksum: of the files that the figures depend on.
+        length: of the path [m].
+        duration: of the drive [s].
+        frames: number of recorded frames.
+        structures: in the stage.
+        triangles: in the stage.
+    """
+
+    sequence: str
+    map: str
+    stage: str
+    title: str
+    checksum: str
+    length: float
+    duration: float
+    frames: int
+    structures: int
+    triangles: int
+
+
+def drive_rows(
+    folder: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    sizes: Mapping[str, tuple[int, int]] | None = None,
+) -> list[DriveRow]:
+    """Returns the rows of a map's drives whose stage is there.
+
+    Args:
+        folder: of the map, with `sequence_NN.yaml` and `stage_NN.sdf`.
+        progress: takes a line for each row that has to be measured.
+        sizes: stage -> its structures and triangles; for other stages they are
+            counted in the world, which takes long to load.
+
+    Raises:
+        InputError: if a drive cannot be read or planned, or its stage cannot
+            be parsed.
+    """
+    its = MapFolder(folder)
+    known = {row.checksum: row for row in _read(its.drive_table)}
+    # Names and sizes stand for the meshes: reading them all would take too long
+    # for a listing.
+    meshes = "".join(
+        f"{mesh.name} {mesh.stat().st_size}"
+        for mesh in sorted(its.meshes.glob("*"))
+    ).encode()
+    rows = []
+    for path in its.drives():
+        scenario = read_scenario_file(path)
+        world = world_file(scenario)
+        if not world.is_file():
+            continue
+        # A map whose drives follow waypoints has no roads.
+        roads = [p for p in (its.roads,) if p.is_file()]
+        checksum = _checksum((path, *roads, world), meshes)
+        row = known.get(checksum)
+        if row is None:
+            progress(f"measuring {drive_name(path)}")
+            size = (sizes or {}).get(str(scenario.stage))
+            row = _measure(scenario, checksum, size)
+        rows.append(row)
+    return rows
+
+
+def write_table(
+    folder: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    sizes: Mapping[str, tuple[int, int]] | None = None,
+) -> None:
+    """Brings the table of a folder up to date.
+
+    A folder without drives gets no table. Arguments as of `drive_rows`.
+
+    Raises:
+        InputError: as `drive_rows`, or if the table cannot be written.
+    """
+    rows = drive_rows(folder, progress, sizes)
+    if not rows:
+        return
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(field.name for field in fields(DriveRow))
+    table.writerows(astuple(row) for row in rows)
+    path = MapFolder(folder).drive_table
+    write_part(path, out.getvalue())
+    complete_part(path)
+
+
+def _checksum(paths: Iterable[Path], more: bytes) -> str:
+    """Returns the checksum of the contents of files, and of more values."""
+    total = 0
+    for path in paths:
+        with user_errors(path):
+            total = zlib.crc32(path.read_bytes(), total)
+    return f"{zlib.crc32(more, total):08x}"
+
+
+def _read(path: Path) -> list[DriveRow]:
+    """Returns the rows of a table; none if it cannot be used.
+
+    The rows of a bad table are measured anew.
+    """
+    names = [field.name for field in fields(DriveRow)]
+    try:
+        return [
+            DriveRow(
+                sequence=row["sequence"],
+                map=row["map"],
+                stage=row["stage"],
+                title=row["title"],
+                checksum=row["checksum"],
+                length=float(row["length"]),
+                duration=float(row["duration"]),
+                frames=int(row["frames"]),
+                structures=int(row["structures"]),
+                triangles=int(row["triangles"]),
+            )
+            for _, row in read_records(path, names)
+        ]
+    except (InputError, ValueError):
+        return []
+
+
+def _measure(
+    scenario: Scenario, checksum: str, size: tuple[int, int] | None
+) -> DriveRow:
+    # Slow to import, and rarely needed.
+    from cns_drake.scenarios.drive_facts import drive_facts
+
+    check_files(scenario)
+    facts = drive_facts(scenario)
+    structures, triangles = size or _size(scenario)
+    return DriveRow(
+        sequence=scenario.name,
+        map=map_folder(scenario).path.resolve().name,
+        stage=str(scenario.stage),
+        title=scenario.title,
+        checksum=checksum,
+        length=round(facts.length, 1),
+        duration=round(facts.duration, 2),
+        frames=facts.frames,
+        structures=structures,
+        triangles=triangles,
+    )
+
+
+def _size(scenario: Scenario) -> tuple[int, int]:
+    """Returns the numbers of structures and triangles of a stage."""
+    from cns_drake.scene.perception_geometry import read_perception_geometry
+    from cns_drake.scene.surfaces import TriangleSurface
+    from cns_drake.scene.world import load_world
+
+    world = load_world(world_file(scenario), without=scenario.without)
+    geometries = read_perception_geometry(world.scene_graph.model_inspector())
+    return len({geometry.structure for geometry in geometries}), sum(
+        len(geometry.surface.triangles)
+        for geometry in geometries
+        if isinstance(geometry.surface, TriangleSurface)
+    )

@@ -1,0 +1,82 @@
+"""Readers of recorded drives and of point clouds, one for each format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.recordings.drive import (
+    Drive,
+    Placed,
+    PlacedDrive,
+    check_same_world,
+)
+
+__all__ = [
+    "Drive",
+    "Placed",
+    "PlacedDrive",
+    "check_same_world",
+    "open",
+    "open_drive",
+]
+
+
+def open_drive(path: Path, lidar: str | None = None) -> Drive:
+    """Opens the recorded drive at `path` with the reader it needs.
+
+    Args:
+        path: an .mcap file or a folder with one (as cns-drake and rosbag2
+            write it), or a folder of a drive as MulRan, HeLiPR, KITTI
+            odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
+            chooses the LiDAR.
+        lidar: which LiDAR's scans to read, of a recording with several.
+
+    Raises:
+        InputError: if nothing there can be read as a drive, or it has no
+            such LiDAR.
+
+    Example:
+        from evaluation import open_drive
+
+        for scan in open_drive("recordings/downtown_01"):
+            print(len(scan))
+    """
+    # Imported here: the readers' libraries are slow to load, and a map file
+    # needs none of them.
+    from cns_drake.base.recordings import mcap_drive
+    from evaluation.drives import cns_folder, helipr, kitti, mulran
+
+    readers = (
+        (mcap_drive.holds_mcap, mcap_drive.McapDrive),
+        (mulran.holds_mulran, mulran.MulranDrive),
+        (helipr.holds_helipr, helipr.HeliprDrive),
+        (kitti.holds_kitti, kitti.KittiDrive),
+        (cns_folder.holds_cns, cns_folder.CnsFolderDrive),
+    )
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f"{path}: no such file or folder")
+    fitting = [reader for holds, reader in readers if holds(path)]
+    if len(fitting) > 1:
+        names = ", ".join(reader.__name__ for reader in fitting)
+        raise InputError(f"{path}: files of several formats ({names})")
+    if fitting and lidar is None:
+        return fitting[0](path)
+    if fitting:
+        if fitting[0] not in (
+            mcap_drive.McapDrive,
+            helipr.HeliprDrive,
+        ):
+            raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+        return fitting[0](path, lidar)
+    if path.is_dir() and any(path.glob("*.mcap.part")):
+        raise InputError(f"{path}: the recording was not finished")
+    raise InputError(
+        f"{path}: not a recorded drive (a folder with an .mcap file, or"
+        " one, or a drive of MulRan, HeLiPR, KITTI odometry or CNS)"
+    )
+
+
+# For `from evaluation import drives; drives.open(path)`.
+open = open_drive

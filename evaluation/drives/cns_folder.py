@@ -1,0 +1,207 @@
+"""Drives in the layout in which the CNS data set was published.
+
+    transformation_lidar.yaml        pose of the LiDAR on the vehicle
+    transformation_imu.yaml
+    <Map>/<Sequence>/gt.csv          time, x y z, qx qy qz qw of X_WB
+    <Map>/<Sequence>/imu.csv
+    <Map>/<Sequence>/pcd/<time>.pcd  x y z intensity
+
+B is the vehicle at the ground. Times are whole nanoseconds, or seconds with
+a decimal point. A row of `imu.csv` is time, quat_xyzw of R_WI, angular
+velocity, specific force. A drive that cns-drake exported also has a
+`scenario.yaml`.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.recordings.motion import IMU_DTYPE
+from cns_drake.base.recordings.scenario_file import read_scenario
+from cns_drake.base.yaml_files import parse_yaml
+from evaluation.clouds.cloud_files import read_cloud
+from evaluation.drives.pose_table import (
+    pose_matrices,
+    read_quaternions,
+)
+from evaluation.drives.scan_files import (
+    FileDrive,
+    list_stamped,
+)
+from evaluation.drives.text_tables import read_stamped_rows
+
+_POSES = "gt.csv"
+_IMU = "imu.csv"
+# Names of the folder in the paper and in the download.
+_FOLDERS = ("pcd", "LiDAR")
+_MOUNT = "transformation_lidar.yaml"
+# Above the vehicle, by the data set's figure of its sensors [m].
+_LIDAR_HEIGHT = 1.6
+
+# Scans and poses have the same times. Only their notation may differ: a double
+# holds nanoseconds since 1970 with an error.
+_TOLERANCE_NS = 1000
+
+
+class CnsFolderDrive(FileDrive):
+    """A drive in the published layout of CNS.
+
+    The mount of the LiDAR is read from `transformation_lidar.yaml`, beside
+    the drive or up to two folders above it. Without such a file it is that
+    of the data set: 1.6 m above the vehicle.
+    """
+
+    def __init__(self, path: Path):
+        """Opens a drive.
+
+        Args:
+            path: its folder.
+
+        Raises:
+            InputError: if there is none, or its poses cannot be used.
+        """
+        folders = [path / name for name in _FOLDERS if (path / name).is_dir()]
+        if not folders:
+            raise InputError(
+                f"{path}: CNS: neither {' nor '.join(_FOLDERS)} in it"
+            )
+        files, stamps_ns = list_stamped(folders[0], ".pcd")
+        trajectory = read_quaternions(path / _POSES, ",")
+        X_WB = trajectory.at(stamps_ns, _TOLERANCE_NS)
+        resolved = path.resolve()
+        self._imu_path = path / _IMU
+        mount = _find_mount(resolved)
+        name, scenario = resolved.name, read_scenario(path)
+        if mount is not None and mount.parent == resolved.parent.parent:
+            name = f"{resolved.parent.name}_{resolved.name}".lower()
+            scenario = scenario or {
+                "map": resolved.parent.name.lower(),
+                "stage": resolved.name,
+            }
+        super().__init__(
+            name=str((scenario or {}).get("name", name)),
+            world_frame="map",
+            files=files,
+            stamps_ns=stamps_ns,
+            X_WS=X_WB @ _read_mount(mount),
+            scenario=scenario,
+        )
+
+    @cached_property
+    def imu(self) -> np.ndarray | None:
+        if not self._imu_path.is_file():
+            return None
+        stamps_ns, values = read_stamped_rows(self._imu_path, 10, ",")
+        imu = np.empty(len(values), dtype=IMU_DTYPE)
+        imu["stamp_ns"] = stamps_ns
+        imu["quat_xyzw"] = values[:, :4]
+        imu["angular_velocity"] = values[:, 4:7]
+        imu["specific_force"] = values[:, 7:]
+        return imu
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        return read_cloud(path)
+
+
+def holds_cns(path: Path) -> bool:
+    """Returns whether a folder looks like a drive in CNS' layout."""
+    return (path / _POSES).is_file() or (path / _FOLDERS[0]).is_dir()
+
+
+def _find_mount(path: Path) -> Path | None:
+    for folder in (path, path.parent, path.parent.parent):
+        if (folder / _MOUNT).is_file():
+            return folder / _MOUNT
+    return None
+
+
+def _read_mount(path: Path | None) -> np.ndarray:
+    """Returns X_BS (4, 4), the pose of the LiDAR on the vehicle."""
+    if path is None:
+        return poses.make_pose(np.eye(3), np.array([0.0, 0.0, _LIDAR_HEIGHT]))
+    try:
+        text = read_bytes(path).decode("utf-8")
+        # OpenCV begins its files with a directive that is not YAML's.
+        lines = [x for x in text.splitlines() if not x.startswith("%")]
+        X_BS = _find_pose(parse_yaml("\n".join(lines), _Loader), path)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+    if X_BS is None:
+        raise InputError(
+            f"{path}: no transformation (a matrix of 4 x 4 or 3 x 4 numbers,"
+            " or translation and rotation)"
+        )
+    if X_BS[2, 3] <= 0.0:
+        raise InputError(
+            f"{path}: translation: puts the LiDAR at z = {X_BS[2, 3]:g} m,"
+            " not above the vehicle (the inverse transformation?)"
+        )
+    return X_BS
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads values with tags of their own (OpenCV's matrices) as if without."""
+
+
+_Loader.add_multi_constructor(
+    "tag:yaml.org,2002:opencv",
+    lambda loader, suffix, node: loader.construct_mapping(node, deep=True),
+)
+
+
+def _find_pose(node: Any, path: Path) -> np.ndarray | None:
+    """Returns the first transformation in a YAML tree, as (4, 4)."""
+    numbers = _numbers(node)
+    if numbers is not None and len(numbers) in (12, 16):
+        if len(numbers) == 16 and not np.array_equal(
+            numbers[12:], [0.0, 0.0, 0.0, 1.0]
+        ):
+            raise ValueError("the last row of the matrix is not 0 0 0 1")
+        return pose_matrices(path, numbers[None, :12])[0]
+    if isinstance(node, dict):
+        lowered = {str(key).lower(): value for key, value in node.items()}
+        p = _numbers(lowered.get("translation"))
+        rotation = _numbers(lowered.get("rotation"))
+        if p is not None and rotation is not None and len(p) == 3:
+            return _compose(p, rotation, path)
+        children = list(node.values())
+    else:
+        children = node if isinstance(node, list) else []
+    for child in children:
+        X = _find_pose(child, path)
+        if X is not None:
+            return X
+    return None
+
+
+def _compose(p: np.ndarray, rotation: np.ndarray, path: Path) -> np.ndarray:
+    """Returns the pose of a position and a quat_xyzw or a 3 x 3 matrix."""
+    if len(rotation) == 4:
+        R = poses.rotation_from_quaternion(rotation)
+    elif len(rotation) == 9:
+        R = rotation.reshape(3, 3)
+    else:
+        raise ValueError(
+            f"rotation: {len(rotation)} numbers instead of 4 (x y z w) or 9"
+        )
+    return pose_matrices(path, np.c_[R, p].reshape(1, 12))[0]
+
+
+def _numbers(node: Any) -> np.ndarray | None:
+    """Returns the numbers of a flat or nested list, or of x, y, z, w keys."""
+    if isinstance(node, dict):
+        keys = [key for key in "xyzw" if key in node]
+        node = [node[key] for key in keys] if len(keys) >= 3 else None
+    try:
+        numbers = np.array(node, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        return None
+    return numbers if node is not None and len(numbers) > 1 else None

@@ -1,0 +1,149 @@
+"""Drives of the HeLiPR data set (Jung et al., IJRR 2024), any of its LiDARs.
+
+    SEQ/LiDAR/{Ouster,Velodyne,Avia,Aeva}/<ns>.bin   packed records
+    SEQ/LiDAR_GT/{LiDAR}_gt.txt           ns x y z qx qy qz qw of X_LS
+    SEQ/LiDAR_GT/global_{LiDAR}_gt.txt    the same in the UTM grid
+
+Poses are those of the LiDAR itself, one for each scan.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from evaluation.drives import utm
+from evaluation.drives.pose_table import read_quaternions
+from evaluation.drives.scan_files import (
+    FileDrive,
+    check_below,
+    keep_spanned,
+    list_stamped,
+    read_packed,
+)
+
+_SCANS = "LiDAR"
+_POSES = "LiDAR_GT"
+
+_XYZ = [("x", "<f4"), ("y", "<f4"), ("z", "<f4")]
+_AEVA_EARLY = [
+    *_XYZ,
+    ("reflectivity", "<f4"),
+    ("velocity", "<f4"),
+    ("time_offset_ns", "<i4"),
+    ("line_index", "u1"),
+]
+# Records have no padding: 26, 22, 19, 29 and 25 bytes.
+_RECORDS = {
+    "Ouster": np.dtype(
+        [
+            *_XYZ,
+            ("intensity", "<f4"),
+            ("t", "<u4"),
+            ("reflectivity", "<u2"),
+            ("ring", "<u2"),
+            ("ambient", "<u2"),
+        ]
+    ),
+    "Velodyne": np.dtype(
+        [*_XYZ, ("intensity", "<f4"), ("ring", "<u2"), ("time", "<f4")]
+    ),
+    "Avia": np.dtype(
+        [
+            *_XYZ,
+            ("reflectivity", "u1"),
+            ("tag", "u1"),
+            ("line", "u1"),
+            ("offset_time", "<u4"),
+        ]
+    ),
+    "Aeva": np.dtype([*_AEVA_EARLY, ("intensity", "<f4")]),
+}
+# Records of Aeva up to this time have no intensity [ns].
+_AEVA_CHANGE_NS = 1691936557946849179
+_NUM_RINGS = {"Ouster": 128, "Velodyne": 16}
+# Each scan has a pose, at 10 Hz.
+_LONGEST_GAP_NS = 1_000_000_000
+
+
+class HeliprDrive(FileDrive):
+    """The scans of one LiDAR of HeLiPR on a drive.
+
+    With a `global_*_gt.txt`, W is the UTM grid with a nearer origin, see
+    `evaluation.drives.utm`; else W is the frame of the drive's own
+    `*_gt.txt`. Points without a return are left out.
+    """
+
+    def __init__(self, path: Path, lidar: str | None = None):
+        """Opens a drive.
+
+        Args:
+            path: the folder of the drive, or `LiDAR/<name>` in it.
+            lidar: name of the LiDAR, if `path` does not contain it: by default
+                the Ouster, or else the only one there.
+
+        Raises:
+            InputError: if there is none, or its poses cannot be used.
+        """
+        drive, lidar = _choose(path, lidar)
+        self._lidar = lidar
+        files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
+        in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
+        poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
+        trajectory = read_quaternions(drive / _POSES / poses_name, None)
+        X_WS, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        kept, notes = keep_spanned(files, spanned, trajectory.path)
+        if in_utm:
+            X_WS = utm.to_world(X_WS, trajectory.path)
+        drive_name = drive.resolve().name
+        super().__init__(
+            name=f"{drive_name}_{lidar}",
+            world_frame=f"helipr/{utm.DATUM if in_utm else drive_name}",
+            files=kept,
+            stamps_ns=stamps_ns[spanned],
+            X_WS=X_WS,
+            notes=notes,
+            datum=utm.DATUM if in_utm else None,
+        )
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        dtype = _RECORDS[self._lidar]
+        if self._lidar == "Aeva" and stamp_ns <= _AEVA_CHANGE_NS:
+            dtype = np.dtype(_AEVA_EARLY)
+        points = read_packed(path, dtype)
+        if self._lidar in _NUM_RINGS:
+            check_below(points, "ring", _NUM_RINGS[self._lidar])
+        return points
+
+
+def holds_helipr(path: Path) -> bool:
+    """Returns whether a folder is a drive of HeLiPR, or one LiDAR of it."""
+    return _is_lidar_folder(path.resolve()) or bool(_lidars(path))
+
+
+def _is_lidar_folder(path: Path) -> bool:
+    return (
+        path.is_dir() and path.parent.name == _SCANS and path.name in _RECORDS
+    )
+
+
+def _lidars(drive: Path) -> list[str]:
+    return [name for name in _RECORDS if (drive / _SCANS / name).is_dir()]
+
+
+def _choose(path: Path, lidar: str | None) -> tuple[Path, str]:
+    """Returns the folder of the drive and the name of the LiDAR."""
+    resolved = path.resolve()
+    if _is_lidar_folder(resolved):
+        return resolved.parent.parent, resolved.name
+    there = _lidars(path)
+    if lidar is None:
+        lidar = there[0] if len(there) == 1 else "Ouster"
+    if lidar not in there:
+        raise InputError(
+            f"{path}: HeLiPR: no {_SCANS}/{lidar} in it (there:"
+            f" {' '.join(there) or 'none'})"
+        )
+    return path, lidar

@@ -1,0 +1,276 @@
+"""Drives of the KITTI odometry benchmark, and of others in its layout.
+
+    sequences/NN/velodyne/%06d.bin   float32 x y z reflectance
+    sequences/NN/times.txt           seconds
+    sequences/NN/calib.txt           Tr: upper 3 x 4 of X_CS
+    poses/NN.txt                     upper 3 x 4 of X_C0C, a row a scan
+
+C is the left grey camera (x right, y down, z forward), C0 that at the first
+scan, S the LiDAR. Without a `calib.txt` the poses are those of the LiDAR,
+X_S0S. If scans are missing, the numbers in the names of the others select their
+rows. If scans were renumbered, `frames.txt` has their old numbers, one for each
+scan.
+
+Beside these there may be, in SemanticKITTI's form,
+
+    sequences/NN/labels/%06d.label   uint32 label | instance << 16, a point
+
+and, as cns-drake exports a drive,
+
+    sequences/NN/first_pose.txt      upper 3 x 4 of X_WS at the first scan
+    sequences/NN/scenario.yaml
+    sequences/NN/structures.json     what the instances are
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import itertools
+from pathlib import Path
+import re
+
+import numpy as np
+
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.json_text import parse_json
+from cns_drake.base.recordings.drive import index_instances
+from cns_drake.base.recordings.scenario_file import read_scenario
+from evaluation.drives.pose_table import pose_matrices
+from evaluation.drives.scan_files import (
+    FileDrive,
+    read_packed,
+)
+from evaluation.drives.text_tables import (
+    check_increasing,
+    parse_seconds,
+    read_numbers,
+)
+
+_SCANS = "velodyne"
+_LABELS = "labels"
+_FRAMES = "frames.txt"
+_FIRST_POSE = "first_pose.txt"
+_STRUCTURES = "structures.json"
+_RECORD = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
+_LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
+
+
+class KittiDrive(FileDrive):
+    """A drive of KITTI odometry.
+
+    Poses of the LiDAR are X_S0S = inverse(Tr) X_C0C Tr. W is S0, the frame
+    of the LiDAR at the first scan and not that of the camera, so that z is
+    up; with a `first_pose.txt` it is the world of the recording. With
+    `labels` points have the fields `label` and `instance`.
+    """
+
+    def __init__(self, path: Path):
+        """Opens a drive.
+
+        Args:
+            path: its folder; the poses lie in `../../poses/<name>.txt`, or
+                as `poses.txt` beside the scans.
+
+        Raises:
+            InputError: if there is none, its files do not fit together, or
+                it has no poses (as 11 to 21).
+        """
+        files, numbers = _numbered_files(path)
+        times_path = path / "times.txt"
+        times = read_numbers(times_path, [("time", "U40")])["time"]
+        try:
+            stamps_ns = parse_seconds(times)
+        except ValueError as error:
+            raise InputError(f"{times_path}: {error}") from error
+        check_increasing(times_path, stamps_ns, "row")
+        poses_path = _poses_path(path)
+        X_C0C = _read_poses(poses_path)
+        rows = len(stamps_ns), len(X_C0C)
+        notes: list[str] = []
+        stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
+        X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
+        # If numbers are missing, one table may have a row for each number and
+        # the other a row for each scan.
+        gaps = numbers != list(range(len(files)))
+        if rows[0] != rows[1] and not gaps:
+            raise InputError(
+                f"{poses_path}: {rows[1]} rows, but {rows[0]} in {times_path}"
+            )
+        calibration = path / "calib.txt"
+        X_CS = np.eye(4)
+        if calibration.exists():
+            X_CS = _read_calibration(calibration)
+        else:
+            notes.append(
+                f"{calibration}: not there; the poses in {poses_path.name} are"
+                " taken as those of the LiDAR"
+            )
+        X_WS = poses.inverse(X_CS) @ X_C0C @ X_CS
+        name = path.resolve().name
+        world_frame = f"kitti/{name}"
+        first_pose = path / _FIRST_POSE
+        if first_pose.is_file():
+            X_WS = _read_first_pose(first_pose) @ X_WS
+            world_frame = "map"
+        scenario = read_scenario(path)
+        self._structures = path / _STRUCTURES
+        labels = path / _LABELS
+        self._labels = labels if labels.is_dir() else None
+        super().__init__(
+            name=str((scenario or {}).get("name", name)),
+            world_frame=world_frame,
+            files=files,
+            stamps_ns=stamps_ns,
+            X_WS=X_WS,
+            notes=tuple(notes),
+            scenario=scenario,
+        )
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        path = self._structures
+        if not path.is_file():
+            return None
+        try:
+            table = parse_json(read_bytes(path))
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
+        return index_instances(table, str(path))
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        stored = read_packed(path, _RECORD)
+        if self._labels is None:
+            return stored
+        labels_path = self._labels / f"{path.stem}.label"
+        labels = read_packed(labels_path, _LABEL)
+        if len(labels) != len(stored):
+            raise ValueError(
+                f"{len(stored)} points, but {len(labels)} in {labels_path}"
+            )
+        points = np.empty(len(stored), dtype=[*_RECORD.descr, *_LABEL.descr])
+        for part in (stored, labels):
+            for name in part.dtype.names or ():
+                points[name] = part[name]
+        return points
+
+
+def holds_kitti(path: Path) -> bool:
+    """Returns whether a folder looks like a drive in KITTI's layout."""
+    return (path / _SCANS).is_dir()
+
+
+def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
+    """Returns the scans of a drive in order, and the number of each."""
+    folder = path / _SCANS
+    files = sorted(folder.glob("*.bin"))
+    if not files:
+        raise InputError(f"{folder}: no scan (*.bin) in it")
+    for file in files:
+        if re.fullmatch("[0-9]{6}", file.stem) is None:
+            raise InputError(f"{file}: the name is no number of six digits")
+    numbers = [int(file.stem) for file in files]
+    frames = path / _FRAMES
+    if not frames.is_file():
+        return files, numbers
+    listed = read_numbers(frames, [("number", "U40")])["number"]
+    if len(listed) != len(files):
+        raise InputError(f"{frames}: {len(listed)} rows for {len(files)} scans")
+    for row, text in enumerate(listed.tolist()):
+        # No drive has a frame whose number has ten digits.
+        if re.fullmatch("[0-9]{1,9}", text) is None:
+            raise InputError(f"{frames}: row {row + 1}: {text!r} is no number")
+    renumbered = numbers == list(range(len(files)))
+    found, numbers = numbers, list(map(int, listed))
+    for row, (before, number) in enumerate(itertools.pairwise(numbers)):
+        if number <= before:
+            raise InputError(
+                f"{frames}: row {row + 2}: {number} does not follow {before}"
+            )
+    if numbers != found and not renumbered:
+        raise InputError(
+            f"{frames}: other numbers than those of the files in {folder}"
+        )
+    return files, numbers
+
+
+def _rows_of_scans(
+    path: Path, rows: np.ndarray, numbers: list[int], notes: list[str]
+) -> np.ndarray:
+    """Returns the rows of a table that belong to the scans.
+
+    Args:
+        path: the table.
+        rows: (M, ...): one for each scan, or one for each number.
+        numbers: of the N scans.
+        notes: gets a note if scans are missing.
+
+    Raises:
+        InputError: if the table is too short.
+    """
+    if len(rows) == len(numbers):
+        return rows
+    if len(rows) < len(numbers):
+        raise InputError(f"{path}: {len(rows)} rows for {len(numbers)} scans")
+    if numbers[-1] >= len(rows):
+        raise InputError(
+            f"{path}: {len(rows)} rows, none for scan {numbers[-1]}"
+        )
+    notes.append(
+        f"{path}: {len(rows)} rows for {len(numbers)} scans; the rows of the"
+        " scans' numbers are used"
+    )
+    return rows[numbers]
+
+
+def _poses_path(path: Path) -> Path:
+    resolved = path.resolve()
+    for candidate in (
+        resolved.parent.parent / "poses" / f"{resolved.name}.txt",
+        path / "poses.txt",
+    ):
+        if candidate.is_file():
+            return candidate
+    raise InputError(
+        f"{path}: KITTI: no poses, neither ../../poses/{resolved.name}.txt nor"
+        " poses.txt"
+    )
+
+
+def _read_first_pose(path: Path) -> np.ndarray:
+    """Returns X_WS (4, 4) at the first scan."""
+    rows = _read_poses(path)
+    if len(rows) != 1:
+        raise InputError(f"{path}: {len(rows)} rows instead of one")
+    return rows[0]
+
+
+def _read_poses(path: Path) -> np.ndarray:
+    values = read_numbers(path, float)
+    if values.shape[1] != 12:
+        raise InputError(
+            f"{path}: rows of {values.shape[1]} numbers instead of 12"
+        )
+    return pose_matrices(path, values)
+
+
+def _read_calibration(path: Path) -> np.ndarray:
+    """Returns X_CS (4, 4), the pose of the LiDAR in the camera's frame."""
+    try:
+        lines = read_bytes(path).decode("ascii").splitlines()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a text file") from error
+    for line in lines:
+        key, colon, text = line.partition(":")
+        if colon and key.strip() == "Tr":
+            try:
+                values = np.array([[float(word) for word in text.split()]])
+            except ValueError as error:
+                raise InputError(f"{path}: Tr: {error}") from error
+            if values.shape[1] != 12:
+                raise InputError(
+                    f"{path}: Tr: {values.shape[1]} numbers instead of 12"
+                )
+            return pose_matrices(path, values)[0]
+    raise InputError(f"{path}: Tr: missing")

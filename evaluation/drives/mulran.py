@@ -1,0 +1,116 @@
+"""Drives of the MulRan data set (Kim et al., ICRA 2020), its Ouster OS1-64.
+
+    SEQ/global_pose.csv              ns, then the upper 3 x 4 of X_UB
+    SEQ/[sensor_data/]Ouster/<ns>.bin     float32 x y z intensity
+
+X_UB is the pose of the vehicle's base in the UTM grid, at 100 Hz; the base
+is on the ground. Times are whole nanoseconds.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from evaluation.drives import utm
+from evaluation.drives.pose_table import read_matrices
+from evaluation.drives.scan_files import (
+    FileDrive,
+    keep_spanned,
+    list_stamped,
+    read_packed,
+)
+
+_POSES = "global_pose.csv"
+_FOLDERS = ("sensor_data/Ouster", "Ouster")
+
+_STORED = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
+_WHOLE = np.dtype([*_STORED.descr, ("ring", "<u2"), ("t", "<u4")])
+
+_NUM_RINGS = 64
+_NUM_COLUMNS = 1024
+_SWEEP_NS = 100_000_000
+# Poses have a rate of 100 Hz.
+_LONGEST_GAP_NS = 1_000_000_000
+
+# Pose of the LiDAR on the vehicle, from the data set's calib_base2ouster. Read
+# as its name says, it puts the LiDAR above the base. Other programs apply its
+# inverse. Since it turns by almost 180 degrees, the inverse puts the LiDAR
+# within a centimetre of the same horizontal position, but 1.8 m below the
+# ground.
+_X_BS = poses.make_pose(
+    Rotation.from_euler(
+        "xyz", [0.0001, 0.0003, 179.6654], degrees=True
+    ).as_matrix(),
+    np.array([1.7042, -0.021, 1.8047]),
+)
+
+
+class MulranDrive(FileDrive):
+    """A drive of MulRan.
+
+    W is the UTM grid with a nearer origin, see `evaluation.drives.utm`.
+    The pose of a scan is interpolated at its stamp. Points without a return,
+    which are stored as (0, 0, 0), are left out. A complete scan has the fields
+    `ring` and `t` [ns since the stamp] beside the stored ones. A scan with too
+    few points lacks these two, because its file does not show which points are
+    missing.
+    """
+
+    def __init__(self, path: Path):
+        """Opens a drive.
+
+        Args:
+            path: its folder, with or without a `sensor_data`.
+
+        Raises:
+            InputError: if there is none, or its poses cannot be used.
+        """
+        folder = _scan_folder(path)
+        if folder is None:
+            raise InputError(
+                f"{path}: MulRan: neither {' nor '.join(_FOLDERS)} in it"
+            )
+        files, stamps_ns = list_stamped(folder, ".bin")
+        trajectory = read_matrices(path / _POSES, ",")
+        X_UB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        kept, notes = keep_spanned(files, spanned, trajectory.path)
+        super().__init__(
+            name=path.resolve().name,
+            world_frame=f"mulran/{utm.DATUM}",
+            files=kept,
+            stamps_ns=stamps_ns[spanned],
+            X_WS=utm.to_world(X_UB, trajectory.path) @ _X_BS,
+            notes=notes,
+            datum=utm.DATUM,
+        )
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        stored = read_packed(path, _STORED)
+        if len(stored) != _NUM_RINGS * _NUM_COLUMNS:
+            return stored
+        # Points are stored column by column, each from ring to ring.
+        points = np.empty(len(stored), dtype=_WHOLE)
+        for name in stored.dtype.names or ():
+            points[name] = stored[name]
+        number = np.arange(len(stored))
+        points["ring"] = number % _NUM_RINGS
+        column = number // _NUM_RINGS
+        points["t"] = np.rint(column * (_SWEEP_NS / _NUM_COLUMNS))
+        return points
+
+
+def holds_mulran(path: Path) -> bool:
+    """Returns whether a folder looks like a drive of MulRan."""
+    return (path / _POSES).is_file() or _scan_folder(path) is not None
+
+
+def _scan_folder(path: Path) -> Path | None:
+    for name in _FOLDERS:
+        if (path / name).is_dir():
+            return path / name
+    return None

@@ -1,0 +1,84 @@
+"""Places along a drive, and the clouds seen there.
+
+- Places d metres apart: frame i is a place when the length of the path so far
+first reaches a multiple of d. The first frame is a place. - Points are limited
+to a range, 100 m in the paper: each of x, y, z in the frame of the sensor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.base import poses
+from cns_drake.base.recordings.drive import Drive
+from evaluation.drives.cropped_cloud import CroppedCloud
+
+
+def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
+    """Returns frames at equal distances along a trajectory.
+
+    Args:
+        positions: (N, 3) [m], N >= 1.
+        spacing: between two frames, along the path [m].
+
+    Returns:
+        (K,) increasing frame numbers; the first is 0.
+    """
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    passed = np.floor(travelled / spacing).astype(np.int64)
+    return np.flatnonzero(np.diff(passed, prepend=-1) > 0)
+
+
+def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
+    """Returns which points (N, 3) are finite and within a range, (N,) bool.
+
+    Args:
+        points: in the frame of the sensor [m].
+        max_range: greatest absolute value of each coordinate [m].
+    """
+    kept = np.ones(len(points), dtype=bool)
+    # One column at a time, because NumPy reduces slowly along a short axis.
+    for coordinates in points.T:
+        # A comparison with NaN is false, so NaN is out of range.
+        kept &= np.abs(coordinates) <= max_range
+    return kept
+
+
+def gather(
+    drive: Drive,
+    frame: int,
+    num_scans: int,
+    max_range: float,
+    fields: tuple[str, ...] = (),
+    num_before: int = 0,
+) -> np.ndarray:
+    """Returns the cloud that a method describes at a frame.
+
+    Args:
+        drive: the drive.
+        frame: of the described place.
+        num_scans: number of consecutive scans that are merged; fewer at the
+            ends of the drive.
+        max_range: see `within_range`.
+        fields: of the points, beside their coordinates.
+        num_before: how many of the scans come before the frame.
+
+    Returns:
+        (N, 3) float64, in the sensor frame of the frame's scan; with fields,
+        a structured array (N,) of float64 x, y, z and the fields.
+
+    Raises:
+        InputError: if the scans lack a field.
+    """
+    first = max(frame - num_before, 0)
+    end = min(frame - num_before + num_scans, len(drive))
+    X_WS = drive.X_WS
+    X_S0W = poses.inverse(X_WS[frame])
+    cloud = CroppedCloud(max_range, fields, drive.name)
+    for index in range(first, end):
+        scan = drive.scan(index)
+        # Products with an identity would be rounded.
+        X_S0S = None if index == frame else X_S0W @ X_WS[index]
+        cloud.add(scan, X_S0S, num_more=end - 1 - index)
+    return cloud.finish()

@@ -1,0 +1,200 @@
+"""Drives that are stored as one file for each scan."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.points import FARTHEST_RETURN
+from cns_drake.base.recordings.drive import Drive
+from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
+from evaluation.drives.text_tables import (
+    check_increasing,
+    parse_stamps_ns,
+)
+
+
+class FileDrive(Drive):
+    """A drive with one file for each scan; the poses are in memory."""
+
+    def __init__(
+        self,
+        name: str,
+        world_frame: str,
+        files: list[Path],
+        stamps_ns: np.ndarray,
+        X_WS: np.ndarray,
+        notes: tuple[str, ...] = (),
+        datum: str | None = None,
+        scenario: Mapping | None = None,
+    ):
+        """Describes a drive of N >= 1 scans.
+
+        Args:
+            name: of the drive.
+            world_frame: name of W.
+            files: N scans.
+            stamps_ns: (N,) int64 [ns], strictly increasing.
+            X_WS: (N, 4, 4).
+            notes: see `Drive.notes`.
+            datum: see `Drive.datum`.
+            scenario: see `Drive.scenario`.
+        """
+        self.name = name
+        self.world_frame = world_frame
+        self._files = files
+        self._stamps_ns = stamps_ns
+        self._X_WS = X_WS
+        self._notes = notes
+        self._datum = datum
+        self._scenario = scenario
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._stamps_ns
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._X_WS
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self._notes
+
+    @property
+    def datum(self) -> str | None:
+        return self._datum
+
+    @property
+    def scenario(self) -> Mapping | None:
+        return self._scenario
+
+    def scan(self, index: int) -> np.ndarray:
+        if not 0 <= index < len(self):
+            raise IndexError(f"scan {index} of {len(self)}")
+        path = self._files[index]
+        try:
+            return _returns(self._read(path, int(self._stamps_ns[index])))
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror or error}") from error
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
+
+    @abc.abstractmethod
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        """Reads the points of one scan as they are in the file.
+
+        Raises:
+            ValueError: if the file is not of its format.
+            OSError: if it cannot be read.
+        """
+
+
+def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
+    """Finds files whose names are their times.
+
+    Args:
+        folder: their folder.
+        suffix: end of their names, after the time.
+
+    Returns:
+        The files in order of time; (N,) int64 times [ns]; N >= 1.
+
+    Raises:
+        InputError: if there is no file, or a name is no time.
+    """
+    files = [
+        path
+        for path in folder.glob(f"*{suffix}")
+        if not path.name.startswith(".")
+    ]
+    if not files:
+        raise InputError(f"{folder}: no scan (*{suffix}) in it")
+    stems = [path.name.removesuffix(suffix) for path in files]
+    try:
+        stamps_ns = parse_stamps_ns(np.array(stems))
+    except ValueError as error:
+        raise InputError(
+            f"{folder}: a file named *{suffix}: {error}"
+        ) from error
+    order = np.argsort(stamps_ns, kind="stable")
+    check_increasing(folder, stamps_ns[order], "scan")
+    return [files[i] for i in order], stamps_ns[order]
+
+
+def keep_spanned(
+    files: list[Path], spanned: np.ndarray, poses_path: Path
+) -> tuple[list[Path], tuple[str, ...]]:
+    """Leaves out the scans before the first and after the last pose.
+
+    Returns:
+        The other files; a note if scans were left out.
+    """
+    if spanned.all():
+        return files, ()
+    kept = [file for file, inside in zip(files, spanned, strict=True) if inside]
+    missing = len(files) - len(kept)
+    return kept, (
+        f"{poses_path}: no pose for {missing} of {len(files)} scans at the"
+        " ends of the drive; they are left out",
+    )
+
+
+def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
+    """Reads a file that consists of records only.
+
+    Raises:
+        ValueError: if the last record is incomplete.
+        InputError: if the file cannot be read, or is too large for a scan.
+    """
+    data = read_bytes(path, SCAN_LIMIT_BYTES)
+    if len(data) % dtype.itemsize:
+        raise ValueError(
+            f"{len(data)} bytes is no whole number of points of"
+            f" {dtype.itemsize} bytes (cut off, or of another sensor)"
+        )
+    return np.frombuffer(data, dtype=dtype)
+
+
+def check_below(points: np.ndarray, name: str, limit: int) -> None:
+    """Refuses points with a number that their sensor does not have.
+
+    The numbers differ between files of two sensors.
+
+    Raises:
+        ValueError: if `points[name]` reaches `limit`.
+    """
+    if len(points) and points[name].max() >= limit:
+        raise ValueError(
+            f"{name}: {points[name].max()} is not below {limit} (of another"
+            " sensor)"
+        )
+
+
+def _returns(points: np.ndarray) -> np.ndarray:
+    """Leaves out points without a return, which are stored at the origin.
+
+    Raises:
+        ValueError: if a coordinate is not finite, or too large for a point.
+    """
+    is_return = np.zeros(len(points), dtype=bool)
+    for name in "xyz":
+        # A comparison with NaN is false, and NumPy warns of some NaN.
+        with np.errstate(over="ignore", invalid="ignore"):
+            bad = ~(np.abs(points[name]) < FARTHEST_RETURN)
+        if bad.any():
+            first = int(np.flatnonzero(bad)[0])
+            raise ValueError(
+                f"{name}: point {first} of {len(points)} is at"
+                f" {points[name][first]:g} m"
+            )
+        is_return |= points[name] != 0.0
+    return points[is_return]

@@ -1,0 +1,101 @@
+"""The table of drives: right figures, and never stale ones."""
+
+from dataclasses import replace
+import shutil
+
+from helpers.small_map import write_small_map
+import pytest
+import yaml
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.drive_facts import drive_facts
+from cns_drake.scenarios.drive_table import (
+    drive_rows,
+    write_table,
+)
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
+
+# A box has twelve triangles.
+BOX = 12
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A map with two drives; the stage of a third one is missing."""
+    folder = write_small_map(tmp_path / "boxes")
+    for name in ("01", "04"):
+        source = shipped_drives()[f"metropolis_{name}"]
+        entries = yaml.safe_load(source.read_text()) | {"map": "."}
+        path = folder / f"sequence_{name}.yaml"
+        path.write_text(yaml.safe_dump(entries))
+    text = (folder / "sequence_04.yaml").read_text()
+    (folder / "sequence_05.yaml").write_text(text.replace("'04'", "'05'"))
+    return folder
+
+
+def measured(folder):
+    """The rows, and the drives that were measured."""
+    lines = []
+    rows = drive_rows(folder, lines.append)
+    return rows, [line.split()[-1] for line in lines]
+
+
+def test_figures_are_those_of_the_drive_and_the_stage(folder):
+    rows, _ = measured(folder)
+    assert [row.sequence for row in rows] == ["boxes_01", "boxes_04"]
+    facts = drive_facts(load_scenario(folder / "sequence_04.yaml"))
+    assert rows[1].map == "boxes"
+    assert rows[1].stage == "04"
+    assert rows[1].frames == facts.frames
+    assert rows[1].length == pytest.approx(facts.length, abs=0.05)
+    assert rows[1].duration == pytest.approx(facts.duration, abs=0.005)
+    assert (rows[0].structures, rows[1].structures) == (20, 41)
+    assert (rows[0].triangles, rows[1].triangles) == (20 * BOX, 41 * BOX)
+
+
+def test_only_what_changed_is_measured_again(folder):
+    write_table(folder)
+    before, again = measured(folder)
+    assert again == []
+    stage = folder / "stage_01.sdf"
+    shutil.copy(folder / "stage_04.sdf", stage)
+    after, again = measured(folder)
+    assert again == ["boxes_01"]
+    assert after[0] == replace(
+        before[0],
+        checksum=after[0].checksum,
+        structures=41,
+        triangles=41 * BOX,
+    )
+    assert after[1] == before[1]
+    roads = folder / "roads.yaml"
+    roads.write_text(roads.read_text() + "# changed\n")
+    assert measured(folder)[1] == ["boxes_01", "boxes_04"]
+
+
+@pytest.mark.parametrize("text", ["", "drive\nboxes_01\n", "\0,\x80"])
+def test_a_spoilt_table_is_measured_anew(folder, text):
+    write_table(folder)
+    good = MapFolder(folder).drive_table.read_bytes()
+    MapFolder(folder).drive_table.write_bytes(text.encode("latin-1"))
+    assert measured(folder)[1] == ["boxes_01", "boxes_04"]
+    write_table(folder)
+    assert MapFolder(folder).drive_table.read_bytes() == good
+
+
+def test_a_drive_that_is_no_mapping_is_named(folder):
+    (folder / "sequence_01.yaml").write_text("- a\n")
+    with pytest.raises(InputError, match=r"sequence_01.yaml: not a mapping"):
+        drive_rows(folder)
+
+
+@pytest.mark.parametrize("name", sorted(shipped_maps()))
+def test_the_shipped_tables_are_up_to_date(name):
+    folder = shipped_maps()[name]
+    if not sorted(folder.glob("stage_*.sdf")):
+        assert not MapFolder(folder).drive_table.exists()
+        return
+    _, again = measured(folder)
+    assert again == []
