@@ -128,7 +128,7 @@ def test_fields_of_points(short_recording):
     (example,) = (
         block.text
         for block in documents.fenced(page)
-        if "drives.open(" in block.text
+        if "open_drive(" in block.text
     )
     scan = open_drive(short_recording).scan(0)
     assert f"# NumPy: {' '.join(scan.dtype.names)}\n" in example

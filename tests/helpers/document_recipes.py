@@ -284,7 +284,7 @@ RECIPES = {
         after=("family drives",),
     ),
     "Python": Recipe(
-        "from evaluation import drives",
+        "from evaluation import open_drive",
         changes=(_LAST,),
         after=("own city",),
         file="read.py",
