@@ -18,7 +18,7 @@ from shapely.geometry import Polygon
 from cns_drake.city.buildings import blocks, houses, public, shops, towers
 from cns_drake.city.buildings.archetypes import ARCHETYPES
 from cns_drake.city.buildings.landmarks import LANDMARKS, add_landmark
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
+from cns_drake.city.facades.assembly import Assembly, Dice, Site
 from cns_drake.city.geometry.structures import Model
 
 __all__ = ["ARCHETYPES", "sample"]

@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import BaseModel
 import yaml
 
-from cns_drake.city.buildings.parts.site import Assembly, Rgb, pick
+from cns_drake.city.facades.assembly import Assembly, Rgb, pick
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.object_meshes import read_mesh
 from cns_drake.city.geometry.object_parts import triple

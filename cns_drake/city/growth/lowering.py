@@ -14,8 +14,8 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Rgb, Site
+from cns_drake.city.facades.assembly import Assembly, Rgb, Site
+from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.object_parts import part_mesh
 from cns_drake.city.geometry.polygons import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import details
+from cns_drake.city.facades import details
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.imports.dressing.facade_plan import (
     FacadePlan,

@@ -11,7 +11,7 @@ from shapely import STRtree
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.buildings.parts.site import Rgb
+from cns_drake.city.facades.assembly import Rgb
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import (
     MeshShape,

@@ -8,11 +8,8 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon, box
 
-from cns_drake.city.buildings.parts.roof_equipment import (
-    add_chimney,
-    equip_roof,
-)
-from cns_drake.city.buildings.parts.site import Assembly, Site
+from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.geometry.structures import Model
 from cns_drake.imports.dressing.styles import Style, Use
 from cns_drake.imports.dressing.upper_sides import UpperSides

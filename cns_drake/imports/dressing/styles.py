@@ -10,7 +10,7 @@ import re
 from matplotlib.colors import to_rgb
 import numpy as np
 
-from cns_drake.city.buildings.parts.site import Rgb, pick
+from cns_drake.city.facades.assembly import Rgb, pick
 from cns_drake.imports.osm_lengths import count
 
 

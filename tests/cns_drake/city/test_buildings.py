@@ -22,9 +22,9 @@ from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.buildings.archetypes import GROUND_OVERHANG_M, HEAD_ROOM_M
 from cns_drake.city.buildings.blocks import brick_block
 from cns_drake.city.buildings.landmarks import LANDMARKS
-from cns_drake.city.buildings.parts.massing import FOUNDATION_M
-from cns_drake.city.buildings.parts.site import Dice, Site
 from cns_drake.city.buildings.towers import hotel, office
+from cns_drake.city.facades.assembly import Dice, Site
+from cns_drake.city.facades.massing import FOUNDATION_M
 from cns_drake.city.geometry.structures import MeshShape
 
 pytestmark = pytest.mark.slow

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon
 
-from cns_drake.city.buildings.parts import massing
-from cns_drake.city.buildings.parts.facades import (
+from cns_drake.city.facades import massing
+from cns_drake.city.facades.walls import (
     Arch,
     Band,
     Facade,

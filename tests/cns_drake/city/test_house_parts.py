@@ -2,15 +2,12 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city.buildings.house_parts import dormers, family_house
-from cns_drake.city.buildings.house_parts.openings import (
-    Openings,
-    free_stretches,
-)
-from cns_drake.city.buildings.parts import bays, massing, outlines
-from cns_drake.city.buildings.parts.facades import Arch, Patch
-from cns_drake.city.buildings.parts.site import Assembly, Site
-from cns_drake.city.buildings.parts.wings import Roof, Wing, add_roof
+from cns_drake.city.buildings.house_parts import family_house
+from cns_drake.city.facades import bays, massing, wings
+from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.facades.house_walls import Openings, free_stretches
+from cns_drake.city.facades.walls import Arch, Patch
+from cns_drake.city.facades.wings import Roof, Wing, add_roof
 from cns_drake.city.geometry.mesh import box_mesh
 
 HALL = Wing.at(0, 0, 20, 8, 6.0, 9.0, Roof())
@@ -95,7 +92,7 @@ def test_a_mirrored_wing():
 def test_dormers_stay_below_the_ridge_and_on_the_slope():
     for kind in ("gable", "shed", "flat"):
         house = assembly("d", walls=(1, 1, 1), glass=(0, 0, 1), roof=(1, 0, 0))
-        dormers.add_dormers(house, HALL, 2.0, 18.0, 3, kind)
+        wings.add_dormers(house, HALL, 2.0, 18.0, 3, kind)
         meshes = house.finish(GROUND).meshes
         corners = np.vstack([m.vertices for m in meshes.values()])
         assert corners[:, 2].max() < 9.0
@@ -111,7 +108,7 @@ def test_dormers_stay_below_the_ridge_and_on_the_slope():
 def test_no_dormer_on_a_flat_slope():
     wing = Wing.at(0, 0, 20, 16, 6.0, 8.0, Roof())
     house = assembly("d", walls=(1, 1, 1))
-    dormers.add_dormers(house, wing, 0.0, 20.0, 3, "gable")
+    wings.add_dormers(house, wing, 0.0, 20.0, 3, "gable")
     assert house.finish(GROUND).parts == ()
 
 
@@ -150,6 +147,6 @@ def test_corners_without_neighbours_are_free():
 def test_edges_of_a_plan_on_edges_of_its_site():
     site = massing.rectangle(0, 0, 10, 8)
     plan = np.array([(2, 0), (10, 0), (10, 8), (0, 8), (0, 2)])
-    assert outlines.edges_on(plan, site, {1, 3}) == {1, 3}
-    assert outlines.edges_on(plan, site, {0}) == {0}
-    assert outlines.edges_on(massing.inset(plan, 0.1), site, {0, 1}) == set()
+    assert massing.edges_on(plan, site, {1, 3}) == {1, 3}
+    assert massing.edges_on(plan, site, {0}) == {0}
+    assert massing.edges_on(massing.inset(plan, 0.1), site, {0, 1}) == set()

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon, box
 
-from cns_drake.city.buildings.parts import details, massing, outlines
+from cns_drake.city.facades import details, massing
 from cns_drake.city.geometry.mesh import merge_meshes
 
 _C, _S = math.cos(0.7), math.sin(0.7)
 # A rectangle of 14 m by 9 m, turned by 0.7 rad.
 TURNED = massing.rectangle(1, 2, 15, 11) @ np.array([[_C, _S], [-_S, _C]])
-COURT = outlines.u_shape(0, 0, 30, 20, 7, 8)
+COURT = massing.u_shape(0, 0, 30, 20, 7, 8)
 
 
 def area(points) -> float:
@@ -73,7 +73,7 @@ def test_rounded_corner_follows_its_circle_and_keeps_the_front(corner):
 
 
 def test_stadium_has_half_circles_left_and_right():
-    ring = outlines.stadium(0, 0, 40, 12, 1.0)
+    ring = massing.stadium(0, 0, 40, 12, 1.0)
     assert area(ring) == pytest.approx(28 * 12 + math.pi * 36, rel=0.01)
     np.testing.assert_allclose(ring[:2], [(6, 0), (34, 0)], atol=1e-9)
     assert Polygon(ring).exterior.is_ccw
@@ -81,17 +81,17 @@ def test_stadium_has_half_circles_left_and_right():
 
 def test_chamfers_and_notches_take_their_corners_out():
     square = massing.rectangle(0, 0, 10, 10)
-    assert area(outlines.chamfered(square, 2.0)) == pytest.approx(100 - 8)
-    notched = outlines.notched(square, 2.0)
+    assert area(massing.chamfered(square, 2.0)) == pytest.approx(100 - 8)
+    notched = massing.notched(square, 2.0)
     assert area(notched) == pytest.approx(100 - 16)
     np.testing.assert_allclose(notched[:2], [(2, 0), (8, 0)])
     # Reflex corners stay.
-    assert len(outlines.chamfered(COURT, 1.0)) == 8 + 6
+    assert len(massing.chamfered(COURT, 1.0)) == 8 + 6
 
 
 def test_mirrored_outline_keeps_front_and_turning():
-    shape = outlines.l_shape(0, 0, 20, 15, 6, 8)
-    mirrored = outlines.mirrored(shape)
+    shape = massing.l_shape(0, 0, 20, 15, 6, 8)
+    mirrored = massing.mirrored(shape)
     assert area(mirrored) == pytest.approx(area(shape))
     assert Polygon(mirrored).exterior.is_ccw
     np.testing.assert_allclose(mirrored[:2], [(0, 0), (20, 0)])

@@ -5,13 +5,13 @@ from helpers.mesh_checks import is_closed, out_of_plane, volume
 import numpy as np
 import pytest
 
-from cns_drake.city.buildings.parts import massing, pitched_roofs
-from cns_drake.city.buildings.parts.pitched_roofs import Hole
+from cns_drake.city.facades import massing, roofs
+from cns_drake.city.facades.roofs import Hole
 
 LINES = {
-    "gable": pitched_roofs.gable_line(2.0, 10.0, 5.0, 8.0, ridge=0.3),
-    "gambrel": pitched_roofs.gambrel_line(2.0, 10.0, 5.0, 8.0),
-    "barrel": pitched_roofs.barrel_line(2.0, 10.0, 5.0, 8.0),
+    "gable": roofs.gable_line(2.0, 10.0, 5.0, 8.0, ridge=0.3),
+    "gambrel": roofs.gambrel_line(2.0, 10.0, 5.0, 8.0),
+    "barrel": roofs.barrel_line(2.0, 10.0, 5.0, 8.0),
 }
 TURNED = massing.rectangle(1, 2, 15, 11) @ np.array([[0.6, 0.8], [-0.8, 0.6]])
 
@@ -46,7 +46,7 @@ def test_a_barrel_is_a_circle():
 @pytest.mark.parametrize("kind", LINES)
 def test_eaves_continue_the_slopes(kind):
     line = LINES[kind]
-    longer = pitched_roofs.with_eaves(line, 0.5, 0.25)
+    longer = roofs.with_eaves(line, 0.5, 0.25)
     assert longer[0][0] == pytest.approx(1.5)
     assert longer[-1][0] == pytest.approx(10.25)
     for k in (0, -2):
@@ -59,7 +59,7 @@ def test_eaves_continue_the_slopes(kind):
 @pytest.mark.parametrize("kind", LINES)
 def test_a_shell_is_a_closed_solid_of_even_thickness(kind, along_y):
     line = LINES[kind]
-    shell = pitched_roofs.shell(line, -3.0, 4.0, 0.2, along_y=along_y)
+    shell = roofs.shell(line, -3.0, 4.0, 0.2, along_y=along_y)
     assert is_closed(shell)
     assert out_of_plane(shell) < 1e-9
     assert volume(shell) == pytest.approx(8.0 * 7.0 * 0.2)
@@ -70,7 +70,7 @@ def test_a_shell_is_a_closed_solid_of_even_thickness(kind, along_y):
 
 def test_a_gable_wall_fills_the_space_below_its_line():
     line = LINES["gable"]
-    plain = pitched_roofs.gable_wall(line, 2.0, 10.0, 4.0)
+    plain = roofs.gable_wall(line, 2.0, 10.0, 4.0)
     # The wall reaches a few centimetres into the roof.
     wanted = area_below(line, 4.0)
     assert wanted < area(plain) < wanted + 8.0 * 0.04
@@ -80,9 +80,9 @@ def test_a_gable_wall_fills_the_space_below_its_line():
 def test_windows_of_a_gable_are_recesses_with_a_pane():
     line = LINES["gable"]
     holes = [Hole(4.0, 5.0, 4.5, 5.5, 0.3), Hole(5.5, 6.0, 4.2, 5.0, 0.1)]
-    plain = pitched_roofs.gable_wall(line, 2.0, 10.0, 4.0)
-    wall = pitched_roofs.gable_wall(line, 2.0, 10.0, 4.0, holes)
-    panes = pitched_roofs.gable_glass(holes)
+    plain = roofs.gable_wall(line, 2.0, 10.0, 4.0)
+    wall = roofs.gable_wall(line, 2.0, 10.0, 4.0, holes)
+    panes = roofs.gable_glass(holes)
     openings = 1.0 * 1.0 + 0.5 * 0.8
     reveals = 4.0 * 0.3 + 2.6 * 0.1
     assert area(panes) == pytest.approx(openings)
@@ -96,7 +96,7 @@ def test_windows_of_a_gable_are_recesses_with_a_pane():
 
 def test_a_hip_on_a_turned_rectangle():
     eaves, fascia, z, top = 0.5, 0.3, 6.0, 9.3
-    roof = pitched_roofs.hip(TURNED, z, top, eaves, fascia)
+    roof = roofs.hip(TURNED, z, top, eaves, fascia)
     assert out_of_plane(roof) < 1e-9
     # A box of 15 m by 10 m below, half a prism and a pyramid above.
     rise = top - z - fascia
@@ -105,7 +105,7 @@ def test_a_hip_on_a_turned_rectangle():
 
 
 def test_a_mansard_bends_at_its_knee():
-    roof = pitched_roofs.mansard(TURNED, 6.0, 8.5, 9.5, 0.6, 0.4)
+    roof = roofs.mansard(TURNED, 6.0, 8.5, 9.5, 0.6, 0.4)
     assert out_of_plane(roof) < 1e-9
     heights = np.unique(np.round(roof.vertices[:, 2], 6))
     np.testing.assert_allclose(heights, [6.0, 6.3, 8.5, 9.5])

@@ -7,10 +7,10 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import bays, details, massing, tiers
-from cns_drake.city.buildings.parts.facades import Band, Facade, Relief
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice, Site
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade, Relief
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _WALLS = (

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cns_drake.city.buildings.parts import bays, details, tiers
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
 
 _BRICKS = (
     (0.56, 0.33, 0.27),

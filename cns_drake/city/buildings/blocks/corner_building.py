@@ -7,16 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from cns_drake.city.buildings.archetypes import ARCHETYPES
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade, Relief
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade, Relief
 from cns_drake.city.geometry.mesh import Mesh
 
 _STUCCOS = ((0.84, 0.78, 0.66), (0.76, 0.66, 0.56), (0.82, 0.80, 0.76))
@@ -59,7 +53,7 @@ def build(p: Parameters, out: Assembly) -> None:
         site = site.detached(ARCHETYPES["corner_building"].overhang)
     rectangle = site.outline
     plan = massing.rounded(rectangle, {p.corner: p.radius}, 2.8)
-    blind = outlines.edges_on(plan, rectangle, site.blind_edges)
+    blind = massing.edges_on(plan, rectangle, site.blind_edges)
     bottom = _add_shops(out, p, plan, blind)
     top = _add_first_floor(out, p, plan, blind, bottom)
     room = p.height - p.dome_height - 2.2 - top

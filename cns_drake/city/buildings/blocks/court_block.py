@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.walls import Band, Facade
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 
@@ -50,10 +44,10 @@ class Parameters:
 
 def build(p: Parameters, out: Assembly) -> None:
     """Builds the block on a rectangle, its court open to the back."""
-    form = outlines.u_shape if p.shape == "U" else outlines.l_shape
+    form = massing.u_shape if p.shape == "U" else massing.l_shape
     plan = form(*out.site.bounds, p.wing, p.back)
     if p.mirrored:
-        plan = outlines.mirrored(plan)
+        plan = massing.mirrored(plan)
     bottom = _add_ground(out, p, plan)
     eaves = p.height - p.mansard_height
     groups, per_group, storey = tiers.divided(eaves - bottom, p.storey_height)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import bays, details, massing, tiers
-from cns_drake.city.buildings.parts.facades import Band, Facade, Relief
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade, Relief
 from cns_drake.city.geometry.mesh import merge_meshes
 
 _CONCRETES = ((0.74, 0.73, 0.70), (0.80, 0.77, 0.70), (0.66, 0.67, 0.68))

@@ -7,20 +7,10 @@ import itertools
 import numpy as np
 
 from cns_drake.city.buildings.house_parts import family_house
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    pitched_roofs,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade, Layout, Relief
-from cns_drake.city.buildings.parts.roof_equipment import (
-    add_chimney,
-    equip_roof,
-)
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, roofs, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import add_chimney, equip_roof
+from cns_drake.city.facades.walls import Band, Facade, Layout, Relief
 from cns_drake.city.geometry.mesh import Mesh
 
 _WALLS = (*family_house.BRICKS, (0.66, 0.50, 0.38), (0.72, 0.62, 0.50))
@@ -80,7 +70,7 @@ def build(p: Parameters, out: Assembly) -> None:
     body = massing.rectangle(left, y0 + _FRONT_M, right, y1 - _BACK_M)
     plan, stairs = _bay_front(p, body)
     site_outline = massing.rectangle(x0, y0, x1, y1)
-    blind = outlines.edges_on(plan, site_outline, site.blind_edges)
+    blind = massing.edges_on(plan, site_outline, site.blind_edges)
     top = _add_ground(out, p, plan, stairs, blind)
     goal = p.height - p.rise - (0.9 if p.roof == "flat" else 0.15)
     groups, per_group, storey = tiers.divided(goal - top, p.storey, 6)
@@ -201,7 +191,7 @@ def _add_top(
         equip_roof(out, body, z, p.roof_items)
         return
     eaves = (max(p.bay_reach + 0.15, 0.45), 0.45, 0.45, 0.45)
-    solid = pitched_roofs.hip(body, z0 - 0.02, p.height, eaves, 0.3)
+    solid = roofs.hip(body, z0 - 0.02, p.height, eaves, 0.3)
     out.add("roof", solid, rgb=p.roof_rgb)
     (ax, ay), (bx, by) = body[0], body[2]
     for k, share in enumerate((0.35, 0.65)):

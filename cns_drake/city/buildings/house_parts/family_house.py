@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cns_drake.city.buildings.house_parts import house_walls
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import wings
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Rgb
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import house_walls, wings
+from cns_drake.city.facades.assembly import Assembly, Dice, Rgb
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Roof, Wing
 
 WALLS = (
     (0.86, 0.84, 0.78),

@@ -8,18 +8,12 @@ import math
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import dormers, house_walls, porches
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import (
-    details,
-    massing,
-    pitched_roofs,
-    wings,
-)
-from cns_drake.city.buildings.parts.facades import Band, Patch
-from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Assembly, Rgb, pick
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import details, house_walls, massing, roofs, wings
+from cns_drake.city.facades.assembly import Assembly, Rgb, pick
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import add_chimney
+from cns_drake.city.facades.walls import Band, Patch
+from cns_drake.city.facades.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
 
 _ROOF_M = 0.2
@@ -160,7 +154,7 @@ def _add_entrance(
     if p.floor > 0.05:
         slab = wall.standing(a, b, -0.05, landing, p.floor, bottom=True)
         out.add_to("base", slab)
-        porches.add_steps(out, wall, a, b, landing, p.floor, run)
+        details.add_steps(out, wall, a, b, landing, p.floor, run)
     if p.canopy:
         z = p.floor + 2.4
         hood = wall.box(x - 0.8, x + 0.8, -0.05, 0.8, z, z + 0.14)
@@ -190,7 +184,7 @@ def _add_bay(
     high = min(foot + low + count * step - 0.1, wing.wall_top - 0.6)
     reach = min(0.6, 0.5 * p.stoop)
     openings.clear(0, x - width / 2 - 0.1, x + width / 2 + 0.1, low, high + 0.5)
-    porches.add_bay_window(
+    details.add_bay_window(
         out, wall, x, width, reach, round(low, 2), round(high, 2),
         storeys=count, canted=p.bay != "box",
     )  # fmt: skip
@@ -207,7 +201,7 @@ def add_roof(out: Assembly, p: RowUnit, wing: Wing) -> None:
         _add_gable_windows(out, wing)
     elif p.roof in ("gable", "gambrel"):
         _add_firewalls(out, wing)
-        dormers.add_dormers(out, wing, 0.0, wing.width, p.dormers, p.dormer)
+        wings.add_dormers(out, wing, 0.0, wing.width, p.dormers, p.dormer)
 
 
 def _stepped_gable(wing: Wing, wall: details.WallFrame) -> list[Mesh]:
@@ -234,8 +228,8 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
         wall = wing.wall(edge)
         for u in spots:
             pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, house_walls.GLASS_M)
-            frame = porches.casings([pane], (pane.depth,), "frame", 0.12)
-            glass = porches.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
+            frame = details.casings([pane], (pane.depth,), "frame", 0.12)
+            glass = details.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
             out.add_to("trim", *(wall.place(piece) for piece in frame))
             out.add_to("glass", wall.place(glass))
 
@@ -244,7 +238,7 @@ def _add_firewalls(out: Assembly, wing: Wing) -> None:
     """Raises the side walls above the roof."""
     line = [(u, z + _FIREWALL_M) for u, z in wing.line]
     for x in (wing.x0, wing.x1 - 0.3):
-        wall = pitched_roofs.shell(line, x, x + 0.3, _FIREWALL_M + 0.1)
+        wall = roofs.shell(line, x, x + 0.3, _FIREWALL_M + 0.1)
         out.add_to("walls", wall)
 
 
@@ -253,13 +247,13 @@ def add_stack(out: Assembly, p: RowUnit, wing: Wing, name: str) -> None:
     yaw = math.pi / 2
     if p.roof in ("front", "stepped"):
         x = wing.x0 + 0.3 * wing.width
-        z = pitched_roofs.line_height(wing.line, x)
+        z = roofs.line_height(wing.line, x)
         spot = (x, wing.y0 + 0.6 * wing.depth, z - 0.6)
         add_chimney(out, name, spot, p.brick, yaw=yaw)
         return
     x = wing.x0 + 0.45 if p.door_left else wing.x1 - 0.45
     y = wing.y0 + 0.55 * wing.depth
-    spot = (x, y, pitched_roofs.line_height(wing.line, y) - 0.8)
+    spot = (x, y, roofs.line_height(wing.line, y) - 0.8)
     row, scale = "chimney_row", (0.8, 0.85, 1.0)
     add_chimney(out, name, spot, p.brick, item=row, yaw=yaw, scale=scale)
 

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import porches
-from cns_drake.city.buildings.house_parts.openings import (
-    Openings,
-    free_stretches,
-)
-from cns_drake.city.buildings.parts import bays, details, massing, wings
-from cns_drake.city.buildings.parts.facades import Band, Patch
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, details, massing, wings
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings, free_stretches
+from cns_drake.city.facades.walls import Band, Patch
+from cns_drake.city.facades.wings import Roof, Wing
 
 _BOARDS = (
     (0.50, 0.22, 0.18),
@@ -158,13 +154,13 @@ def _add_doors(
         b = a + half
         brace = (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1)
         frame = [
-            porches.board(a, a + 0.18, 0.08, height, 0.15),
-            porches.board(b - 0.18, b, 0.08, height, 0.15),
-            porches.board(a, b, height - 0.18, height, 0.15),
-            porches.board(a, b, 0.08, 0.26, 0.15),
+            details.board(a, a + 0.18, 0.08, height, 0.15),
+            details.board(b - 0.18, b, 0.08, height, 0.15),
+            details.board(a, b, height - 0.18, height, 0.15),
+            details.board(a, b, 0.08, 0.26, 0.15),
             details.beam(*brace, 0.1),
         ]
-        leaf = porches.board(a, b, 0.08, height, 0.1)
+        leaf = details.board(a, b, 0.08, height, 0.1)
         out.add_to("doors", wall.place(leaf))
         out.add_to("trim", *(wall.place(m) for m in frame))
     rail = (x - width - 0.1, x + width + 0.1, 0.0, 0.18)
@@ -187,7 +183,7 @@ def _add_battens(
             u = a + x
             if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):
                 continue
-            strip = porches.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
+            strip = details.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
             out.add_to("walls", wall.place(strip))
 
 

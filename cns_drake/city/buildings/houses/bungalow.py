@@ -6,17 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import (
-    family_house,
-    house_walls,
-    porches,
-)
+from cns_drake.city.buildings.house_parts import family_house
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import massing
-from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import details, house_walls, massing
+from cns_drake.city.facades.assembly import Assembly, Dice, Site
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import add_chimney
+from cns_drake.city.facades.wings import Roof, Wing
 
 # Kept free around the walls, for wide eaves [m].
 _MARGIN = 0.75
@@ -160,7 +156,7 @@ def _add_main(
     reach = min(1.6, main.y0 - y0 - 0.4)
     if p.veranda and b - a > 4.0 and reach > 0.9:
         eaves = min(p.floor + 2.25, main.wall_top - 0.35)
-        porches.add_porch(
+        details.add_porch(
             out, wall, a + 0.25, b - 0.25, reach, p.floor, eaves,
             eaves + 0.4, posts=max(3, round((b - a) / 2.4)),
         )  # fmt: skip

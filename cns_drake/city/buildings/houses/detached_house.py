@@ -6,17 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import (
-    dormers,
-    family_house,
-    house_walls,
-    porches,
-)
+from cns_drake.city.buildings.house_parts import family_house
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M, STOREY_M
-from cns_drake.city.buildings.parts import bays
-from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, details, house_walls, wings
+from cns_drake.city.facades.assembly import Assembly, Dice, Site
+from cns_drake.city.facades.roofs import add_chimney
+from cns_drake.city.facades.wings import Roof, Wing
 
 # Kept free around the walls, for eaves and chimneys [m].
 _MARGIN = 0.5
@@ -166,7 +161,7 @@ def _add_main(out: Assembly, p: Parameters, plan: _Plan) -> None:
     _add_porch(out, p, plan, (a, b))
     family_house.close_box(out, main, openings, p.deck, p.casing)
     if p.roof in ("gable", "gambrel"):
-        dormers.add_dormers(out, main, a, b, p.dormers, p.dormer, 3.0)
+        wings.add_dormers(out, main, a, b, p.dormers, p.dormer, 3.0)
 
 
 def _add_porch(
@@ -183,18 +178,18 @@ def _add_porch(
         top = min(top, plan.main.wall_top + 0.1)
     full = p.porch == "full" and b - a > 3.5
     x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
-    porches.add_porch(
+    details.add_porch(
         out, wall, x0, x1, reach, p.deck, eaves, top,
         roof="shed" if p.porch == "full" else p.porch,
         posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
     )  # fmt: skip
     room = plan.ahead - reach - 0.02
-    porches.add_steps(out, wall, door - 0.7, door + 0.7, reach, p.deck, room)
+    details.add_steps(out, wall, door - 0.7, door + 0.7, reach, p.deck, room)
     if full and p.deck > 0.3:
         y = reach - 0.15
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
         for k, (start, end) in enumerate(runs):
-            porches.add_railing(
+            details.add_railing(
                 out, f"railing_{k}", wall, (start, y), (end, y), p.deck,
                 family_house.TRIM,
             )  # fmt: skip
@@ -209,7 +204,7 @@ def _add_wing(out: Assembly, p: Parameters, plan: _Plan, wing: Wing) -> None:
     is_front = wing.y0 < plan.main.y0
     if p.bay_window and is_front and wing.width > 3.0:
         size = (wing.width / 2, 2.2, 0.4, 0.0, p.deck + 2.3)
-        porches.add_bay_window(out, wing.wall(0), *size)
+        details.add_bay_window(out, wing.wall(0), *size)
 
 
 def _add_chimney(out: Assembly, p: Parameters, plan: _Plan) -> None:
@@ -217,7 +212,7 @@ def _add_chimney(out: Assembly, p: Parameters, plan: _Plan) -> None:
     if p.chimney == "breast":
         wall = main.wall(1 if p.mirrored else 3)
         x = wall.length / 2
-        breast = porches.chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
+        breast = details.chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
         out.add_to("base", breast)
         spot = (*wall.point(x, 0.18), main.top - 0.9)
         add_chimney(out, "chimney", spot, family_house.BASE, yaw=np.pi / 2)

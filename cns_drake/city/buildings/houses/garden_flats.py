@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import family_house, house_walls
+from cns_drake.city.buildings.house_parts import family_house
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, details, wings
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, details, house_walls, wings
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import add_chimney
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 

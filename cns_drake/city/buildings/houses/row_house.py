@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from cns_drake.city.buildings.house_parts import (
-    family_house,
-    house_walls,
-    row_unit,
-)
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.buildings.house_parts import family_house, row_unit
+from cns_drake.city.facades import house_walls
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.wings import Roof, Wing
 
 _WALLS = (
     *family_house.BRICKS,

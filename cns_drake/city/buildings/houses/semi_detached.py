@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import (
-    family_house,
-    house_walls,
-    porches,
-)
+from cns_drake.city.buildings.house_parts import family_house
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M, STOREY_M
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import details, house_walls
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import add_chimney
+from cns_drake.city.facades.wings import Roof, Wing
 
 # Kept free around the walls, for eaves [m].
 _MARGIN = 0.5
@@ -135,16 +132,16 @@ def _add_entrances(
     for x in (half - offset, half + offset):
         house_walls.add_door(out, main, openings, 0, x, p.floor)
         if not p.doors_inside:
-            porches.add_porch(out, wall, x - 0.85, x + 0.85, *size)
+            details.add_porch(out, wall, x - 0.85, x + 0.85, *size)
     if p.doors_inside:
-        porches.add_porch(
+        details.add_porch(
             out, wall, half - 1.6, half + 1.6, *size, roof="flat", posts=3
         )
     for x in _middles(p, main) if p.bay == "canted" else ():
         width = min(2.4, 0.5 * half)
         ends = (x - width / 2 - 0.1, x + width / 2 + 0.1)
         openings.clear(0, *ends, 0.0, p.floor + STOREY_M - 0.2)
-        porches.add_bay_window(
+        details.add_bay_window(
             out, wall, x, width, min(0.7, room - 0.1), 0.0,
             round(p.floor + 2.3, 2),
         )  # fmt: skip

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from cns_drake.city.buildings.house_parts import (
-    family_house,
-    house_walls,
-    porches,
-    row_unit,
-    shop_fronts,
-)
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, tiers
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Wing
+from cns_drake.city.buildings.house_parts import family_house, row_unit
+from cns_drake.city.facades import bays, details, house_walls, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Wing
 
 _WALLS = (
     *family_house.BRICKS,
@@ -106,7 +100,7 @@ def build(p: Parameters, out: Assembly) -> None:
     if p.unit.roof == "flat" and room > 0.8:
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.25))
-    glass = (house_walls.GLASS_M, *shop_fronts.SHOP_GLASS_M)
+    glass = (house_walls.GLASS_M, *house_walls.SHOP_GLASS_M)
     openings.add_walls(out, glass, bands)
     row_unit.add_roof(out, p.unit, wing)
     if p.unit.roof == "flat":
@@ -123,7 +117,7 @@ def _add_ground(
     door, length = 1.7 * (p.unit.floor < p.height - 3.0), wall.length
     left = p.unit.door_left
     start, end = (door, length) if left else (0.0, length - door)
-    shop_fronts.add_shops(
+    house_walls.add_shops(
         out, wall, openings, 0, start, end, p.unit.floor,
         width=p.shop_width, awnings=p.awnings,
     )  # fmt: skip
@@ -156,7 +150,7 @@ def _add_oriels(
         openings.clear(
             0, x - width / 2 - 0.15, x + width / 2 + 0.15, low, high + 0.4
         )
-        porches.add_bay_window(
+        details.add_bay_window(
             out, wall, x, width, 0.6, low, high,
             storeys=max(1, upper - 1), canted=p.unit.bay != "box",
         )  # fmt: skip

@@ -8,11 +8,7 @@ import numpy as np
 
 from cns_drake.city.buildings.house_parts import family_house, row_unit
 from cns_drake.city.buildings.house_parts.row_unit import RowUnit
-from cns_drake.city.buildings.parts.site import (
-    Assembly,
-    Dice,
-    pick,
-)
+from cns_drake.city.facades.assembly import Assembly, Dice, pick
 
 _DOORS = ("accent", "trim", "roof")
 

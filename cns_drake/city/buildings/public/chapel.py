@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts.openings import (
-    Openings,
-    free_stretches,
-)
-from cns_drake.city.buildings.parts import bays, massing, wings
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, massing, wings
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings, free_stretches
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
 
 _WALLS = (

@@ -7,20 +7,10 @@ import math
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts.porches import add_railing
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    pitched_roofs,
-)
-from cns_drake.city.buildings.parts.facades import (
-    Band,
-    Facade,
-    facade_mesh,
-    glass_mesh,
-)
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, roofs
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.details import add_railing
+from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 
 _TIMBERS = ((0.88, 0.87, 0.83), (0.44, 0.34, 0.26), (0.34, 0.42, 0.38))
 _ROOFS = ((0.34, 0.46, 0.42), (0.44, 0.28, 0.23), (0.36, 0.37, 0.40))
@@ -185,16 +175,14 @@ def _add_shelter(out: Assembly, p: Parameters, area: massing.Area) -> None:
     ceiling = massing.prism(frame, z - 0.25, z + 0.02, bottom=True)
     out.add_to("timber", ceiling)
     if p.bell:
-        roof = pitched_roofs.hip(plan, z, p.height, 0.55, 0.15)
+        roof = roofs.hip(plan, z, p.height, 0.55, 0.15)
     else:
         along_y = d - c > b - a
         low, high = (a, b) if along_y else (c, d)
         start, end = (c, d) if along_y else (a, b)
-        line = pitched_roofs.gable_line(low, high, z + 0.15, p.height)
-        line = pitched_roofs.with_eaves(line, 0.5, 0.5)
-        roof = pitched_roofs.shell(
-            line, start - 0.5, end + 0.5, 0.15, along_y=along_y
-        )
+        line = roofs.gable_line(low, high, z + 0.15, p.height)
+        line = roofs.with_eaves(line, 0.5, 0.5)
+        roof = roofs.shell(line, start - 0.5, end + 0.5, 0.15, along_y=along_y)
     out.add_to("roof", roof)
     _add_tables(out, (a, b, c, d), floor)
 

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    pitched_roofs,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, details, massing, roofs, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
+from cns_drake.city.facades.wings import Roof, Wing
 
 _WALLS = ((0.62, 0.42, 0.34), (0.82, 0.76, 0.64), (0.74, 0.72, 0.68))
 _ROOFS = ((0.44, 0.28, 0.23), (0.36, 0.37, 0.40))
@@ -115,7 +109,7 @@ def _add_classes(out: Assembly, p: Parameters, bar: np.ndarray) -> float:
     out.add("foundation", massing.foundation(bar))
     top = tiers.add_storeys(out, bar, walls, 0.0, p.storeys, 1)
     if p.roof == "hip":
-        roof = pitched_roofs.hip(bar, top - 0.02, p.height, 0.5, 0.3)
+        roof = roofs.hip(bar, top - 0.02, p.height, 0.5, 0.3)
         out.add("hip", roof, rgb=p.roof_rgb)
         return top
     rim = 0.7

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from cns_drake.city.buildings.house_parts.openings import (
-    Openings,
-    free_stretches,
-)
-from cns_drake.city.buildings.parts import bays, massing, pitched_roofs
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, massing, roofs
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings, free_stretches
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Roof, Wing
 
 _WALLS = ((0.80, 0.78, 0.74), (0.62, 0.44, 0.36), (0.66, 0.70, 0.72))
 _ROOFS = ((0.42, 0.46, 0.50), (0.52, 0.30, 0.24), (0.36, 0.44, 0.40))
@@ -140,7 +137,7 @@ def _add_frames(
     start, end = hall.ridge
     for u, _ in bays.stretches(end - start, p.bay, 0.5)[1:]:
         ends = (start + u - 0.18, start + u + 0.18)
-        rib = pitched_roofs.shell(line, *ends, 0.25, along_y=hall.roof.along_y)
+        rib = roofs.shell(line, *ends, 0.25, along_y=hall.roof.along_y)
         out.add_to("frames", rib)
 
 

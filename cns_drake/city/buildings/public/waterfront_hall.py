@@ -6,14 +6,9 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import bays, details, massing
-from cns_drake.city.buildings.parts.facades import (
-    Band,
-    Facade,
-    facade_mesh,
-    glass_mesh,
-)
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _WALLS = ((0.60, 0.36, 0.29), (0.62, 0.62, 0.60), (0.70, 0.64, 0.52))

@@ -5,15 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.city.buildings.archetypes import ARCHETYPES
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
 from cns_drake.city.geometry.mesh import Mesh
 
 _WALLS = (
@@ -67,7 +62,7 @@ def build(p: Parameters, out: Assembly) -> None:
         site = site.detached(ARCHETYPES["corner_store"].overhang)
     rectangle = site.outline
     plan, front = _plan(p, rectangle)
-    blind = outlines.edges_on(plan, rectangle, site.blind_edges)
+    blind = massing.edges_on(plan, rectangle, site.blind_edges)
     side = (front - 1) % 5 if p.corner == 0 else (front + 1) % 5
     top = _add_shop(out, p, plan, (0, front, side), blind)
     room = p.height - (p.raised + 0.6) - top

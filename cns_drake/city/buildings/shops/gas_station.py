@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, massing, pitched_roofs
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Wing
+from cns_drake.city.facades import bays, massing, roofs
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Wing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _BRANDS = (
@@ -94,7 +94,7 @@ def _add_canopy(out: Assembly, p: Parameters, canopy: np.ndarray) -> None:
     if p.sloped:
         middle = (y0 + y1) / 2
         line = [(y0, top - 0.3), (middle, top - 0.9), (y1, top - 0.3)]
-        out.add_to("brand", pitched_roofs.shell(line, x0, x1, 0.35))
+        out.add_to("brand", roofs.shell(line, x0, x1, 0.35))
         low = top - 1.2
         rim = (x0 + 0.5, x1 - 0.5, middle - 0.4, middle + 0.4, low, top - 0.6)
         out.add_to("steel", massing.box(*rim))

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import porches
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    pitched_roofs,
-)
-from cns_drake.city.buildings.parts.facades import Band, Patch
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, details, massing, roofs
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.walls import Band, Patch
+from cns_drake.city.facades.wings import Roof, Wing
 
 _STALLS = (
     (0.30, 0.42, 0.36),
@@ -130,7 +124,7 @@ def _add_stall(
         openings.add(0, shutter(a - 0.3, b + 0.3))
     door = bays.window(0.9, 0.05, 2.0, 0.12)
     openings.row((2,), 0.2, wall.length, [door], 0.3)
-    sign = porches.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
+    sign = details.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
     out.add_to("awning", wall.place(sign))
     bands = (Band(0.0, 0.25, -0.05),)
     openings.enclose(out, (0.12,), bands, material)
@@ -153,7 +147,7 @@ def _add_arcade(
     low, y = 2.35, front - p.arcade
     top = min(2.9, p.height - 0.4)
     line = [(y - 0.15, low + 0.15), (front + 0.05, top)]
-    out.add_to("roof", pitched_roofs.shell(line, a, b, 0.12))
+    out.add_to("roof", roofs.shell(line, a, b, 0.12))
     for x in np.linspace(a + 0.15, b - 0.15, max(2, round((b - a) / 3.2))):
         post = massing.standing(x - 0.08, x + 0.08, y, y + 0.16, low + 0.1)
         out.add_to("timber", post)

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts import (
-    family_house,
-    house_walls,
-    shop_fronts,
-)
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.buildings.house_parts import family_house
+from cns_drake.city.facades import bays, house_walls
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Roof, Wing
 
 _WALLS = (
     (0.78, 0.74, 0.66),
@@ -118,13 +114,13 @@ def _add_unit(out: Assembly, p: Parameters, wing: Wing, tall: bool) -> None:
         openings, (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
         head=min(2.3, storey - 0.4),
     )  # fmt: skip
-    shop_fronts.add_shops(
+    house_walls.add_shops(
         out, wall, openings, 0, 0.2, wall.length - 0.2, p.ground,
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
     back = [bays.gate(2.0, 2.2, 0.2), house_walls.sash(1.0, 0.0, 1.6, 2.3)]
     openings.row((2,), 0.5, 3.6, back, 0.7)
-    glass = (house_walls.GLASS_M, *shop_fronts.SHOP_GLASS_M)
+    glass = (house_walls.GLASS_M, *house_walls.SHOP_GLASS_M)
     openings.enclose(out, glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
         z, reach = p.ground - 0.95, p.canopy_reach

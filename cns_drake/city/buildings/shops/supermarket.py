@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, details
-from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.facades import bays, details
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Roof, Wing
 
 _WALLS = (
     (0.82, 0.80, 0.76),

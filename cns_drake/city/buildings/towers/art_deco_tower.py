@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.walls import Band, Facade
 
 _STONES = ((0.76, 0.70, 0.60), (0.68, 0.64, 0.58), (0.70, 0.58, 0.48))
 
@@ -57,7 +51,7 @@ class Parameters:
 def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower on a rectangle."""
     base = out.site.outline
-    plan = outlines.notched(base, p.notch) if p.notch else base
+    plan = massing.notched(base, p.notch) if p.notch else base
     top = _add_ground(out, p, plan)
     crown_height = round(min(0.16 * p.height, 16.0), 1)
     goals = [p.height * f for f, _, _ in p.steps] + [p.height - crown_height]
@@ -71,7 +65,7 @@ def build(p: Parameters, out: Assembly) -> None:
         _add_terrace(out, plan, top, k)
         _, across, along = p.steps[k]
         plan = massing.inset(base, (across, along, across, along))
-        plan = outlines.notched(plan, p.notch) if p.notch else plan
+        plan = massing.notched(plan, p.notch) if p.notch else plan
     _add_crown(out, p, plan, top)
 
 

@@ -6,15 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import bays, details, massing, tiers
-from cns_drake.city.buildings.parts.facades import (
-    Band,
-    Facade,
-    Relief,
-    facade_mesh,
-)
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade, Relief, facade_mesh
 from cns_drake.city.geometry.mesh import merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
 
 _TINTS = (
     ((0.62, 0.66, 0.70), (0.24, 0.34, 0.42)),
@@ -102,9 +96,9 @@ def build(p: Parameters, out: Assembly) -> None:
 def _shaped(outline: np.ndarray, p: Parameters) -> np.ndarray:
     size = p.corner_size
     if p.corner == "chamfered":
-        return outlines.chamfered(outline, size)
+        return massing.chamfered(outline, size)
     if p.corner == "notched":
-        return outlines.notched(outline, 0.6 * size)
+        return massing.notched(outline, 0.6 * size)
     if p.corner == "rounded":
         corners = dict.fromkeys(range(len(outline)), size)
         return massing.rounded(outline, corners, 3.5)

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice, Site
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
 
 _CLADDINGS = (
     (0.80, 0.78, 0.74),
@@ -94,7 +88,7 @@ def _plan(p: Parameters, site: Site) -> np.ndarray:
     x0, y0, x1, y1 = site.bounds
     base = massing.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
     if p.plan == "notched":
-        return outlines.notched(base, p.shift * massing.shortest_side(base))
+        return massing.notched(base, p.shift * massing.shortest_side(base))
     if p.plan == "box":
         return base
     (a, c), (b, d) = base[0], base[2]

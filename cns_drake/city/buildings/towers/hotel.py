@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
 
 _PAINTS = ((0.86, 0.83, 0.77), (0.80, 0.72, 0.62), (0.72, 0.75, 0.76))
 _FORECOURT_M = 7.0
@@ -49,7 +43,7 @@ def build(p: Parameters, out: Assembly) -> None:
     x0, y0, x1, y1 = out.site.bounds
     front = y0 + _FORECOURT_M
     if p.round_ends:
-        plan = outlines.stadium(x0, front, x1, y1, 3.2)
+        plan = massing.stadium(x0, front, x1, y1, 3.2)
     else:
         block = massing.rectangle(x0, front, x1, y1)
         plan = massing.rounded(block, {0: p.corner, 1: p.corner}, 2.8)

@@ -6,16 +6,10 @@ import math
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import (
-    bays,
-    details,
-    massing,
-    outlines,
-    tiers,
-)
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _CLADDINGS = (
@@ -75,7 +69,7 @@ def build(p: Parameters, out: Assembly) -> None:
     plan = massing.rectangle(left, near, right, far)
     _add_garden(out, plan, roof)
     if p.chamfer:
-        plan = outlines.chamfered(plan, p.chamfer)
+        plan = massing.chamfered(plan, p.chamfer)
     out.rgb = p.tower_rgb
     _add_tower(out, p, plan, roof)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import bays, details, massing, tiers
-from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
 
 _CONCRETES = ((0.66, 0.65, 0.62), (0.74, 0.71, 0.66), (0.58, 0.58, 0.58))
 

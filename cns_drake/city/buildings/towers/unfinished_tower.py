@@ -6,14 +6,9 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.buildings.parts import bays, details, massing
-from cns_drake.city.buildings.parts.facades import (
-    Band,
-    Facade,
-    facade_mesh,
-    glass_mesh,
-)
-from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.facades import bays, details, massing
+from cns_drake.city.facades.assembly import Assembly, Dice
+from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _CONCRETE = (0.66, 0.65, 0.63)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 
-from cns_drake.city.buildings.parts import massing
+from cns_drake.city.facades import massing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape

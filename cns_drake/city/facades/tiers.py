@@ -9,22 +9,15 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.city.buildings.parts import bays, details, massing
-from cns_drake.city.buildings.parts.bays import Bay
-from cns_drake.city.buildings.parts.facades import (
-    Band,
-    Facade,
-    facade_mesh,
-    glass_mesh,
-)
-from cns_drake.city.buildings.parts.site import Assembly, pick
+from cns_drake.city.facades import bays, details, massing
+from cns_drake.city.facades.assembly import Assembly, pick
+from cns_drake.city.facades.bays import Bay
+from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # A pane cuts this far into the reveals in front of it, so that no ray passes
 # between the two [m].
 _PANE_OVERLAP = 0.004
-
-
 AWNINGS = (
     (0.55, 0.18, 0.16),
     (0.20, 0.36, 0.28),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from cns_drake.city.buildings.parts.facades import Arch, Layout, Patch, Relief
+from cns_drake.city.facades.walls import Arch, Layout, Patch, Relief
 
 Bay = Callable[[float, float], list[Relief]]
 # Start and end of a stretch [m].

@@ -1,1 +1,0 @@
-"""Parts of all buildings: masses, facades, roofs."""

@@ -1,0 +1,1 @@
+"""One grammar of walls, windows, doors, shop fronts, balconies and roofs."""
