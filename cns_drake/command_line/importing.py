@@ -14,10 +14,10 @@ from cns_drake.base.garbage import uncollected
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, print_rows
 from cns_drake.imports.building_years import Undated
-from cns_drake.imports.import_report import DriveOn, ImportOptions
+from cns_drake.imports.options import DriveOn, ImportOptions
 
 if TYPE_CHECKING:
-    from cns_drake.imports.import_report import ImportReport
+    from cns_drake.imports.options import ImportReport
 
 # Share of the buildings that the first stage of a city without years lacks.
 _GROW = 0.3

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
+import hashlib
 
 import numpy as np
 
@@ -16,8 +17,25 @@ from cns_drake.city.geometry.structures import (
     Part,
     Structure,
 )
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.street_lanes import Street
+from cns_drake.imports.drives.city_drives import Street
+from cns_drake.imports.options import ImportFaults
+
+
+def lot(seed: int, purpose: str, name: str) -> float:
+    """Returns a number from 0 to 1 that depends on the arguments only."""
+    return _number(seed, purpose, name) / 2.0**64
+
+
+def lot_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
+    """Returns a generator whose draws depend on the arguments only."""
+    return np.random.default_rng(_number(seed, purpose, name))
+
+
+def _number(seed: int, purpose: str, name: str) -> int:
+    text = f"{seed}/{purpose}/{name}".encode()
+    digest = hashlib.blake2b(text, digest_size=8).digest()
+    return int.from_bytes(digest, "big")
+
 
 Rgb = tuple[float, float, float]
 

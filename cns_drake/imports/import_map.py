@@ -18,24 +18,37 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.side_by_side import begun
 from cns_drake.base.map_folder import LANES_NAME
 from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing.whole_city import dress_city
-from cns_drake.imports.drive_files import write_drives
-from cns_drake.imports.drive_search import find_drives
+from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
+from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
+from cns_drake.imports.drives.search import (
+    WaypointDrive,
+    find_drives,
+    steerable_drive,
+)
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.free_drives import CellGraph
-from cns_drake.imports.free_space import FreeSpace, find_free_space
-from cns_drake.imports.grown_city import grow
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.import_ground import Ground, bottom_of, ground_of
-from cns_drake.imports.import_report import DriveOn, ImportOptions, ImportReport
-from cns_drake.imports.import_structures import import_cityjson
-from cns_drake.imports.map_files import map_draft, write_facts, write_world
-from cns_drake.imports.near_drives import drive_along
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.osm_traffic import lanes_of_streets
-from cns_drake.imports.staged_city import StagedCity, stage_city
-from cns_drake.imports.street_drives import StreetGraph
-from cns_drake.imports.waypoint_drives import WaypointDrive, steerable_drive
+from cns_drake.imports.ground import Ground, bottom_of, ground_of
+from cns_drake.imports.map_files import (
+    map_draft,
+    write_drives,
+    write_facts,
+    write_world,
+)
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
+from cns_drake.imports.options import (
+    DriveOn,
+    ImportFaults,
+    ImportOptions,
+    ImportReport,
+)
+from cns_drake.imports.staged_city import (
+    StagedCity,
+    drive_along,
+    grow,
+    stage_city,
+)
 
 Progress = Callable[[str], None]
 # Receives the folder, and the numbers of structures and triangles by stage.
@@ -102,7 +115,7 @@ def _import_city(
 
         def draw() -> None:
             # Slow to import.
-            from cns_drake.imports.overview import draw_overview
+            from cns_drake.imports.map_files import draw_overview
 
             draw_overview(draft / "from_above.png", bare, space, drives)
 
@@ -192,8 +205,7 @@ def _import_roads(
     finish: Finish,
 ) -> ImportReport:
     with uninterrupted():  # They import the whole city generator.
-        from cns_drake.imports.opendrive.town import build_town
-        from cns_drake.imports.opendrive.town_files import write_town
+        from cns_drake.imports.opendrive.town import build_town, write_town
 
     town = build_town(source, options.seed, progress, options.dressed)
     with map_draft(output) as draft:

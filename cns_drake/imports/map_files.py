@@ -9,7 +9,11 @@ from itertools import chain
 import os
 from pathlib import Path
 import shutil
+from typing import Any
 
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+import numpy as np
 import yaml
 
 from cns_drake.base.files import part_path, user_errors
@@ -24,10 +28,12 @@ from cns_drake.city.geometry.structures import (
     Structure,
 )
 from cns_drake.imports.dressing.whole_city import Dressing
-from cns_drake.imports.foreign_city import ForeignCity
-from cns_drake.imports.grown_city import Growth
-from cns_drake.imports.import_report import ImportOptions
-from cns_drake.imports.staged_city import StagedCity
+from cns_drake.imports.drives.free_space import CELL, FreeSpace
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.foreign_city import ForeignCity, Imported
+from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.staged_city import Growth, StagedCity
+from cns_drake.scene.semantics import CLASS_RGB
 
 OF_BOX = 12  # triangles
 # Meshes are written in this many parts, side by side.
@@ -201,3 +207,121 @@ def with_column(table: str, name: str, values: Sequence[str]) -> str:
     lines = table.splitlines()
     rows = zip(lines, [name, *values], strict=True)
     return "".join(f"{line},{value}\n" for line, value in rows)
+
+
+_CRUISE = 8.0  # [m/s]
+_ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
+
+
+def write_drives(
+    folder: Path,
+    stages: Mapping[str, str],
+    routes: Sequence[np.ndarray],
+    cruise: Sequence[float] = (_CRUISE, _CRUISE),
+) -> None:
+    """Writes routes, and scenarios of each through every stage.
+
+    Args:
+        folder: of the map, with the map's name.
+        stages: stage -> words for its time, the end of a title.
+        routes: waypoints (N, 3) of at most two [m].
+        cruise: speed on each [m/s].
+    """
+    for letter, waypoints in zip("ab", routes, strict=False):
+        rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]
+        text = "\n".join(["x,y,z", *rows, ""])
+        (folder / f"route_{letter}.csv").write_text(text, "utf-8")
+    speeds = dict(zip("ab", cruise, strict=False))
+    for number, (stage, when) in enumerate(stages.items()):
+        # The query drive is in the last stage, on another route than the
+        # databases.
+        letters = "ab"[: len(routes)]
+        if number < len(stages) - 1:
+            letters = letters[::-1]
+        for kind, letter in zip(("sequence", "other"), letters, strict=False):
+            scenario = {
+                "map": ".",
+                "stage": stage,
+                "title": f"Route {letter} through {folder.name}{when}",
+                "waypoints": f"route_{letter}.csv",
+                "speeds": {"cruise": speeds[letter], **_ACCELERATION},
+            }
+            text = yaml.safe_dump(scenario, sort_keys=False)
+            (folder / f"{kind}_{stage}.yaml").write_text(text, "utf-8")
+
+
+_DPI = 130
+_INCHES = 9.0
+_ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
+
+
+def draw_overview(
+    path: Path,
+    structures: Sequence[Imported],
+    space: FreeSpace | None,
+    drives: Sequence[WaypointDrive],
+) -> None:
+    """Draws structures, the room for a car, and the drives [m].
+
+    Args:
+        path: the picture to write.
+        structures: of the whole city.
+        space: the room for a car, if it is to be drawn.
+        drives: the drives that were found.
+    """
+    corners = np.concatenate(
+        [one.triangles.reshape(-1, 3) for one in structures]
+    )
+    low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
+    if space is not None:
+        low = space.low
+        high = low + CELL * np.array(space.clearance.shape[::-1])
+    size = _INCHES * (high - low) / (high - low).max()
+    figure = Figure(
+        figsize=(size[0] + 0.8, size[1] + 0.6), layout="constrained"
+    )
+    axes = figure.subplots()
+    for is_ground in (True, False):
+        alike: dict[tuple[float, float, float], list[np.ndarray]] = {}
+        for one in structures:
+            if one.is_ground == is_ground and one.kind != "TINRelief":
+                alike.setdefault(_colour(one), []).append(one.triangles)
+        for colour, triangles in alike.items():
+            # An array, which the library takes faster than a list, is none of
+            # what its hints allow.
+            corners_xy: Any = np.concatenate(triangles)[:, :, :2]
+            axes.add_collection(
+                PolyCollection(
+                    corners_xy,
+                    facecolors=[colour],
+                    # Without this, fine lines show between triangles.
+                    edgecolors="face",
+                    linewidths=0.3,
+                )
+            )
+    extent = (low[0], high[0], low[1], high[1])
+    if space is not None:
+        room = np.where(space.clearance >= space.least, 1.0, np.nan)
+        axes.imshow(
+            room,
+            origin="lower",
+            extent=extent,
+            cmap="summer",
+            alpha=0.35,
+            vmax=1.2,
+        )
+    for drive, line in zip(drives, _ROUTE_COLOURS, strict=False):
+        axes.plot(*drive.path.T, color=line, linewidth=2.0)
+        axes.plot(*drive.path[0], "o", color=line)
+        axes.plot(*drive.path[-1], "s", color=line)
+    axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x [m]", ylabel="y [m]")
+    axes.set_aspect("equal")
+    axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+
+
+def _colour(one: Imported) -> tuple[float, float, float]:
+    part = one.structure.model.parts[0]
+    if one.structure.semantic_class == "vegetation":
+        return CLASS_RGB["vegetation"]
+    return part.rgb or CLASS_RGB[one.structure.semantic_class]

@@ -2,24 +2,159 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+import shapely
+from shapely import STRtree
+from shapely.geometry import MultiLineString
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.structure_rows import MAX_STRUCTURES
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.building_years import (
     stage_names,
     stands_at,
     stands_today,
 )
-from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.gone_buildings import with_gone
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.import_report import ImportOptions
-from cns_drake.imports.near_drives import keep_near
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.drives.search import WaypointDrive, driven_path
+from cns_drake.imports.foreign_city import ForeignCity, Imported, lot
+from cns_drake.imports.options import ImportFaults, ImportOptions
+from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.roads.u_turn import TIGHTEST_RADIUS
+from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
+
+
+def drive_along(path: Path) -> WaypointDrive:
+    """Returns a drive along waypoints of a file, without their heights.
+
+    Raises:
+        InputError: if the file cannot be used, or a bend is too tight.
+    """
+    points, _ = read_waypoints(path)
+    control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
+    driven, radii = driven_path(control)
+    radius, (x, y) = radii.min(), driven[radii.argmin()]
+    if radius < TIGHTEST_RADIUS:
+        raise InputError(
+            f"{path}: a bend at {x:.1f}, {y:.1f} has a radius of {radius:.2f} "
+            f"m; the car needs {TIGHTEST_RADIUS:.2f} m"
+        )
+    return WaypointDrive(points[:, :2], control)
+
+
+def keep_near(
+    structures: Sequence[Imported],
+    drives: Sequence[WaypointDrive],
+    distance: float,
+    faults: ImportFaults,
+) -> list[Imported | None]:
+    """Returns the structures, and the part of the terrain, near drives.
+
+    Other structures become None.
+
+    Args:
+        structures: of the city.
+        drives: at least one.
+        distance: greatest distance of a structure's nearest corner, or of its
+            bounding box [m].
+        faults: counts the structures left out.
+    """
+    ways = MultiLineString([drive.path for drive in drives])
+    shapely.prepare(ways)
+    kept: list[Imported | None] = []
+    for one in structures:
+        corners = one.triangles.reshape(-1, 3)
+        if not _near(corners[None], ways, distance)[0]:
+            name = one.structure.name
+            faults.add("structure far from the drives, left out", name)
+            kept.append(None)
+        elif one.kind == "TINRelief":
+            kept.append(_cropped(one, ways, distance))
+        else:
+            kept.append(one)
+    return kept
+
+
+def _near(
+    things: np.ndarray, ways: BaseGeometry, distance: float
+) -> np.ndarray:
+    """Returns which of M things of N corners (M, N, 3) have a box nearby."""
+    low, high = things[:, :, :2].min(axis=1), things[:, :, :2].max(axis=1)
+    boxes = shapely.box(*low.T, *high.T)
+    return np.asarray(shapely.dwithin(boxes, ways, distance))
+
+
+def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
+    """Returns the near part of a terrain, unchanged."""
+    meshes = {}
+    for name, mesh in one.structure.model.meshes.items():
+        faces = mesh.triangles()
+        near = faces[_near(mesh.vertices[faces], ways, distance)]
+        used, index = np.unique(near, return_inverse=True)
+        corners = map(tuple, index.reshape(-1, 3).tolist())
+        meshes[name] = Mesh(mesh.vertices[used], tuple(corners))
+    model = one.structure.model
+    parts = tuple(
+        part
+        for part in model.parts
+        if isinstance(part.shape, MeshShape) and meshes[part.shape.mesh].faces
+    )
+    filled = {name: mesh for name, mesh in meshes.items() if mesh.faces}
+    structure = replace(
+        one.structure, model=replace(model, parts=parts, meshes=filled)
+    )
+    near = _near(one.triangles, ways, distance)
+    return replace(one, structure=structure, triangles=one.triangles[near])
+
+
+# A building that shares so much of the smaller outline stands in the place of
+# the other.
+_SHARED = 0.3
+
+
+def with_gone(
+    gone: Sequence[Imported], others: Iterable[Imported]
+) -> list[Imported]:
+    """Returns what stood together, of what is gone and what stands today.
+
+    Where both have the same place, a building of today that has a year was
+    there already, and what it replaced was not; one without a year came
+    later.
+
+    Args:
+        gone: demolished buildings.
+        others: present structures that may have stood then.
+    """
+    others = list(others)
+    later = [one for one in others if one.kind.startswith("Building")]
+    tree = STRtree([one.structure.model.footprint for one in later])
+    stood: list[Imported] = []
+    replaced: set[Imported] = set()
+    for one in gone:
+        outline = one.structure.model.footprint
+        there = [
+            later[k]
+            for k in np.sort(tree.query(outline, "intersects"))
+            if _shares(outline, later[k].structure.model.footprint)
+        ]
+        if any(new.year is not None for new in there):
+            continue
+        stood.append(one)
+        replaced.update(there)
+    return [one for one in others if one not in replaced] + stood
+
+
+def _shares(one: BaseGeometry, other: BaseGeometry) -> bool:
+    shared = one.intersection(other).area
+    return bool(shared > _SHARED * min(one.area, other.area))
+
 
 # Greatest distance from the middle of a city [m].
 _FARTHEST = 10_000.0
@@ -226,3 +361,158 @@ def _has_years(one: Imported) -> bool:
     is_building = one.kind.startswith("Building")
     is_dated = one.year is not None or one.until is not None
     return not one.is_ground and (is_dated or is_building)
+
+
+# Buildings this near to each other are of one block [m].
+_SAME_BLOCK = 4.0
+# The part of the changing buildings that is drawn block by block, and the part
+# that is lower at first; the others are missing.
+_BY_BLOCK = 0.5
+_LOWER = 1.0 / 3.0
+# Only buildings at least this high [m] can be lower, with this part of their
+# height.
+_LEAST_HEIGHT = 7.0
+_HEIGHTS = (0.4, 0.7)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """The drawn changes.
+
+    Attributes:
+        missing: buildings that the first stage lacks.
+        lower: building -> its height there as a part of the whole.
+        gone: buildings of the file that stood there and stand no more.
+    """
+
+    missing: tuple[str, ...]
+    lower: dict[str, float]
+    gone: tuple[str, ...] = ()
+
+
+def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
+    """Returns a city with a stage before its only one.
+
+    The draws depend on the names of buildings, so that the rest of a file does
+    not change them.
+
+    Args:
+        city: of one stage; what is gone by then stands at the first, and what
+            has its place today does not.
+        part: share of its buildings that are missing or lower at first.
+        seed: of the lot.
+    """
+    (last,) = city.standing.values()
+    buildings = [one for one in last if one.kind.startswith("Building")]
+    chosen = _drawn(buildings, round(part * len(buildings)), seed)
+    taken = {one.structure.name for one in city.kept}
+    missing: list[str] = []
+    lower: dict[str, float] = {}
+    variants: dict[Imported, Imported | None] = {}
+    for one in chosen:
+        name = one.structure.name
+        z = one.triangles[:, :, 2]
+        if np.ptp(z) >= _LEAST_HEIGHT and lot(seed, "lower", name) < _LOWER:
+            low, high = _HEIGHTS
+            share = low + (high - low) * lot(seed, "height", name)
+            lower[name] = round(share, 2)
+            variants[one] = _lowered(one, lower[name], taken)
+        else:
+            missing.append(name)
+            variants[one] = None
+    first = [new for one in last if (new := variants.get(one, one)) is not None]
+    extra = [new for new in variants.values() if new is not None]
+    stood: list[Imported] = []
+    if city.gone:
+        before = first
+        first = with_gone(city.gone, before)
+        stood = [one for one in first if one in set(city.gone)]
+        replaced = set(before) - set(first)
+        missing += [one.lot_name for one in replaced]
+        extra = [one for one in extra if one not in replaced]
+        lower = {n: h for n, h in lower.items() if n not in missing}
+    grown = replace(
+        city,
+        standing={"01": first, "02": last},
+        kept=[*city.kept, *extra, *stood],
+        gone=(),
+    )
+    return grown, Growth(
+        tuple(sorted(missing)),
+        dict(sorted(lower.items())),
+        tuple(one.structure.name for one in stood),
+    )
+
+
+def _drawn(
+    buildings: Sequence[Imported], number: int, seed: int
+) -> list[Imported]:
+    """Returns a number of buildings, about half of them block by block."""
+    blocks: dict[int, list[Imported]] = {}
+    for block, one in zip(_blocks(buildings), buildings, strict=True):
+        blocks.setdefault(block, []).append(one)
+
+    def lot_of_block(members: list[Imported]) -> float:
+        name = min(one.structure.name for one in members)
+        return lot(seed, "block", name)
+
+    chosen: list[Imported] = []
+    for members in sorted(blocks.values(), key=lot_of_block):
+        if len(chosen) >= _BY_BLOCK * number:
+            break
+        if 1 < len(members) <= number - len(chosen):
+            chosen += members
+    left = set(buildings) - set(chosen)
+    singles = sorted(
+        left, key=lambda one: lot(seed, "single", one.structure.name)
+    )
+    return chosen + singles[: number - len(chosen)]
+
+
+def _blocks(buildings: Sequence[Imported]) -> np.ndarray:
+    """Returns the number of the block (N,) of each building."""
+    if not buildings:
+        return np.zeros(0, dtype=int)
+    outlines = [one.structure.model.footprint for one in buildings]
+    near = STRtree(outlines).query(np.array(outlines), "dwithin", _SAME_BLOCK)
+    links = coo_array(
+        (np.ones(near.shape[1]), (near[0], near[1])),
+        (len(outlines), len(outlines)),
+    )
+    _, block = connected_components(links, directed=False)
+    return np.asarray(block)
+
+
+def _lowered(one: Imported, share: float, taken: set[str]) -> Imported:
+    """Returns a building cut to a part of its height, under a new name."""
+    suffix = "_lower"
+    while f"{one.structure.name}{suffix}" in taken:
+        suffix += "_"
+    bottom = float(one.triangles[:, :, 2].min())
+    scale = np.array([1.0, 1.0, share])
+    move = np.array([0.0, 0.0, (1.0 - share) * bottom])
+    model = one.structure.model
+    meshes = {
+        f"{name}{suffix}": replace(mesh, vertices=mesh.vertices * scale + move)
+        for name, mesh in model.meshes.items()
+    }
+    parts = tuple(
+        replace(
+            part, shape=replace(part.shape, mesh=f"{part.shape.mesh}{suffix}")
+        )
+        if isinstance(part.shape, MeshShape)
+        else part
+        for part in model.parts
+    )
+    structure = replace(
+        one.structure,
+        name=f"{one.structure.name}{suffix}",
+        model=replace(model, parts=parts, meshes=meshes),
+    )
+    return replace(
+        one,
+        structure=structure,
+        kind=f"{one.kind}, lower at first",
+        triangles=one.triangles * scale + move,
+        original=one.structure.name,
+    )

@@ -12,9 +12,8 @@ from cns_drake.imports.dressing.roof_pieces import is_flat_roof
 from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.upper_sides import looks_up
 from cns_drake.imports.dressing.wall_panels import is_upright
-from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.lots import lot_generator
+from cns_drake.imports.foreign_city import Imported, lot_generator
+from cns_drake.imports.ground import Ground
 
 # A building whose feet are farther from the ground was sunk into it [m].
 _LET_IN = 2.0

@@ -35,11 +35,10 @@ from cns_drake.imports.dressing.wall_panels import (
     Panel,
     find_panels,
 )
-from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.lots import lot_generator
-from cns_drake.imports.street_lanes import Street
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.drives.city_drives import Street
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.foreign_city import Imported, lot_generator
+from cns_drake.imports.ground import Ground
 
 # Walls that are farther from all drives have no windows, and roofs no
 # equipment [m].

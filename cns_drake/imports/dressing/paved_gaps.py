@@ -20,11 +20,10 @@ from cns_drake.imports.dressing.grounds import (
     near_drives,
 )
 from cns_drake.imports.dressing.upper_sides import looks_up, turned_up
-from cns_drake.imports.extrusions import flat_surface
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import flat_surface, parts_of
 from cns_drake.imports.foreign_city import Imported, make_imported
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.osm_places import parts_of
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.options import ImportFaults
 
 # Widest gap that is paved [m], and least area of one [m^2].
 _WIDEST, _LEAST_AREA = 3.0, 0.05

@@ -26,11 +26,10 @@ from cns_drake.imports.dressing.street_room import (
     StreetThings,
     title_of,
 )
-from cns_drake.imports.foreign_city import Imported, Thing
-from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.lots import lot_generator
-from cns_drake.imports.street_lanes import Street
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.drives.city_drives import Street
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.foreign_city import Imported, Thing, lot_generator
+from cns_drake.imports.ground import Ground
 
 # Things farther from all drives are left out [m].
 _THINGS_WITHIN = 100.0

@@ -18,9 +18,9 @@ from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.imports.dressing.round_parts import without_curves
 from cns_drake.imports.dressing.upper_sides import UpperSides, turned_up
+from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.ground import Ground
 
 # Least distance of all objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7

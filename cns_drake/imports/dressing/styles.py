@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 import numpy as np
 
 from cns_drake.city.facades.assembly import Rgb, pick
-from cns_drake.imports.osm_lengths import count
+from cns_drake.imports.openstreetmap.tags import count
 
 
 class Use(Enum):

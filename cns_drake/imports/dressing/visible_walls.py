@@ -12,8 +12,8 @@ import shapely
 from shapely.geometry import LineString
 
 from cns_drake.imports.dressing.wall_panels import Panel
-from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.ground import Ground
 
 # Distance of the places on drives from which walls are looked at [m].
 _SPACING = 4.0

@@ -26,10 +26,10 @@ from cns_drake.imports.dressing.guessed_streets import guessed_streets
 from cns_drake.imports.dressing.lane_marks import lane_marks
 from cns_drake.imports.dressing.paved_gaps import paved_gaps
 from cns_drake.imports.dressing.street_dressing import dress_streets
+from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.import_ground import Ground
+from cns_drake.imports.ground import Ground
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.imports.waypoint_drives import WaypointDrive
 
 _TERRAIN = "TINRelief"
 

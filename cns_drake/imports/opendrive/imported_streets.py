@@ -1,26 +1,128 @@
-"""The areas of imported streets, as a city is built along them."""
+"""The areas of imported streets, as a city is built along them.
+
+The lanes of a junction often lack the shoulders of the roads that lead to it:
+in the file the kerb of the road then steps aside. Kerbs that are built swing
+over, along tapers."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely.geometry import LinearRing, MultiPolygon, Polygon
+from shapely.geometry import LinearRing, LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.angles import wrapped
 from cns_drake.city.geometry.polygons import polygons_of, snap
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.streets import (
     TILE,
     Covering,
     kerb_area,
     parking_bays,
 )
-from cns_drake.imports.opendrive.kerb_tapers import kerb_tapers
-from cns_drake.imports.opendrive.lane_bands import LaneBand
-from cns_drake.imports.opendrive.lane_kinds import is_raised, lane_class
+from cns_drake.imports.foreign_city import make_imported
+from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_class
+
+# Smallest and largest step, and least length of the kerb before it [m].
+_STEP = (0.02, 2.0)
+_BEFORE = 1.0
+# Kerbs on both sides of a step go on in the same direction, up to this; the
+# step itself turns aside by more [rad].
+_ASTRAY = np.radians(45.0)
+# Length of a taper over the width of its step, and its greatest one [m].
+_SLENDER, _LONGEST = 10.0, 6.0
+# Places where a taper may end are at most this far apart; corners this near to
+# a straight edge are none [m].
+_SPACING, _SIMPLE = 0.25, 0.005
+
+
+def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
+    """Returns areas that turn steps of a carriageway's edge into tapers [m]."""
+    found: list[Polygon] = []
+    for polygon in polygons_of(carriageway):
+        polygon = shapely.orient_polygons(polygon)
+        for ring in (polygon.exterior, *polygon.interiors):
+            simple = LinearRing(ring).simplify(_SIMPLE)
+            xy = shapely.get_coordinates(simple)[:-1]
+            found += map(Polygon, _tapers(xy))
+            # Backwards and mirrored, the carriageway is on the left again.
+            mirror = np.array([-1.0, 1.0])
+            found += (Polygon(a * mirror) for a in _tapers(xy[::-1] * mirror))
+    return found
+
+
+def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
+    """Yields the corners of areas where an edge steps to the left.
+
+    Args:
+        xy: (N, 2) corners of a ring with the carriageway on its left [m].
+    """
+    steps = np.roll(xy, -1, axis=0) - xy
+    lengths = np.hypot(*steps.T)
+    heading = np.arctan2(steps[:, 1], steps[:, 0])
+    turns = wrapped(heading - np.roll(heading, 1))
+    is_step = (
+        (lengths > _STEP[0])
+        & (lengths < _STEP[1])
+        & (turns > _ASTRAY)
+        & (np.roll(turns, -1) < -_ASTRAY)
+    )
+    for k in np.flatnonzero(is_step):
+        # The kerb before the step comes first, nearest to the step.
+        before = np.roll(xy[::-1], k + 1 - len(xy), axis=0)
+        behind = np.roll(xy, -k - 1, axis=0)
+        ahead = np.array([np.cos(heading[k - 1]), np.sin(heading[k - 1])])
+        aside = float(lengths[k] * np.sin(turns[k]))
+        straight = before[: _straight_on(before, -ahead) + 1]
+        chain = _kerb(behind, ahead)
+        if _reach(straight) < _BEFORE or len(chain) < 2:
+            continue
+        within = min(_LONGEST, _SLENDER * aside)
+        dense = shapely.get_coordinates(
+            shapely.segmentize(shapely.linestrings(chain), _SPACING)
+        )
+        away = dense - xy[k]
+        along, left = away @ ahead, away @ [-ahead[1], ahead[0]]
+        reached = np.flatnonzero((along > _SPACING) & (along < within + 1e-6))
+        if not len(reached):
+            continue
+        # The taper touches the kerb where it is seen farthest to the right.
+        last = int(reached[np.argmin(left[reached] / along[reached])])
+        yield np.concatenate([xy[k : k + 1], dense[: last + 1]])
+
+
+def _straight_on(xy: np.ndarray, ahead: np.ndarray) -> int:
+    """Returns how many edges between corners (N, 2) go on in a direction."""
+    steps = np.diff(xy, axis=0)
+    goes_on = steps @ ahead > np.cos(_ASTRAY) * np.hypot(*steps.T)
+    return int(np.argmin(np.append(goes_on, False)))
+
+
+def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """Returns the first corners (M, 2) of an edge that goes straight on.
+
+    Where it soon steps back, the corner behind that step is the last one.
+
+    Args:
+        xy: (N, 2) corners of a ring, with the carriageway on its left [m].
+        ahead: (2,) unit vector.
+    """
+    last = _straight_on(xy, ahead)
+    if 0 < last < len(xy) - 2 and _straight_on(xy[last + 1 :], ahead):
+        step = xy[last + 1] - xy[last]
+        goes_right = step @ [-ahead[1], ahead[0]] < 0.0
+        if goes_right and np.hypot(*step) < _STEP[1]:
+            last += 1
+    return xy[: last + 1]
+
+
+def _reach(xy: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
+
 
 # Slits up to twice this width between lanes are closed [m].
 _SEAM = 0.05
@@ -200,3 +302,57 @@ def _cut_at_tiles(area: MultiPolygon) -> MultiPolygon:
 
 def _multi(area: BaseGeometry) -> MultiPolygon:
     return MultiPolygon(polygons_of(area))
+
+
+_DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
+_LEAST_CROSS = 1e-6
+# Wider than a kerb [m].
+_END = 0.2
+
+
+def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
+    """Yields the upper sides of bridges by class, and their undersides."""
+    of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
+    for band in bands:
+        # Parts without a lane are closed as well.
+        kind = lane_class(band.kind) or "other-ground"
+        left, right = band.inner, band.outer
+        if band.lane.number > 0:
+            left, right = right, left
+        of_road[band.road.name, kind].append(_strip(right, left))
+        low_left, low_right = left - _DEPTH, right - _DEPTH
+        of_road[band.road.name, "other-structure"] += [
+            _strip(low_left, low_right),
+            _strip(low_right, right),
+            _strip(left, low_left),
+        ]
+    for (road, kind), pieces in of_road.items():
+        triangles = np.concatenate(pieces)
+        edges = np.cross(
+            triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+        )
+        triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_CROSS]
+        if len(triangles):
+            yield make_imported(
+                f"bridge_{road}_{kind}", kind, "Bridge", {"deck": triangles}, {}
+            ).structure
+
+
+def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
+    """Returns the area about the ends of bridges [m]."""
+    lines = [
+        LineString([band.inner[k, :2], band.outer[k, :2]])
+        for band in bands
+        for k in (0, -1)
+    ]
+    return shapely.union_all(lines).buffer(_END, cap_style="flat")
+
+
+def _strip(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Returns triangles between lines (N, 3), upward if the second is left."""
+    return np.concatenate(
+        [
+            np.stack([a[:-1], a[1:], b[1:]], axis=1),
+            np.stack([a[:-1], b[1:], b[:-1]], axis=1),
+        ]
+    )

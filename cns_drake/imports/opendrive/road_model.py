@@ -1,13 +1,203 @@
-"""Roads of a network: course, heights and lanes."""
+"""Roads of a network: course, heights and lanes.
+
+The course is made of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE 1.7,
+chapter 8, https://www.asam.net/standards/detail/opendrive"""
 
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
+import math
+from typing import Protocol
 
 import numpy as np
 
-from cns_drake.imports.opendrive.plan_view import Piece
+# Number of nodes of Gauss and Legendre's rule; exact on a panel to 1e-14 m.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+# Greatest turn of a spiral's heading on a panel [rad].
+_TURN = 0.5
+# A road that turns more is a fault of the file [rad].
+_MOST_TURN = 10_000.0
+_PANELS = 64
+_NEWTON_STEPS = 8
+
+
+class Shape(Protocol):
+    """A curve in the frame of its first point."""
+
+    def evaluate(self, ds: np.ndarray) -> np.ndarray:
+        """Returns (N, 3) u, v [m] and heading [rad] at distances (N,) [m]."""
+        ...
+
+    @property
+    def sharpest(self) -> float:
+        """The greatest curvature, about [1/m]."""
+        ...
+
+
+@dataclass(frozen=True)
+class Arc:
+    """An arc, or a line if the curvature is 0 [1/m]."""
+
+    curvature: float
+
+    def evaluate(self, ds: np.ndarray) -> np.ndarray:
+        half = self.curvature * ds / 2.0
+        # The chord, which is straight ahead for a line.
+        chord = ds * np.sinc(half / np.pi)
+        return np.stack(
+            [chord * np.cos(half), chord * np.sin(half), 2.0 * half], axis=1
+        )
+
+    @property
+    def sharpest(self) -> float:
+        return abs(self.curvature)
+
+
+class Spiral:
+    """A clothoid, whose curvature grows evenly."""
+
+    def __init__(self, start: float, end: float, length: float):
+        """Takes the curvature at both ends [1/m], and the length [m]."""
+        self.sharpest = max(abs(start), abs(end))
+        turn = self.sharpest * length
+        if turn > _MOST_TURN:
+            raise ValueError(f"turns by up to {turn:.0f} rad")
+        self._start, self._growth = start, (end - start) / length
+        panels = math.ceil(turn / _TURN) + 1
+        self._panel = length / panels
+        ends = np.arange(panels) * self._panel
+        steps = self._steps(ends, np.full(panels, self._panel))
+        before = np.cumsum(steps, axis=0) - steps
+        self._before = before
+
+    def evaluate(self, ds: np.ndarray) -> np.ndarray:
+        index = np.clip(
+            (ds / self._panel).astype(int), 0, len(self._before) - 1
+        )
+        begin = index * self._panel
+        uv = self._before[index] + self._steps(begin, ds - begin)
+        return np.column_stack([uv, self._heading(ds)])
+
+    def _heading(self, s: np.ndarray) -> np.ndarray:
+        return self._start * s + self._growth * s**2 / 2.0
+
+    def _steps(self, begin: np.ndarray, length: np.ndarray) -> np.ndarray:
+        """Returns (N, 2) from s = begin (N,) on, over lengths (N,) [m]."""
+        s = begin[:, None] + length[:, None] * (_NODES + 1.0) / 2.0
+        heading = self._heading(s)
+        scale = length / 2.0
+        return np.stack(
+            [
+                scale * (np.cos(heading) @ _WEIGHTS),
+                scale * (np.sin(heading) @ _WEIGHTS),
+            ],
+            axis=1,
+        )
+
+
+class Cubic:
+    """A curve of two cubic polynomials of a parameter p.
+
+    Attributes:
+        sharpest: see `Shape`.
+    """
+
+    def __init__(
+        self,
+        u: Sequence[float],
+        v: Sequence[float],
+        last: float,
+        length: float,
+        by_parameter: bool = False,
+        stretched: bool = True,
+    ):
+        """Prepares the arc length.
+
+        Args:
+            u, v: four coefficients each, of p^0 first [m].
+            last: p at the end.
+            length: of the curve in the file [m].
+            by_parameter: whether p is the distance itself.
+            stretched: whether the whole curve is scaled to that length; else it
+                ends where the length is reached.
+        """
+        self._u, self._v = (np.polynomial.Polynomial(one) for one in (u, v))
+        self._du, self._dv = self._u.deriv(), self._v.deriv()
+        self._by_parameter = by_parameter
+        self._panel = last / _PANELS
+        panels = np.arange(_PANELS) * self._panel
+        steps = self._arc(panels, np.full(_PANELS, self._panel))
+        self._reached = np.concatenate([[0.0], np.cumsum(steps)])
+        whole = float(self._reached[-1])
+        if not whole > 1e-9:
+            raise ValueError("a curve without length")
+        self._scale = whole / length if stretched else 1.0
+        p = np.linspace(0.0, last, 4 * _PANELS + 1)
+        turns = np.abs(np.diff(np.unwrap(self._heading(p))))
+        self.sharpest = float(turns.max()) / (length / (4 * _PANELS))
+
+    def evaluate(self, ds: np.ndarray) -> np.ndarray:
+        p = ds if self._by_parameter else self._parameter(ds * self._scale)
+        return np.stack([self._u(p), self._v(p), self._heading(p)], axis=1)
+
+    def _heading(self, p: np.ndarray) -> np.ndarray:
+        return np.arctan2(self._dv(p), self._du(p))
+
+    def _speed(self, p: np.ndarray) -> np.ndarray:
+        return np.hypot(self._du(p), self._dv(p))
+
+    def _arc(self, begin: np.ndarray, size: np.ndarray) -> np.ndarray:
+        p = begin[:, None] + size[:, None] * (_NODES + 1.0) / 2.0
+        return size / 2.0 * (self._speed(p) @ _WEIGHTS)
+
+    def _parameter(self, arc: np.ndarray) -> np.ndarray:
+        """Returns the parameter at an arc length, by Newton's rule."""
+        index = np.clip(
+            np.searchsorted(self._reached, arc, side="right") - 1,
+            0,
+            _PANELS - 1,
+        )
+        low, begin = self._reached[index], index * self._panel
+        whole = np.maximum(self._reached[index + 1] - low, 1e-12)
+        size = (arc - low) / whole * self._panel
+        for _ in range(_NEWTON_STEPS):
+            speed = np.maximum(self._speed(begin + size), 1e-9)
+            size = size - (self._arc(begin, size) - (arc - low)) / speed
+            size = np.clip(size, -self._panel, 2.0 * self._panel)
+        return begin + size
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One element of a plan view.
+
+    Attributes:
+        s: its start along the road [m].
+        x, y, heading: its first point in the world [m, rad].
+        length: of it [m].
+        shape: in the frame of that point.
+    """
+
+    s: float
+    x: float
+    y: float
+    heading: float
+    length: float
+    shape: Shape
+
+    def evaluate(self, s: np.ndarray) -> np.ndarray:
+        """Returns (N, 3) x, y [m] and heading [rad] along the road."""
+        u, v, turn = self.shape.evaluate(s - self.s).T
+        c, sine = math.cos(self.heading), math.sin(self.heading)
+        return np.stack(
+            [
+                self.x + c * u - sine * v,
+                self.y + sine * u + c * v,
+                self.heading + turn,
+            ],
+            axis=1,
+        )
 
 
 class Cubics:

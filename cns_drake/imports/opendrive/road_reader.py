@@ -1,8 +1,12 @@
-"""Reads roads from an OpenDRIVE file."""
+"""Reads roads from an OpenDRIVE file.
+
+The import joins lanes where they meet and does not use the links of roads,
+lanes and junctions. A link to something that is not in the file is still
+reported as a fault."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -12,24 +16,179 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.opendrive.mark_reader import read_marks
-from cns_drake.imports.opendrive.plan_view import (
+from cns_drake.imports.opendrive.road_model import (
     Arc,
     Cubic,
-    Piece,
-    Shape,
-    Spiral,
-)
-from cns_drake.imports.opendrive.road_links import count_dangling_links
-from cns_drake.imports.opendrive.road_model import (
     Cubics,
     ImportedRoad,
     Lane,
     LaneSection,
+    MarkLine,
+    Piece,
     RoadMap,
+    RoadMark,
+    Shape,
+    Spiral,
 )
-from cns_drake.imports.opendrive.road_things import read_things
+from cns_drake.imports.opendrive.things import read_things
+from cns_drake.imports.options import ImportFaults
+
+# Width of a painted line without a plausible one [m].
+_MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
+# Shortest distance between the starts of two dashes [m].
+_CLOSEST_DASHES = 0.1
+
+
+def read_marks(
+    lane: Element, start: float, road: str, faults: ImportFaults
+) -> list[RoadMark]:
+    """Returns the marks of a lane, in their order along the road.
+
+    Args:
+        lane: the element.
+        start: of its section along the road [m].
+        road: name of the road.
+        faults: counts marks whose lines are not usable.
+
+    Raises:
+        ValueError: naming line and fault, if a text is not a number.
+    """
+    marks = []
+    for one in lane.all("roadMark"):
+        stated = one.number("width", 0.0)
+        width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
+        if one.text("weight", "standard") == "bold" and not stated:
+            width *= 2.0
+        lines: tuple[MarkLine, ...] = ()
+        try:
+            lines = tuple(_mark_lines(one, width))
+        except _NoPatternError:
+            faults.add("road mark with impossible dashes, made usual", road)
+        marks.append(
+            RoadMark(
+                start + one.number("sOffset", 0.0),
+                one.text("type", "none"),
+                one.text("color", "standard"),
+                width,
+                lines,
+            )
+        )
+    return sorted(marks, key=lambda mark: mark.start)
+
+
+class _NoPatternError(Exception):
+    """The dashes of a line cannot be painted."""
+
+
+def _mark_lines(mark: Element, usual: float) -> Iterator[MarkLine]:
+    """Yields the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
+
+    Args:
+        mark: the element.
+        usual: width of a line that has no plausible one [m].
+
+    Raises:
+        _NoPatternError: if a line has lengths that cannot be.
+    """
+    for one in mark.all("type", "line"):
+        dash, gap = one.number("length", 0.0), one.number("space", 0.0)
+        # Programs write both as 0 for a line without gaps.
+        if min(dash, gap) < 0.0 or (gap > 0.0 and dash == 0.0):
+            raise _NoPatternError
+        if gap > 0.0 and dash + gap < _CLOSEST_DASHES:
+            raise _NoPatternError
+        stated = one.number("width", 0.0)
+        yield MarkLine(
+            aside=one.number("tOffset", 0.0),
+            start=one.number("sOffset", 0.0),
+            dash=dash,
+            gap=gap,
+            width=stated if 0.0 < stated <= _WIDEST_MARK else usual,
+        )
+
+
+_ENDS = ("predecessor", "successor")
+
+
+def count_dangling_links(top: Element, faults: ImportFaults) -> None:
+    """Counts the links of a file to things that are not in it.
+
+    Args:
+        top: the outermost element.
+        faults: the counts.
+    """
+    roads = {one.attributes.get("id", ""): one for one in top.all("road")}
+    junctions = {one.attributes.get("id", "") for one in top.all("junction")}
+    for name, road in roads.items():
+        own = road.attributes.get("junction", "-1")
+        if own not in ("-1", "") and own not in junctions:
+            faults.add("road of a junction that is not in the file", name)
+        for end in _ENDS:
+            kind, linked = _linked(road, end)
+            known = junctions if kind == "junction" else roads
+            if linked is not None and linked not in known:
+                faults.add(f"link to a {kind} that is not in the file", name)
+        for _ in _dangling_lanes(road, roads):
+            faults.add("link to a lane that is not in the file", name)
+    for junction in top.all("junction"):
+        name = junction.attributes.get("id", "")
+        for connection in junction.all("connection"):
+            for key in ("incomingRoad", "connectingRoad", "linkedRoad"):
+                linked = connection.attributes.get(key)
+                if linked is not None and linked not in roads:
+                    faults.add(
+                        "connection of a junction with a road that is not in"
+                        " the file",
+                        f"junction {name}",
+                    )
+
+
+def _linked(road: Element, end: str) -> tuple[str, str | None]:
+    """Returns kind and id of the link at an end of a road, if any."""
+    link = road.first("link", end)
+    if link is None:
+        return "road", None
+    kind = link.attributes.get("elementType", "road")
+    return kind, link.attributes.get("elementId")
+
+
+def _dangling_lanes(
+    road: Element, roads: Mapping[str, Element]
+) -> Iterator[Element]:
+    """Yields the links of a road's lanes to lanes that are not there."""
+    sections = _linked_sections(road)
+    for k, section in enumerate(sections):
+        for end, at in zip(_ENDS, (k - 1, k + 1), strict=True):
+            if 0 <= at < len(sections):
+                beside = [sections[at]]
+            else:
+                kind, linked = _linked(road, end)
+                if kind != "road" or linked is None or linked not in roads:
+                    continue
+                # The link names the end of the other road, which some files
+                # omit.
+                others = _linked_sections(roads[linked])
+                beside = others[:1] + others[-1:]
+            there = {
+                lane.attributes.get("id")
+                for other in beside
+                for lane in _linked_lanes(other)
+            }
+            for lane in _linked_lanes(section):
+                for link in lane.all("link", end):
+                    if link.attributes.get("id") not in there:
+                        yield link
+
+
+def _linked_sections(road: Element) -> list[Element]:
+    found = list(road.all("lanes", "laneSection"))
+    return sorted(found, key=lambda one: one.number("s", 0.0))
+
+
+def _linked_lanes(section: Element) -> Iterator[Element]:
+    for side in ("left", "center", "right"):
+        yield from section.all(side, "lane")
+
 
 _KNOWN = frozenset(
     (

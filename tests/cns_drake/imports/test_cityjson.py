@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.cityjson import read_cityjson
-from cns_drake.imports.free_space import find_free_space
-from cns_drake.imports.import_ground import ground_of
-from cns_drake.imports.import_structures import import_structures
+from cns_drake.imports.cityjson.reader import read_cityjson
+from cns_drake.imports.cityjson.structures import import_structures
+from cns_drake.imports.drives.free_space import find_free_space
+from cns_drake.imports.ground import ground_of
 
 ORIGIN = np.array([85000.0, 446000.0, 3.0])
 

@@ -8,11 +8,11 @@ from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.imports.dressing.dressed_city import plan_buildings
 from cns_drake.imports.dressing.upper_sides import UpperSides, turned_up
 from cns_drake.imports.dressing.whole_city import dress_city
-from cns_drake.imports.import_ground import ground_of
-from cns_drake.imports.import_report import ImportOptions
-from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.ground import ground_of
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.staged_city import stage_city
-from cns_drake.imports.waypoint_drives import WaypointDrive
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ import yaml
 
 from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.command_line.cli import app
+from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing.dressed_city import plan_buildings
 from cns_drake.imports.dressing.facade_plan import plan_facade, with_doors
 from cns_drake.imports.dressing.reliefs import Openings, framed, open_wall
@@ -25,15 +26,12 @@ from cns_drake.imports.dressing.styles import (
     tagged_colour,
 )
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
-from cns_drake.imports.extrusions import extruded
-from cns_drake.imports.grown_city import grow
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.import_ground import ground_of
-from cns_drake.imports.import_report import ImportOptions
-from cns_drake.imports.import_structures import import_cityjson
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.staged_city import stage_city
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import extruded
+from cns_drake.imports.ground import ground_of
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.options import ImportFaults, ImportOptions
+from cns_drake.imports.staged_city import grow, stage_city
 from cns_drake.scenarios.drive_table import write_table
 
 # The digest of an import before dressing existed.

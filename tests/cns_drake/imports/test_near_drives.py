@@ -9,7 +9,7 @@ from shapely.geometry import LineString, box
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.import_report import ImportOptions
+from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
 

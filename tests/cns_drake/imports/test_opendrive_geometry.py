@@ -20,12 +20,11 @@ from scipy.special import fresnel
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lane_bands import lane_bands
-from cns_drake.imports.opendrive.plan_view import Arc, Cubic, Spiral
-from cns_drake.imports.opendrive.road_heights import RoadHeights
+from cns_drake.imports.opendrive.lanes import RoadHeights, lane_bands
+from cns_drake.imports.opendrive.road_model import Arc, Cubic, Spiral
 from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.options import ImportFaults
 
 # All kinds of curves, one after the other.
 SHAPES = [

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.opendrive.lane_bands import lane_bands
+from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports.options import ImportFaults
 
 RADIUS = 50.0
 # A bend to the left, from its middle; two lanes of 3.5 m, one line in the

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, box
 
-from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.opendrive.lane_bands import lane_bands
-from cns_drake.imports.opendrive.road_levels import split_levels
+from cns_drake.imports.opendrive.lanes import lane_bands, split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports.options import ImportFaults
 
 SIGNS = """<signals>
 <signal id="1" s="20" t="-6" zOffset="2" type="206" dynamic="no"

@@ -22,16 +22,15 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
-from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
     lane_polygon,
 )
-from cns_drake.imports.opendrive.lane_bands import lane_bands
 from cns_drake.imports.opendrive.lane_drives import find_lane_drives
-from cns_drake.imports.opendrive.road_heights import RoadHeights
+from cns_drake.imports.opendrive.lanes import RoadHeights, lane_bands
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports.options import ImportFaults
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario

@@ -9,17 +9,18 @@ from shapely.geometry import Polygon
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.building_years import Undated
-from cns_drake.imports.extrusions import extruded
-from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.faces import extruded
 from cns_drake.imports.import_map import ImportOptions, import_city
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.osm_lengths import count, length
-from cns_drake.imports.osm_tags import (
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.openstreetmap.tags import (
+    count,
     heights,
+    length,
     sidewalk_sides,
     street_width,
     why_absent,
 )
+from cns_drake.imports.options import ImportFaults
 
 
 def read(path, year_attribute=None):

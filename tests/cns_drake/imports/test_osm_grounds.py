@@ -6,9 +6,9 @@ import pytest
 
 from cns_drake.imports.dressing.lane_marks import lane_marks
 from cns_drake.imports.dressing.street_parking import may_park_on
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.street_lanes import Street
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.drives.city_drives import Street
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
 
 
 def read(osm, folder, dressed=True):

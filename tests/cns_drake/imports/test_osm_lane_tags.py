@@ -2,7 +2,7 @@
 
 import pytest
 
-from cns_drake.imports.osm_lane_tags import lane_layout, speed_limit
+from cns_drake.imports.openstreetmap.tags import lane_layout, speed_limit
 
 
 def tags(**values):

@@ -8,8 +8,8 @@ import pytest
 from shapely.geometry import box
 
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.import_report import ImportOptions
-from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.options import ImportOptions
 
 TWICE = "building drawn twice, taken once"
 NESTED = "building inside another one, taken as its part"

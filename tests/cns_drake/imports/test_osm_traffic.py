@@ -6,11 +6,11 @@ import pytest
 import shapely
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.import_map import ImportOptions, import_city
-from cns_drake.imports.import_report import DriveOn
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.osm_traffic import lanes_of_streets
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
+from cns_drake.imports.options import DriveOn
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario

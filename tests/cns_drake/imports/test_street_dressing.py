@@ -10,6 +10,7 @@ from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.object_parts import HEADROOM, part_triangles
+from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing import whole_city
 from cns_drake.imports.dressing.grounds import (
     missing_sidewalks,
@@ -18,13 +19,11 @@ from cns_drake.imports.dressing.grounds import (
 )
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.dressing.whole_city import dress_city
-from cns_drake.imports.import_ground import bottom_of, ground_of
-from cns_drake.imports.import_report import ImportOptions
-from cns_drake.imports.import_structures import import_cityjson
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.osm_things import object_of
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.ground import bottom_of, ground_of
+from cns_drake.imports.openstreetmap.city import import_openstreetmap, object_of
+from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.staged_city import stage_city
-from cns_drake.imports.waypoint_drives import WaypointDrive
 
 WIDTH = 9.0
 

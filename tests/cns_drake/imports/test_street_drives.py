@@ -6,12 +6,16 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports.drives.city_drives import Street, lane_links, make_lanes
+from cns_drake.imports.drives.search import driven_path
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.import_report import DriveOn, ImportOptions
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.osm_tags import driven_ways, is_marked, lanes_beside
-from cns_drake.imports.street_lanes import Street, lane_links, make_lanes
-from cns_drake.imports.waypoint_drives import driven_path
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.openstreetmap.tags import (
+    driven_ways,
+    is_marked,
+    lanes_beside,
+)
+from cns_drake.imports.options import DriveOn, ImportOptions
 from cns_drake.motion.control_points import POINT_SPACING
 from cns_drake.motion.path_geometry import SmoothPath
 from cns_drake.roads.waypoints import make_waypoint_path

@@ -7,12 +7,12 @@ import pytest
 import shapely
 from shapely.geometry import LineString, box
 
+from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing.guessed_streets import guessed_streets
 from cns_drake.imports.dressing.paved_gaps import paved_gaps
-from cns_drake.imports.import_ground import ground_of
-from cns_drake.imports.import_structures import import_cityjson
-from cns_drake.imports.openstreetmap import import_openstreetmap
-from cns_drake.imports.waypoint_drives import WaypointDrive
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.ground import ground_of
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
 
 
 def straight_drive(y=0.0, start=-80.0, end=70.0):

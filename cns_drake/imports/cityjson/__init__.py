@@ -1,0 +1,1 @@
+"""CityJSON: a file's objects as structures of a city."""

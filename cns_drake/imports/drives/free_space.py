@@ -1,0 +1,375 @@
+"""The room for a car between the buildings of an imported city."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.ndimage import (
+    binary_closing,
+    binary_fill_holes,
+    distance_transform_edt,
+    label,
+)
+import shapely
+from shapely import STRtree
+
+from cns_drake.base.compiled import compiled
+from cns_drake.base.jobs.side_by_side import mapped
+from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.ground import Ground
+
+# Longer triangles are divided, so that their far parts can be left out.
+_LONGEST = 256  # In spacings.
+# Points at a time, unless a single triangle has more.
+_AT_ONCE = 1_000_000
+
+
+def surface_samples(
+    triangles: np.ndarray,
+    spacing: float,
+    window: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Iterator[np.ndarray]:
+    """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
+
+    No place on a triangle is farther from all of them than the spacing. At most
+    about a million come at a time.
+
+    Args:
+        triangles: to sample.
+        spacing: of the points [m].
+        window: (2,) least and greatest x and y; points outside are left out.
+    """
+    while len(triangles):
+        if window is not None:
+            low, high = window
+            xy = triangles[:, :, :2]
+            is_near = (xy.max(axis=1) >= low) & (xy.min(axis=1) <= high)
+            triangles = triangles[is_near.all(axis=1)]
+        edges = triangles - np.roll(triangles, 1, axis=1)
+        longest = np.linalg.norm(edges, axis=2).max(axis=1, initial=0.0)
+        is_small = longest <= _LONGEST * spacing
+        yield from _in_batches(triangles[is_small], spacing, window)
+        a, b, c = np.moveaxis(triangles[~is_small], 1, 0)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])
+
+
+def _in_batches(
+    triangles: np.ndarray,
+    spacing: float,
+    window: tuple[np.ndarray, np.ndarray] | None,
+) -> Iterator[np.ndarray]:
+    triangles = np.ascontiguousarray(triangles, dtype=np.float64)
+    counts = _fill(triangles, spacing, np.zeros((0, 3)))
+    ends = np.cumsum(counts)
+    first = 0
+    while first < len(triangles):
+        before = ends[first - 1] if first else 0
+        last = int(np.searchsorted(ends, before + _AT_ONCE, "right"))
+        last = max(last, first + 1)
+        points = np.empty((int(ends[last - 1] - before), 3))
+        _fill(triangles[first:last], spacing, points)
+        first = last
+        if window is not None:
+            low, high = window
+            xy = points[:, :2]
+            points = points[((xy >= low) & (xy <= high)).all(axis=1)]
+        if len(points):
+            yield points
+
+
+@compiled
+def _fill(
+    triangles: np.ndarray, spacing: float, points: np.ndarray
+) -> np.ndarray:
+    """Writes the points of triangles (M, 3, 3) one after the other.
+
+    Lines of points run across the two longer sides, along the shortest one.
+
+    Args:
+        triangles: to sample.
+        spacing: of the points.
+        points: (N, 3) to write to, for all; (0, 3) to count them only.
+
+    Returns:
+        (M,) number of points of each triangle.
+    """
+    counts = np.zeros(len(triangles), dtype=np.int64)
+    written = 0
+    for k in range(len(triangles)):
+        # The apex is opposite the shortest side.
+        apex, shortest, longest = 0, np.inf, 0.0
+        for m in range(3):
+            side = triangles[k, (m + 2) % 3] - triangles[k, (m + 1) % 3]
+            length = np.sqrt((side * side).sum())
+            longest = max(longest, length)
+            if length < shortest:
+                shortest, apex = length, m
+        a = triangles[k, apex]
+        ab = triangles[k, (apex + 1) % 3] - a
+        ac = triangles[k, (apex + 2) % 3] - a
+        lines = max(1, int(np.ceil(longest / spacing)))
+        for i in range(lines + 1):
+            u = i / lines
+            steps = max(1, int(np.ceil(u * shortest / spacing)))
+            counts[k] += steps + 1
+            if len(points) == 0:
+                continue
+            for j in range(steps + 1):
+                v = j / steps
+                for axis in range(3):
+                    points[written, axis] = a[axis] + u * (
+                        (1.0 - v) * ab[axis] + v * ac[axis]
+                    )
+                written += 1
+    return counts
+
+
+CELL = 1.0  # [m]
+# A car passes below things higher than this above the ground, and over things
+# no higher than a kerb [m].
+_HEADROOM = 3.5
+_KERB = 0.3
+# Least distance from the middle of a path to a wall, and to the edge of a road
+# [m].
+_FROM_WALL = 2.5
+_FROM_EDGE = 1.6
+# The part of it that a car following the path may lose [m].
+_SLACK = 0.6
+# Least distance from the middle of the car to an obstacle [m].
+_HALF_CAR = 1.1
+# Half of the widest street; wider open ground is outside the city [m].
+_HALF_STREET = 20.0
+_SAMPLE_SPACING = 0.5
+# Room is searched within this distance of a city's middle: no drive is longer
+# [m].
+_FARTHEST = 1500.0
+# Roads are used if their connected room has at least this area [m^2].
+_LEAST_ROAD = 800.0
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """Room on a grid.
+
+    Attributes:
+        low: (2,) where the grid begins, the corner of its first cell [m].
+        clearance: (rows along y, columns along x) from the middle of each cell
+            to the nearest obstacle [m]; 0 where no car may be.
+        on_roads: whether only roads of the file count.
+        least: the clearance that a path needs [m].
+        walls: the obstacles, seen from above.
+    """
+
+    low: np.ndarray
+    clearance: np.ndarray
+    on_roads: bool
+    least: float
+    walls: STRtree
+
+    def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns row and column of places (N, 2), clipped to the grid."""
+        index = np.floor((xy - self.low) / CELL).astype(int)
+        rows, columns = self.clearance.shape
+        return (
+            np.clip(index[:, 1], 0, rows - 1),
+            np.clip(index[:, 0], 0, columns - 1),
+        )
+
+    def clearance_at(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the clearance at places (N, 2) [m]."""
+        return self.clearance[self.cells(xy)]
+
+    def obstacle(self, path: np.ndarray) -> np.ndarray | None:
+        """Returns the first (2,) place of a path where a car has no room.
+
+        Args:
+            path: (N, 2) places, close together [m].
+        """
+        narrow = self.clearance_at(path) < self.least - _SLACK
+        hit = self.walls.query(shapely.points(path), "dwithin", _HALF_CAR)[0]
+        narrow[hit] = True
+        return path[narrow.argmax()] if narrow.any() else None
+
+    def middle(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Returns the middles (N, 2) of cells [m]."""
+        return self.low + CELL * (np.c_[column, row] + 0.5)
+
+
+def find_free_space(
+    structures: Sequence[Imported], ground: Ground
+) -> FreeSpace:
+    """Returns the room for a car, on roads if the file has any.
+
+    Args:
+        structures: of the whole city, at all stages.
+        ground: below them.
+    """
+    low, high = _window(structures)
+    size = np.ceil((high - low) / CELL).astype(int) + 1
+    grid = _Grid(low, high, (int(size[1]), int(size[0])))
+    roads = [o for o in structures if o.structure.semantic_class == "road"]
+    waters = [o for o in structures if o.kind.startswith("Water")]
+    on_road = grid.covered([one.triangles for one in roads])
+    in_water = grid.covered([one.triangles for one in waters])
+    blocked, walls = _blocked(structures, ground, grid)
+    free = ~(blocked | (in_water & ~on_road))
+    on_roads = False
+    paved = binary_closing(on_road, iterations=1) & ~blocked
+    if _largest(_clearance(paved) >= _FROM_EDGE) * CELL**2 >= _LEAST_ROAD:
+        free, on_roads = paved, True
+    elif blocked.any():
+        free &= _between(blocked)
+    least = _FROM_EDGE if on_roads else _FROM_WALL
+    outlines = walls[:, [0, 1, 2, 0], :2]
+    return FreeSpace(
+        low,
+        _clearance(free),
+        on_roads,
+        least,
+        STRtree(np.asarray(shapely.linearrings(outlines))),
+    )
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Cells of a window.
+
+    Attributes:
+        low, high: (2,) corners of the window [m].
+        shape: rows and columns.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    shape: tuple[int, int]
+
+    def empty(self) -> np.ndarray:
+        return np.zeros(self.shape, dtype=bool)
+
+    def covered(self, groups: Sequence[np.ndarray]) -> np.ndarray:
+        """Returns which cells (rows, columns) are covered by triangles.
+
+        Args:
+            groups: (M, 3, 3) each [m].
+        """
+        found = self.empty()
+        # All at once: thousands of small groups would take far longer.
+        for row, column in self._batches(
+            np.concatenate([np.zeros((0, 3, 3)), *groups])
+        ):
+            found[row, column] = True
+        return found
+
+    def cells(
+        self, triangles: np.ndarray, ground: Ground | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns rows and columns that triangles (M, 3, 3) cover.
+
+        Args:
+            triangles: in the window or not [m].
+            ground: only triangles that a car on it could hit count; all if
+                None.
+        """
+        found = [np.zeros((2, 0), dtype=int), *self._batches(triangles, ground)]
+        row, column = np.concatenate(found, axis=1)
+        return row, column
+
+    def _batches(
+        self, triangles: np.ndarray, ground: Ground | None = None
+    ) -> Iterator[np.ndarray]:
+        """Yields what `cells` returns, (2, N) at a time."""
+        window = (self.low, self.high)
+        for points in surface_samples(triangles, _SAMPLE_SPACING, window):
+            if ground is not None:
+                above = points[:, 2] - ground.height(points[:, :2])
+                points = points[above < _HEADROOM]
+            cells = ((points[:, :2] - self.low) / CELL).astype(int)
+            yield cells.T[::-1]
+
+
+def _blocked(
+    structures: Sequence[Imported], ground: Ground, grid: _Grid
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the blocked cells, and the triangles (M, 3, 3) that block them.
+
+    The insides of buildings are blocked too.
+    """
+    solid = [
+        one
+        for one in structures
+        if not (one.is_ground or one.kind.startswith("Water"))
+    ]
+    blocked = grid.empty()
+    walls = [np.zeros((0, 3, 3))]
+    blocks = partial(_blocked_by, ground=ground, grid=grid)
+    for (row, column), triangles in mapped(blocks, solid):
+        blocked[row, column] = True
+        walls.append(triangles)
+    return blocked, np.concatenate(walls)
+
+
+def _blocked_by(
+    one: Imported, ground: Ground, grid: _Grid
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Returns the cells that a structure blocks, and with which triangles."""
+    corners = one.triangles.reshape(-1, 3)
+    above = corners[:, 2] - ground.height(corners[:, :2])
+    lowest = above.reshape(-1, 3).min(axis=1)
+    highest = above.reshape(-1, 3).max(axis=1)
+    is_low = (lowest < _HEADROOM) & (above.max() >= _KERB)
+    cells = grid.cells(one.triangles[is_low], ground)
+    if one.structure.semantic_class == "building" and len(cells[0]):
+        cells = _filled(*cells)
+    return cells, one.triangles[is_low & (highest > _KERB)]
+
+
+def _filled(
+    row: np.ndarray, column: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns cells (N,), one or more, and the cells they enclose."""
+    first = np.array([row.min(), column.min()])
+    shape = np.array([row.max(), column.max()]) - first + 1
+    walls = np.zeros(shape, dtype=bool)
+    walls[row - first[0], column - first[1]] = True
+    row, column = np.nonzero(binary_fill_holes(walls))
+    return row + first[0], column + first[1]
+
+
+def _clearance(free: np.ndarray) -> np.ndarray:
+    """Returns the distance of each cell to one that is not free [m]."""
+    # No car can drive beyond the grid.
+    return distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
+
+
+def _between(blocked: np.ndarray) -> np.ndarray:
+    """Returns the cells that have buildings on both sides."""
+    reach = int(_HALF_STREET / CELL)
+    near = distance_transform_edt(~np.pad(blocked, 2 * reach)) <= reach
+    return (distance_transform_edt(near) > reach)[
+        2 * reach : -2 * reach, 2 * reach : -2 * reach
+    ]
+
+
+def _largest(cells: np.ndarray) -> int:
+    """Returns the number of cells of the largest connected part."""
+    parts, number = label(cells, np.ones((3, 3)))
+    return int(np.bincount(parts.ravel())[1:].max()) if number else 0
+
+
+def _window(structures: Sequence[Imported]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the corners (2,) of the window in which room is searched [m]."""
+    boxes = np.array(
+        [
+            (s.triangles.min(axis=(0, 1)), s.triangles.max(axis=(0, 1)))
+            for s in structures
+        ]
+    )[:, :, :2]
+    middle = np.median(boxes.mean(axis=1), axis=0)
+    low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)
+    high = np.minimum(boxes[:, 1].max(axis=0), middle + _FARTHEST)
+    return np.floor(low), np.maximum(high, np.floor(low))

@@ -1,0 +1,372 @@
+"""The lanes of roads: kinds, borders, levels and heights.
+
+Borders are sampled closely enough for LiDAR."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from cns_drake.imports.opendrive.road_model import (
+    Cubics,
+    ImportedRoad,
+    Lane,
+    LaneSection,
+)
+
+# Cars drive on them, each in one direction.
+DRIVEN = frozenset(
+    (
+        "driving",
+        "entry",
+        "exit",
+        "onRamp",
+        "offRamp",
+        "connectingRamp",
+        "slipLane",
+    )
+)
+# Type -> class; all others are road.
+_CLASSES = {
+    "parking": "parking",
+    "sidewalk": "sidewalk",
+    "walking": "sidewalk",
+    "curb": "sidewalk",
+    "biking": "sidewalk",
+    "median": "other-ground",
+    "border": "other-ground",
+    "restricted": "other-ground",
+    "tram": "other-ground",
+    "rail": "other-ground",
+}
+_RAISED = frozenset({"sidewalk", "walking", "curb"})
+# From this height on a lane has a kerb [m].
+_LEAST_KERB = 0.03
+
+
+def lane_class(kind: str) -> str | None:
+    """Returns the semantic class of a lane, None for type none."""
+    return None if kind == "none" else _CLASSES.get(kind, "road")
+
+
+def is_raised(kind: str, height: float) -> bool:
+    """Returns whether a lane is a kerb above the road.
+
+    Args:
+        kind: its type.
+        height: of its inner edge above the road in the file [m].
+    """
+    return kind in _RAISED or height >= _LEAST_KERB
+
+
+# Greatest distance of two places on a border, and greatest error of chords of
+# the reference line, of widths and of heights: borders are then true to 5 mm
+# [m].
+_SPACING = 2.0
+_SAG = 0.002
+_MOST_STATIONS = 200_000
+# No lane is farther from the reference line, or higher [m].
+_FARTHEST, _HIGHEST = 50_000.0, 10_000.0
+# Places nearer to each other than this, counted from the joints, are one [m].
+_INWARDS = 1e-6
+
+
+@dataclass(frozen=True)
+class LaneBand:
+    """A lane of a section, from end to end.
+
+    Attributes:
+        road, section, lane: its road, the number of its section there, its
+            lane.
+        kind: type of the lane; "enclosed" for a lane of type none with others
+            farther outside, as on a road that is closed to traffic.
+        inner, outer: (N, 3) places on its edges, in the order of the road; two
+            are the same at a step in its width [m].
+        middle: (N, 3) between them.
+        heading, roll, grade: (N,) of the road there [rad, rad, 1].
+        s: (N,) along the road [m].
+    """
+
+    road: ImportedRoad
+    section: int
+    lane: Lane
+    kind: str
+    inner: np.ndarray
+    outer: np.ndarray
+    middle: np.ndarray
+    heading: np.ndarray
+    roll: np.ndarray
+    grade: np.ndarray
+    s: np.ndarray
+
+    @property
+    def width(self) -> np.ndarray:
+        """Its width (N,) [m]."""
+        return np.linalg.norm(self.outer - self.inner, axis=1)
+
+
+def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
+    """Yields all lanes of a road, section by section, from the middle.
+
+    Raises:
+        ValueError: naming road and fault, if it has too many bends to be
+            followed, or a lane leads out of the world.
+    """
+    for k, section in enumerate(road.sections):
+        s, inside = _stations(road, section)
+        _, _, _, heading, roll = road.reference(s, inside).T
+        grade = road.elevation.slope(s, inside)
+        offset = road.lane_offset.at(s, inside)
+        middle_line = road.points(s, inside, offset)
+        for side in (1, -1):
+            t, inner = offset, middle_line
+            numbers = sorted(
+                (n for n in section.lanes if n * side > 0), key=abs
+            )
+            for number in numbers:
+                lane = section.lanes[number]
+                if lane.width or not lane.border:
+                    # A width below zero is a slip.
+                    width = np.maximum(lane.width.at(s, inside), 0.0)
+                    beyond = t + side * width
+                else:
+                    border = np.abs(lane.border.at(s, inside))
+                    beyond = offset + side * np.maximum(
+                        border, side * (t - offset)
+                    )
+                outer = road.points(s, inside, beyond)
+                _check_place(road, number, outer)
+                yield LaneBand(
+                    road=road,
+                    section=k,
+                    lane=lane,
+                    kind=_kind(road, section, lane),
+                    inner=inner,
+                    outer=outer,
+                    middle=(inner + outer) / 2.0,
+                    heading=heading,
+                    roll=roll,
+                    grade=grade,
+                    s=s,
+                )
+                t, inner = beyond, outer
+
+
+def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
+    for reach, axes in ((_FARTHEST, edge[:, :2]), (_HIGHEST, edge[:, 2])):
+        farthest = float(np.abs(axes).max())
+        # NaN counts as too far.
+        if not farthest <= reach:
+            raise ValueError(
+                f"road {road.name}: lane {lane}: {farthest:g} m off, more than"
+                f" {reach:g} m"
+            )
+
+
+def _kind(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
+    if lane.kind != "none" or road.junction is not None:
+        return lane.kind
+    beyond = [
+        other.kind
+        for other in section.lanes.values()
+        if abs(other.number) > abs(lane.number)
+        and other.number * lane.number > 0
+    ]
+    return "enclosed" if any(kind != "none" for kind in beyond) else "none"
+
+
+def _stations(
+    road: ImportedRoad, section: LaneSection
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns places along a section, and the starts of their pieces.
+
+    A joint is there twice, once for each side.
+    """
+    cubics: list[Cubics] = [
+        road.elevation,
+        road.superelevation,
+        road.lane_offset,
+    ]
+    for lane in section.lanes.values():
+        cubics += [lane.width, lane.border]
+    joints = np.concatenate(
+        [
+            [section.start, section.end],
+            [piece.s for piece in road.pieces],
+            *(one.starts for one in cubics),
+        ]
+    )
+    joints = np.unique(np.clip(joints, section.start, section.end))
+    between = joints[
+        (joints > section.start + 4.0 * _INWARDS)
+        & (joints < section.end - 4.0 * _INWARDS)
+    ]
+    between = between[np.diff(between, prepend=-math.inf) > 4.0 * _INWARDS]
+    ends = np.concatenate([[section.start], between, [section.end]])
+    starts = np.array([piece.s for piece in road.pieces])
+    places, inside = [], []
+    total = 0
+    for a, b in pairwise(ends):
+        piece = int(np.searchsorted(starts, a + _INWARDS, "right")) - 1
+        sharpest = road.pieces[max(0, piece)].shape.sharpest
+        bend = max(sharpest, *(one.bend(a, b) for one in cubics))
+        step = _SPACING
+        if bend > 0.0:
+            step = min(step, math.sqrt(8.0 * _SAG / bend))
+        number = math.ceil((b - a) / step) + 1
+        total += number
+        if total > _MOST_STATIONS:
+            raise ValueError(f"road {road.name}: too many bends")
+        s = np.linspace(a, b, number)
+        places.append(s)
+        inside.append(np.clip(s, a + _INWARDS, b - _INWARDS))
+    return np.concatenate(places), np.concatenate(inside)
+
+
+# A road at least this much above another one is a bridge [m].
+_HEADROOM = 3.0
+# Cell size for finding places above one another, and length of a bridge beyond
+# the crossed road [m].
+_NEAR, _BEYOND = 2.5, 8.0
+_LEAST_WIDTH = 0.1
+
+
+def split_levels(
+    bands: Sequence[LaneBand],
+) -> tuple[list[LaneBand], list[LaneBand]]:
+    """Returns the lanes on the ground, and those on bridges, cut up."""
+    raised = _raised_places(bands)
+    ground: list[LaneBand] = []
+    bridges: list[LaneBand] = []
+    for band in bands:
+        above = raised.get(band.road.name)
+        if above is None:
+            ground.append(band)
+            continue
+        low, high = np.searchsorted(above, [band.s - _BEYOND, band.s + _BEYOND])
+        is_bridge = high > low
+        for run, carried in _runs(is_bridge):
+            (bridges if carried else ground).append(_cut(band, run))
+    return ground, bridges
+
+
+def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
+    """Returns road -> places where it passes over another, increasing [m]."""
+    names = {band.road.name: k for k, band in enumerate(bands)}
+    rows = []
+    for band in bands:
+        wide = band.width > _LEAST_WIDTH
+        for edge in (band.inner, band.middle, band.outer):
+            owner = np.full(len(band.s), names[band.road.name])
+            rows.append(np.column_stack([edge, band.s, owner])[wide])
+    places = np.concatenate(rows) if rows else np.zeros((0, 5))
+    if len(places) == 0 or np.ptp(places[:, 2]) < _HEADROOM:
+        return {}
+    # One place for each square metre is enough: the highest and the lowest.
+    tree = cKDTree(places[:, :2])
+    found: dict[str, list[float]] = {}
+    high = np.flatnonzero(places[:, 2] > places[:, 2].min() + _HEADROOM)
+    for k, near in zip(
+        high, tree.query_ball_point(places[high, :2], _NEAR), strict=True
+    ):
+        others = places[near]
+        below = others[:, 2] < places[k, 2] - _HEADROOM
+        if (below & (others[:, 4] != places[k, 4])).any():
+            road = bands[int(places[k, 4])].road.name
+            found.setdefault(road, []).append(float(places[k, 3]))
+    return {road: np.unique(some) for road, some in found.items()}
+
+
+def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
+    """Yields stretches of the same level; neighbours share a place."""
+    starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
+    for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):
+        last = min(b + 1, len(is_bridge))
+        if last - a > 1:
+            yield slice(int(a), int(last)), bool(is_bridge[a])
+
+
+def _cut(band: LaneBand, run: slice) -> LaneBand:
+    names = ("inner", "outer", "middle", "heading", "roll", "grade", "s")
+    return replace(band, **{name: getattr(band, name)[run] for name in names})
+
+
+# Number of nearby places whose planes give a height, as their mean.
+_NEIGHBOURS = 8
+# Distance of the places of a lane [m].
+_PLACE_SPACING = 0.5
+# Nearer places count more; this distance bounds their weight [m].
+_CORE = 0.05
+# Places at a time.
+_BLOCK = 200_000
+_LEVEL = 1e-9
+
+
+class RoadHeights:
+    """The height of imported carriageways, continued to both sides.
+
+    Each place in the middle of a lane has a plane, from the grade and the roll
+    of its road. The height is the mean of those nearby (Shepard's
+    interpolation): exact on one road, and without a step where roads that
+    overlap in a junction differ.
+    """
+
+    def __init__(self, bands: Sequence[LaneBand]):
+        """Takes all lanes that lie on the ground, at least one."""
+        places = np.concatenate([_places(band) for band in bands])
+        self._p = places[:, :3]
+        heading, roll, grade = places[:, 3:].T
+        across = np.tan(roll)
+        self._slope = np.stack(
+            [
+                grade * np.cos(heading) - across * np.sin(heading),
+                grade * np.sin(heading) + across * np.cos(heading),
+            ],
+            axis=1,
+        )
+        self._tree = cKDTree(self._p[:, :2])
+
+    @property
+    def is_level(self) -> bool:
+        """Whether all roads lie at z = 0 throughout."""
+        return bool(
+            np.abs(self._p[:, 2]).max() < _LEVEL
+            and np.abs(self._slope).max() < _LEVEL
+        )
+
+    def heights(self, xy: ArrayLike) -> np.ndarray:
+        """Returns the (N,) heights at (N, 2) places [m]."""
+        xy = np.asarray(xy, dtype=float).reshape(-1, 2)
+        blocks = [
+            self._block(xy[k : k + _BLOCK]) for k in range(0, len(xy), _BLOCK)
+        ]
+        return np.concatenate([np.zeros(0), *blocks])
+
+    def _block(self, xy: np.ndarray) -> np.ndarray:
+        count = min(_NEIGHBOURS, len(self._p))
+        distance, index = self._tree.query(xy, k=count)
+        distance, index = distance.reshape(-1, count), index.reshape(-1, count)
+        away = xy[:, None] - self._p[index, :2]
+        z = self._p[index, 2] + (self._slope[index] * away).sum(axis=2)
+        weight = 1.0 / (distance**2 + _CORE**2) ** 2
+        return (z * weight).sum(axis=1) / weight.sum(axis=1)
+
+
+def _places(band: LaneBand) -> np.ndarray:
+    """Returns (N, 6) places in the middle, heading, roll and grade there."""
+    rows = np.column_stack([band.middle, band.heading, band.roll, band.grade])
+    # Both sides of a joint stay: the stretch between them has no length.
+    steps = np.diff(band.s)
+    counts = np.maximum(np.ceil(steps / _PLACE_SPACING).astype(int), 1)
+    first = np.repeat(np.arange(len(steps)), counts)
+    part = (
+        np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    ) / counts[first]
+    between = rows[first] + part[:, None] * (rows[first + 1] - rows[first])
+    return np.concatenate([between, rows[-1:]])

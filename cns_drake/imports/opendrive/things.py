@@ -1,0 +1,315 @@
+"""Signals and objects beside the roads of OpenDRIVE, and their structures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+import zlib
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon, box
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.xml_elements import Element
+from cns_drake.city.geometry.polygons import placed
+from cns_drake.city.geometry.structures import Model, Structure
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.plants.vegetation import tree
+from cns_drake.imports.faces import extruded
+from cns_drake.imports.foreign_city import make_imported
+from cns_drake.imports.opendrive.road_model import ImportedRoad, Thing
+from cns_drake.imports.options import ImportFaults
+
+_MOST_REPEATS = 10_000
+# An object repeated without a distance is cut into pieces of this length [m].
+_PIECE = 4.0
+_LARGEST = 1000.0  # [m]
+
+
+def read_things(
+    road: Element, name: str, faults: ImportFaults
+) -> Iterator[Thing]:
+    """Yields the signals and objects beside a road.
+
+    Raises:
+        ValueError: naming line and fault, if a text is not a number.
+    """
+    for k, one in enumerate(road.all("signals", "signal")):
+        yield Thing(
+            name=f"signal_{name}_{k}",
+            is_signal=True,
+            kind=one.text("type", "").lower(),
+            s=one.number("s"),
+            t=one.number("t"),
+            z=one.number("zOffset", 0.0),
+            heading=one.number("hOffset", 0.0),
+            size=(0.0, one.number("width", 0.0), one.number("height", 0.0)),
+            is_dynamic=one.text("dynamic", "no") == "yes",
+            faces_back=one.text("orientation", "none") == "-",
+        )
+    for k, one in enumerate(road.all("objects", "object")):
+        thing = _object(one, f"object_{name}_{k}")
+        repeats = list(one.all("repeat"))
+        if not repeats:
+            yield thing
+        for m, repeat in enumerate(repeats):
+            yield from _repeated(thing, repeat, m, faults)
+
+
+def _object(one: Element, name: str) -> Thing:
+    radius = one.number("radius", 0.0)
+    size = (
+        one.number("length", 2.0 * radius),
+        one.number("width", 2.0 * radius),
+        one.number("height", 0.0),
+    )
+    if not all(0.0 <= side <= _LARGEST for side in size):
+        raise ValueError(
+            f"line {one.line}: object: a size of {size} m is not in 0 to "
+            f"{_LARGEST:g} m"
+        )
+    outline = next(one.all("outlines", "outline"), one.first("outline"))
+    corners = road_corners = None
+    if outline is not None:
+        corners = _corners(outline, "cornerLocal", "u", "v")
+        road_corners = _corners(outline, "cornerRoad", "s", "t")
+    return Thing(
+        name=name,
+        is_signal=False,
+        kind=one.text("type", one.text("name", "none")).lower(),
+        s=one.number("s"),
+        t=one.number("t"),
+        z=one.number("zOffset", 0.0),
+        heading=one.number("hdg", 0.0),
+        size=size,
+        outline=corners,
+        road_outline=road_corners,
+    )
+
+
+def _corners(
+    outline: Element, tag: str, first: str, second: str
+) -> np.ndarray | None:
+    rows = [
+        (one.number(first), one.number(second), one.number("height", 0.0))
+        for one in outline.all(tag)
+    ]
+    return np.array(rows) if len(rows) >= 3 else None
+
+
+def _repeated(
+    thing: Thing, repeat: Element, number: int, faults: ImportFaults
+) -> Iterator[Thing]:
+    start, length = repeat.number("s"), repeat.number("length")
+    distance = repeat.number("distance", 0.0)
+    step = distance if distance > 0.0 else _PIECE
+    count = math.floor(length / step + 1e-9) + (distance > 0.0)
+    if distance <= 0.0:
+        count = math.ceil(length / step)
+    if count > _MOST_REPEATS:
+        faults.add(
+            f"object repeated more than {_MOST_REPEATS} times, left out",
+            thing.name,
+        )
+        return
+    for k in range(max(count, 1)):
+        # A wall becomes pieces, each centred on its own middle.
+        at = k * step if distance > 0.0 else (k + 0.5) * length / max(count, 1)
+        part = min(1.0, at / length) if length > 0.0 else 0.0
+
+        def value(name: str, default: float, part: float = part) -> float:
+            first = repeat.number(f"{name}Start", default)
+            last = repeat.number(f"{name}End", first)
+            return first + part * (last - first)
+
+        own = thing.size[0]
+        if distance <= 0.0 and length > 0.0:
+            own = length / count
+        size = (
+            own,
+            value("width", thing.size[1]),
+            value("height", thing.size[2]),
+        )
+        yield Thing(
+            name=f"{thing.name}_{number}_{k}",
+            is_signal=False,
+            kind=thing.kind,
+            s=start + at,
+            t=value("t", thing.t),
+            z=value("zOffset", thing.z),
+            heading=thing.heading,
+            size=size,
+            outline=thing.outline,
+        )
+
+
+# Traffic signs of the Vienna convention, by the beginning of their type,
+# numbered as in most files.
+_SIGNS = (
+    (("206", "stop"), "sign_stop"),
+    (("205", "1"), "sign_triangular"),
+    (("2",), "sign_round"),
+)
+# Beginning of a type -> class; all others are other objects.
+_CLASSES = (
+    (("building",), "building"),
+    (
+        ("barrier", "railing", "guard", "fence", "wall", "soundbarrier"),
+        "fence",
+    ),
+    (("vegetation", "bush", "hedge", "plant"), "vegetation"),
+    (("pole", "streetlamp", "lamp", "permanentdelineator"), "pole"),
+    (("gantry", "bridge", "tunnel"), "other-structure"),
+    (("trafficisland",), "other-ground"),
+)
+# These are painted, or flat on the ground.
+_FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
+_LEAST_HEIGHT = 0.05
+_LEAST_SIDE = 0.05
+_LEAST_AREA = 1e-4
+_HALF_TURN = math.pi
+
+
+def thing_structures(
+    road: ImportedRoad, lanes: BaseGeometry, faults: ImportFaults
+) -> Iterator[Structure]:
+    """Yields structures of the signals and objects beside a road.
+
+    Args:
+        road: the road.
+        lanes: the area of all lanes, where no sign stands [m].
+        faults: counts things left out.
+    """
+    for thing in road.things:
+        if not 0.0 <= thing.s <= road.length + 1.0:
+            faults.add(
+                "object beyond the end of its road, left out", thing.name
+            )
+            continue
+        name = thing.name
+        x, y, z, heading = _place(road, thing)
+        if thing.is_signal:
+            key = _signal_object(thing)
+            builder = OBJECTS[key]
+            facing = heading + thing.heading
+            facing += 0.0 if thing.faces_back else _HALF_TURN
+            if thing.is_dynamic:
+                # The front of traffic lights is their left side.
+                facing -= _HALF_TURN / 2.0
+            one = Structure(
+                name,
+                builder.semantic_class,
+                builder.build(_rng(name)),
+                (x, y, z),
+                round(math.remainder(facing, 2.0 * math.pi), 5),
+                ("signal",),
+            )
+            if one.footprint_W.intersects(lanes):
+                faults.add("signal over a lane, left out", name)
+                continue
+            yield one
+            continue
+        if thing.kind.startswith(_FLAT):
+            faults.add("object that is painted on the road, left out", name)
+        elif thing.kind.startswith("tree"):
+            model = tree(
+                _rng(name), species="lime_tree", height=thing.size[2] or None
+            )
+            yield Structure(
+                name, "vegetation", model, (x, y, z), 0.0, ("object",)
+            )
+        else:
+            solid = _solid(road, thing, name, (x, y, z, heading), faults)
+            if solid is not None:
+                yield solid
+
+
+def _place(
+    road: ImportedRoad, thing: Thing
+) -> tuple[float, float, float, float]:
+    """Returns x, y, z [m] of a thing's foot, and the road's heading there."""
+    s = np.array([min(thing.s, road.length)])
+    inside = np.clip(s, 1e-6, road.length - 1e-6)
+    x, y, z = road.points(s, inside, np.array([thing.t]))[0].tolist()
+    heading = float(road.reference(s, inside)[0, 3])
+    low = 0.0 if thing.is_signal else thing.z
+    return round(x, 3), round(y, 3), round(z + low, 3), heading
+
+
+def _signal_object(thing: Thing) -> str:
+    if thing.is_dynamic:
+        return "traffic_light_post"
+    for beginnings, name in _SIGNS:
+        if thing.kind.startswith(beginnings):
+            return name
+    return "sign_rectangular"
+
+
+def _solid(
+    road: ImportedRoad,
+    thing: Thing,
+    name: str,
+    place: tuple[float, float, float, float],
+    faults: ImportFaults,
+) -> Structure | None:
+    """Returns an object raised from its outline; None without an outline."""
+    x, y, z, heading = place
+    high = thing.size[2]
+    if thing.road_outline is not None:
+        s, t, heights = thing.road_outline.T
+        s = np.clip(s, 0.0, road.length)
+        inside = np.clip(s, 1e-6, road.length - 1e-6)
+        polygon = Polygon(road.points(s, inside, t)[:, :2])
+        high = float(heights.max()) or high
+    else:
+        length, width = thing.size[0], thing.size[1]
+        if thing.outline is not None:
+            footprint = Polygon(thing.outline[:, :2])
+            high = float(thing.outline[:, 2].max()) or high
+        else:
+            half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
+            footprint = box(-half[0], -half[1], half[0], half[1])
+            if length == width == 0.0:
+                faults.add("object without a size, left out", name)
+                return None
+        polygon = placed(footprint, (x, y), heading + thing.heading)
+    if high < _LEAST_HEIGHT:
+        faults.add("object without a height, left out", name)
+        return None
+    if not polygon.is_valid:
+        faults.add("outline that crosses itself, repaired", name)
+    pieces = [
+        piece
+        for piece in shapely.get_parts(
+            shapely.set_precision(shapely.make_valid(polygon), 0.001)
+        )
+        if isinstance(piece, Polygon) and piece.area > _LEAST_AREA
+    ]
+    if not pieces:
+        faults.add("object without an area, left out", name)
+        return None
+    solids = [
+        np.concatenate(extruded(piece, z, z + high, name, faults))
+        for piece in pieces
+    ]
+    one = make_imported(
+        name,
+        _class_of(thing.kind),
+        "Object",
+        {"body": np.concatenate(solids)},
+        {},
+    ).structure
+    model = Model(one.model.parts, one.model.meshes, shapely.union_all(pieces))
+    return Structure(name, one.semantic_class, model, one.xyz, 0.0, ("object",))
+
+
+def _class_of(kind: str) -> str:
+    for beginnings, semantic_class in _CLASSES:
+        if kind.startswith(beginnings):
+            return semantic_class
+    return "other-object"
+
+
+def _rng(name: str) -> np.random.Generator:
+    return np.random.default_rng(zlib.crc32(name.encode()))

@@ -1,0 +1,1 @@
+"""OpenStreetMap: a file's buildings, streets and land as a city."""

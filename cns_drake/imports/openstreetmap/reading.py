@@ -1,0 +1,262 @@
+"""Reads the parts of an OpenStreetMap file that make a city."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular
+from cns_drake.city.geometry.polygons import hull_of
+from cns_drake.imports.options import ImportFaults
+
+Tags = Mapping[str, str]
+
+# Less than the area of a point and its rounding, some 0.01 m^2 [deg^2].
+_NO_AREA = 1e-12
+_OPEN = "whose outline does not close"
+_LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
+# Tags that give the kind of a thing, the more specific first
+# (https://wiki.openstreetmap.org/wiki/Map_features).
+_KIND_KEYS = (
+    "building",
+    "building:part",
+    "highway",
+    "railway",
+    "aeroway",
+    "aerialway",
+    "waterway",
+    "barrier",
+    "natural",
+    "landuse",
+    "leisure",
+    "amenity",
+    "man_made",
+    "historic",
+    "tourism",
+    "shop",
+    "office",
+    "craft",
+    "healthcare",
+    "emergency",
+    "power",
+    "telecom",
+    "public_transport",
+    "advertising",
+    "traffic_sign",
+    "traffic_calming",
+    "entrance",
+    "indoor",
+    "military",
+    "geological",
+    "playground",
+    "sport",
+    "route",
+    "boundary",
+    "place",
+    "area:highway",
+)
+# Prefixes of keys of former things, and of former or future things.
+_GONE = ("demolished", "destroyed", "historic", "razed", "removed", "was")
+_LIFECYCLE = (
+    "abandoned",
+    "construction",
+    "demolished",
+    "destroyed",
+    "disused",
+    "historic",
+    "planned",
+    "proposed",
+    "razed",
+    "removed",
+    "was",
+)
+
+
+class OsmWay(NamedTuple):
+    """A way: its id, tags, places [deg] and the numbers of its nodes."""
+
+    name: str
+    tags: Tags
+    line: np.ndarray
+    nodes: tuple[int, ...]
+
+
+class OsmArea(NamedTuple):
+    """An area: its id, tags and polygons [deg]."""
+
+    name: str
+    tags: Tags
+    polygons: list[Polygon]
+
+
+@dataclass
+class OsmFeatures:
+    """The content of a file; places are longitude and latitude [deg].
+
+    Attributes:
+        areas: closed ways and multipolygons.
+        ways: with those of their places that are in the file.
+        trees: id, tags and place.
+        crossings: number of the node, and tags.
+        nodes: id, tags and place of all other nodes that have tags.
+        outers: id of each way that is an outline of a building's multipolygon
+            -> id of that.
+        kinds: id of each thing with tags -> its kind; nodes have `n` before
+            their number, ways `w` and relations `r`.
+        faults: counts of unreadable things.
+    """
+
+    areas: list[OsmArea] = field(default_factory=list)
+    ways: list[OsmWay] = field(default_factory=list)
+    trees: list[tuple[str, Tags, tuple[float, float]]] = field(
+        default_factory=list
+    )
+    crossings: list[tuple[int, Tags]] = field(default_factory=list)
+    nodes: list[tuple[str, Tags, tuple[float, float]]] = field(
+        default_factory=list
+    )
+    outers: dict[str, str] = field(default_factory=dict)
+    kinds: dict[str, str] = field(default_factory=dict)
+    faults: ImportFaults = field(default_factory=ImportFaults)
+
+
+def read_openstreetmap(path: Path) -> OsmFeatures:
+    """Reads a file.
+
+    Raises:
+        InputError: if it cannot be read.
+    """
+    import osmium
+
+    features = OsmFeatures()
+    check_regular(path)
+    wanted: dict[str, None] = {}
+    flat: set[str] = set()
+    try:
+        reader = osmium.FileProcessor(str(path)).with_locations().with_areas()
+        for one in reader:
+            tags = {tag.k: tag.v for tag in one.tags}
+            if tags and not isinstance(one, osmium.osm.Area):
+                letter = _LETTERS[type(one).__name__]
+                features.kinds[f"{letter}{one.id}"] = thing_kind(tags)
+            if isinstance(one, osmium.osm.Area):
+                polygons = _polygons(one)
+                kind = "w" if one.from_way() else "r"
+                name = f"{kind}{one.orig_id()}"
+                if polygons and is_building(tags) and _is_flat(polygons):
+                    flat.add(name)
+                elif polygons:
+                    features.areas.append(OsmArea(name, tags, polygons))
+            elif isinstance(one, osmium.osm.Way) and tags:
+                name = f"w{one.id}"
+                if is_building(tags):
+                    wanted[name] = None
+                nodes = [n for n in one.nodes if n.location.valid()]
+                missing = len(one.nodes) - len(nodes)
+                if missing and name not in wanted:
+                    features.faults.add(
+                        "place of a way that is not in the file, left out",
+                        name,
+                        missing,
+                    )
+                if len(nodes) > 1:
+                    line = np.array([(n.lon, n.lat) for n in nodes])
+                    numbers = tuple(n.ref for n in nodes)
+                    features.ways.append(OsmWay(name, tags, line, numbers))
+            elif isinstance(one, osmium.osm.Relation):
+                if tags.get("type") == "multipolygon" and is_building(tags):
+                    wanted[f"r{one.id}"] = None
+                    features.outers |= {
+                        f"w{member.ref}": f"r{one.id}"
+                        for member in one.members
+                        if member.type == "w" and member.role != "inner"
+                    }
+            elif isinstance(one, osmium.osm.Node) and one.location.valid():
+                if tags.get("natural") == "tree":
+                    place = (one.lon, one.lat)
+                    features.trees.append((f"n{one.id}", tags, place))
+                elif tags.get("highway") == "crossing":
+                    features.crossings.append((one.id, tags))
+                elif tags:
+                    place = (one.lon, one.lat)
+                    features.nodes.append((f"n{one.id}", tags, place))
+    except (
+        RuntimeError,
+        ValueError,
+        OverflowError,
+        osmium.InvalidLocationError,
+    ) as error:
+        first = str(error).splitlines()[0] if str(error) else "unreadable"
+        raise InputError(f"{path}: {first}") from error
+    closed = {name for name, _, _ in features.areas}
+    shapeless = [name for name in wanted if name not in closed]
+    if shapeless:
+        flat.update(_closed_without_area(features.ways))
+    for name in shapeless:
+        fault = "without area" if name in flat else _OPEN
+        features.faults.add(f"building {fault}, left out", name)
+    return features
+
+
+def _polygons(area: Any) -> list[Polygon]:
+    found = []
+    for outer in area.outer_rings():
+        holes = [
+            [(n.lon, n.lat) for n in inner] for inner in area.inner_rings(outer)
+        ]
+        found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
+    return found
+
+
+def _closed_without_area(ways: Iterable[OsmWay]) -> Iterator[str]:
+    """Yields closed ways from which the reader makes no area."""
+    for way in ways:
+        if way.nodes[0] == way.nodes[-1] and _is_flat([hull_of(way.line)]):
+            yield way.name
+
+
+def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:
+    return sum(outline.area for outline in outlines) < _NO_AREA
+
+
+def thing_kind(tags: Tags) -> str:
+    """Returns the kind of a thing, by its first tag that gives one."""
+    for key in _KIND_KEYS:
+        if has_tag(tags, key):
+            return f"{key}={tags[key]}"
+    if any(key.startswith("addr:") for key in tags):
+        return "address"
+    for key in tags:
+        stage, _, rest = key.partition(":")
+        if stage in _LIFECYCLE and rest:
+            return f"{stage}:{rest}"
+    return f"relation of type {tags['type']}" if "type" in tags else "other"
+
+
+def has_tag(tags: Tags, name: str) -> bool:
+    """Returns whether the tag exists and is not `no`."""
+    return tags.get(name, "no") != "no"
+
+
+def is_building(tags: Tags) -> bool:
+    """Returns whether tags mean a building or a part of one.
+
+    A former building with the date of its end counts, too.
+    """
+    return (
+        has_tag(tags, "building")
+        or has_tag(tags, "building:part")
+        or ("end_date" in tags and was_building(tags))
+    )
+
+
+def was_building(tags: Tags) -> bool:
+    """Returns whether a key marks a former building."""
+    return any(has_tag(tags, f"{stage}:building") for stage in _GONE)

@@ -1,0 +1,506 @@
+"""Values of OpenStreetMap's tags: heights, widths, classes, lanes, limits.
+
+https://wiki.openstreetmap.org/wiki/Map_features,
+https://wiki.openstreetmap.org/wiki/Map_features/Units,
+https://wiki.openstreetmap.org/wiki/Key:building:levels,
+https://wiki.openstreetmap.org/wiki/Key:lanes,
+https://wiki.openstreetmap.org/wiki/Key:maxspeed"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+import re
+from typing import NamedTuple
+
+from cns_drake.imports.options import ImportFaults
+
+# Units in metres; without one a length is in metres.
+_UNITS = {
+    "": 1.0,
+    "m": 1.0,
+    "metre": 1.0,
+    "metres": 1.0,
+    "meter": 1.0,
+    "meters": 1.0,
+    "cm": 0.01,
+    "km": 1000.0,
+    "mi": 1609.344,
+    "ft": 0.3048,
+    "foot": 0.3048,
+    "feet": 0.3048,
+    "'": 0.3048,
+    "in": 0.0254,
+    '"': 0.0254,
+}
+_NUMBER = r"(\d+(?:[.,]\d+)?|[.,]\d+)"
+_LENGTH = re.compile(rf"{_NUMBER}\s*([a-z]*|'|\")")
+_FEET_AND_INCHES = re.compile(
+    rf"{_NUMBER}\s*(?:'|ft|feet|foot)\s*{_NUMBER}\s*(?:\"|in|'')?"
+)
+# Separators of lists and of ranges.
+_BETWEEN = re.compile(r"\s*;\s*|(?<=[^\s;])\s*(?:-|–|\bto\b)\s*(?=[\d.,])")
+_ABOUT = re.compile(r"^\s*(?:~|≈|ca\.?|about|approx\.?)\s*")
+_QUOTES = str.maketrans({"’": "'", "′": "'", "”": '"', "″": '"'})
+
+
+def length(text: str | None) -> float | None:
+    """Returns a length in metres; None if it is missing or no length.
+
+    The greatest, where there is a list or a range.
+    """
+    found = [_length(part) for part in _parts(text)]
+    return _greatest(found)
+
+
+def count(text: str | None) -> float | None:
+    """Returns a number, such as of levels; None if it is missing or none.
+
+    The greatest, where there is a list or a range.
+    """
+    found = [
+        float(part.replace(",", ".")) if re.fullmatch(_NUMBER, part) else None
+        for part in _parts(text)
+    ]
+    return _greatest(found)
+
+
+def _parts(text: str | None) -> Iterator[str]:
+    if text is None or len(text) > 255:  # OpenStreetMap allows no more.
+        return
+    plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
+    for part in _BETWEEN.split(plain):
+        if part.strip():
+            yield _ABOUT.sub("", part).strip()
+
+
+def _length(text: str) -> float | None:
+    both = _FEET_AND_INCHES.fullmatch(text)
+    if both:
+        feet, inches = (float(one.replace(",", ".")) for one in both.groups())
+        return 0.3048 * (feet + inches / 12.0)
+    match = _LENGTH.fullmatch(text)
+    if match is None or match[2] not in _UNITS:
+        return None
+    return float(match[1].replace(",", ".")) * _UNITS[match[2]]
+
+
+def _greatest(values: list[float | None]) -> float | None:
+    """Returns the greatest value; None without any, or if one is None."""
+    if not values or None in values:
+        return None
+    return max(value for value in values if value is not None)
+
+
+STOREY = 3.0  # [m]
+LANE = 3.0  # [m]
+# Least width for two cars to pass each other [m].
+_TWO_CARS = 5.0
+# Levels of buildings without tags for height or levels.
+_USUAL_LEVELS = {
+    "garage": 1,
+    "garages": 1,
+    "shed": 1,
+    "hut": 1,
+    "roof": 1,
+    "carport": 1,
+    "kiosk": 1,
+    "service": 1,
+    "house": 2,
+    "detached": 2,
+    "terrace": 2,
+    "church": 4,
+    "apartments": 5,
+}
+_LEVELS = 3
+# Width of streets without tags for width or lanes [m].
+_STREETS = {
+    "motorway": 12.0,
+    "trunk": 12.0,
+    "primary": 11.0,
+    "secondary": 10.0,
+    "tertiary": 8.0,
+    "unclassified": 6.5,
+    "residential": 6.5,
+    "living_street": 5.5,
+    "service": 4.5,
+    "track": 3.5,
+}
+_PATHS = {
+    "pedestrian": 6.0,
+    "footway": 2.0,
+    "path": 2.0,
+    "cycleway": 2.5,
+    "steps": 2.0,
+}
+# Larger than any building or street: the tallest tower has 828 m.
+_TALLEST = 850.0  # [m]
+_LOWEST = 0.1  # [m]
+_MOST_LEVELS = 170
+_WIDEST = 60.0  # [m]
+_LANES_OF_STREET = 16
+# Values of `building` for buildings that are not there, and keys for it.
+_ABSENT = {
+    "demolished": "demolished",
+    "destroyed": "demolished",
+    "razed": "demolished",
+    "removed": "demolished",
+    "collapsed": "demolished",
+    "proposed": "proposed",
+    "planned": "proposed",
+    "construction": "unfinished",
+}
+
+
+def tag_value(
+    tags: Mapping[str, str],
+    key: str,
+    read: Callable[[str], float | None],
+    most: float,
+    where: tuple[str, ImportFaults] | None,
+    least: float = 0.0,
+) -> float | None:
+    """Returns the value of a tag; None if it has no valid one.
+
+    Args:
+        tags: of a thing.
+        key: of the tag.
+        read: parser of its value.
+        most: greatest plausible value.
+        where: name of the thing, and the counts for values that cannot be
+            parsed or are implausible; None if they are counted elsewhere.
+        least: least plausible value.
+    """
+    text = tags.get(key)
+    if text is None:
+        return None
+    value = read(text)
+    if value is not None and least <= value <= most:
+        return value
+    if where is not None:
+        name, faults = where
+        kind = f"{key} unreadable or implausible, the usual one taken"
+        faults.add(kind, name)
+    return None
+
+
+def heights(
+    tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
+) -> tuple[float, float, float]:
+    """Returns lowest and highest point of a building, and its roof's height.
+
+    All three are measured from the ground [m].
+
+    Args:
+        tags: of the building.
+        where: see `tag_value`.
+    """
+
+    def metres(key: str, least: float = 0.0) -> float | None:
+        return tag_value(tags, key, length, _TALLEST, where, least)
+
+    def number(key: str, least: float = 0.0) -> float | None:
+        return tag_value(tags, key, count, _MOST_LEVELS, where, least)
+
+    roof_levels = number("roof:levels")
+    # A building may have no levels if its roof has some.
+    levels = number("building:levels", 0.0 if roof_levels else 0.5)
+    roof = metres("roof:height")
+    if roof is None:
+        roof = STOREY * (roof_levels or 1.0)
+        if tags.get("roof:shape", "flat") == "flat":
+            roof = 0.0
+    high = (
+        metres("height", _LOWEST)
+        or metres("building:height", _LOWEST)
+        or metres("est_height", _LOWEST)
+    )
+    if high is None:
+        if levels is None:
+            levels = _USUAL_LEVELS.get(tags.get("building", ""), _LEVELS)
+        high = STOREY * levels + (roof or STOREY * (roof_levels or 0.0))
+    low = metres("min_height")
+    if low is None:
+        low = STOREY * (number("building:min_level") or 0.0)
+    high = max(high, 1.0)
+    if low >= high and where is not None:
+        name, faults = where
+        faults.add("building that begins above its top, lowered", name)
+    low = min(low, high - 0.5)
+    return low, high, min(roof, high - low - 0.1)
+
+
+def why_absent(tags: Mapping[str, str]) -> str | None:
+    """Returns why a building of a file is absent; None if it stands."""
+    if not ("building" in tags or "building:part" in tags):
+        return "demolished"
+    kinds = [tags.get("building", ""), tags.get("building:part", "")]
+    kinds += [key for key in _ABSENT if tags.get(key) == "yes"]
+    for kind in kinds:
+        if kind in _ABSENT:
+            return _ABSENT[kind]
+    layer = tags.get("layer", "")
+    if (
+        tags.get("location") in ("underground", "underwater")
+        or tags.get("tunnel", "no") not in ("no", "building_passage")
+        or re.fullmatch(r"-\d+(\.\d+)?", layer)
+        or (
+            tags.get("building:levels") == "0"
+            and count(tags.get("building:levels:underground"))
+            and not count(tags.get("roof:levels"))
+        )
+    ):
+        return "underground"
+    return None
+
+
+def street_width(
+    tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
+) -> float | None:
+    """Returns the width of a street for cars [m]; None for other ways.
+
+    Args:
+        tags: of a way.
+        where: see `tag_value`.
+    """
+    kind = tags.get("highway", "").removesuffix("_link")
+    if kind not in _STREETS:
+        return None
+    width = tag_value(tags, "width", length, _WIDEST, where)
+    if width:
+        return width
+    lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, where)
+    if lanes:
+        return LANE * lanes + 0.5
+    usual = _STREETS[kind]
+    is_one_way = not all(driven_ways(tags))
+    return max(0.6 * usual, 3.5) if is_one_way else usual
+
+
+def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
+    """Returns whether cars may drive along a street's line, and against it."""
+    if any(
+        tags.get(key) in ("no", "private", "bus", "agricultural")
+        for key in ("motor_vehicle", "motorcar", "vehicle")
+    ) or tags.get("access") in ("no", "private"):
+        return False, False
+    one_way = tags.get("oneway", "")
+    if one_way in ("-1", "reverse"):
+        return False, True
+    kind = tags.get("highway", "")
+    is_round = tags.get("junction") in ("roundabout", "circular")
+    usual = is_round or kind in ("motorway", "motorway_link")
+    if one_way in ("yes", "1", "true") or (usual and one_way != "no"):
+        return True, False
+    return True, True
+
+
+def lanes_beside(tags: Mapping[str, str], width: float) -> float:
+    """Returns the distance of the outermost lane from a street's middle [m].
+
+    Args:
+        tags: of the street.
+        width: of its carriageway [m].
+    """
+    lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
+    if not lanes:
+        lanes = 2.0 if all(driven_ways(tags)) else 1.0
+    # If two cars cannot pass, both keep to the middle.
+    if width < _TWO_CARS and all(driven_ways(tags)):
+        return 0.0
+    return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))
+
+
+def is_marked(tags: Mapping[str, str]) -> bool:
+    """Returns whether a crossing has stripes."""
+    markings = tags.get("crossing:markings")
+    if markings is not None:
+        return markings.startswith("zebra") or markings == "yes"
+    return (
+        tags.get("crossing") in ("zebra", "marked", "uncontrolled")
+        or tags.get("crossing_ref") == "zebra"
+    )
+
+
+def path_width(tags: Mapping[str, str]) -> float | None:
+    """Returns the width of a way for people [m]; None for other ways."""
+    usual = _PATHS.get(tags.get("highway", ""))
+    if usual is None:
+        return None
+    return tag_value(tags, "width", length, _WIDEST, None) or usual
+
+
+def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
+    """Returns whether a street has a sidewalk on its left and right."""
+    both = tags.get("sidewalk:both") == "yes"
+    side = tags.get("sidewalk", "")
+    left = (
+        both or side in ("both", "left") or tags.get("sidewalk:left") == "yes"
+    )
+    right = (
+        both or side in ("both", "right") or tags.get("sidewalk:right") == "yes"
+    )
+    return left, right
+
+
+def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
+    """Returns kind and class of an area on the ground; None for others."""
+    if tags.get("natural") == "water" or tags.get("waterway") in (
+        "riverbank",
+        "dock",
+    ):
+        return "WaterBody", "other-ground"
+    if tags.get("amenity") == "parking":
+        return "Parking", "parking"
+    if tags.get("highway") == "pedestrian" or tags.get("place") == "square":
+        return "Square", "other-ground"
+    if (
+        tags.get("landuse")
+        in (
+            "grass",
+            "forest",
+            "meadow",
+            "farmland",
+            "flowerbed",
+            "cemetery",
+            "village_green",
+            "orchard",
+            "allotments",
+        )
+        or tags.get("leisure") in ("park", "garden", "pitch", "playground")
+        or tags.get("natural") in ("grassland", "scrub", "wood", "heath")
+    ):
+        return "LandUse", "terrain"
+    return None
+
+
+# Least width of a lane that carries any vehicle, the width that drivers use,
+# and the width of street for each lane where the file gives no number [m].
+_LEAST, _USED, _USUAL = 2.75, 3.25, 3.5
+_MOST_LANES = 8
+_KM_H = 1.0 / 3.6
+_MILES_H = 0.44704
+_FASTEST = 60.0  # [m/s]
+_WALKING_PACE = 7.0 * _KM_H
+# Limits of streets without a tag for it, and of the values that name a rule of
+# a country, such as `DE:urban` [km/h].
+_BY_CLASS = {
+    "motorway": 120.0,
+    "trunk": 80.0,
+    "primary": 50.0,
+    "secondary": 50.0,
+    "tertiary": 50.0,
+    "unclassified": 50.0,
+    "residential": 30.0,
+    "living_street": 7.0,
+    "service": 20.0,
+}
+_LINKS = 50.0
+_BY_RULE = {
+    "motorway": 120.0,
+    "trunk": 80.0,
+    "rural": 90.0,
+    "urban": 50.0,
+    "zone30": 30.0,
+    "zone:30": 30.0,
+    "living_street": 7.0,
+    "bicycle_road": 30.0,
+}
+_SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
+
+
+class LaneLayout(NamedTuple):
+    """Lanes of a street.
+
+    Attributes:
+        forward, backward: number of lanes along its line, and against it.
+        width: of each [m].
+    """
+
+    forward: int
+    backward: int
+    width: float
+
+    def offset(self, is_forward: bool, number: int) -> float:
+        """Returns the place of a lane, from the middle of the street [m].
+
+        To the side on which traffic keeps, in the lane's own direction.
+
+        Args:
+            is_forward: whether it leads along the street's line.
+            number: of the lane in its direction, 0 for the innermost one.
+        """
+        same, other = self.forward, self.backward
+        if not is_forward:
+            same, other = other, same
+        return self.width * (number + (1 + other - same) / 2.0)
+
+
+def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
+    """Returns the lanes of a street; none where vehicles cannot pass.
+
+    Args:
+        tags: of the street.
+        width: of its carriageway [m].
+    """
+    is_along, is_against = driven_ways(tags)
+    directions = is_along + is_against
+    most = int(width / _LEAST)
+    if directions == 0 or most < directions:
+        return LaneLayout(0, 0, 0.0)
+
+    def number(key: str) -> int | None:
+        value = tag_value(tags, key, count, _MOST_LANES, None, 1.0)
+        return None if value is None else int(value)
+
+    total = number("lanes") or directions * int(
+        max(1.0, width / directions / _USUAL)
+    )
+    if directions == 1:
+        forward = min(total, most) * is_along
+        backward = min(total, most) * is_against
+    else:
+        # A middle lane of both directions stays empty.
+        there, back = number("lanes:forward"), number("lanes:backward")
+        forward = there or max(1, total - back if back else total // 2)
+        backward = back or max(1, total - there if there else total // 2)
+        while forward + backward > most:
+            if forward >= backward:
+                forward -= 1
+            else:
+                backward -= 1
+    return LaneLayout(
+        forward, backward, min(_USED, width / (forward + backward))
+    )
+
+
+def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
+    """Returns the speed limit of a street [m/s].
+
+    Args:
+        tags: of the street.
+        is_forward: whether along its line.
+    """
+    side = "forward" if is_forward else "backward"
+    for key in (f"maxspeed:{side}", "maxspeed", "maxspeed:type"):
+        found = _speed(tags.get(key, ""))
+        if found is not None:
+            return found
+    kind = tags.get("highway", "")
+    return _KM_H * _BY_CLASS.get(kind, _LINKS)
+
+
+def _speed(text: str) -> float | None:
+    """Returns the lowest speed of a value [m/s]; None if it has none."""
+    speeds = []
+    for part in text.lower().split(";"):
+        found = _SPEED.fullmatch(part.strip())
+        rule = part.strip().partition(":")[2]
+        if found:
+            unit = _MILES_H if found[2] == "mph" else _KM_H
+            speeds.append(int(found[1]) * unit)
+        elif part.strip() == "walk":
+            speeds.append(_WALKING_PACE)
+        elif rule in _BY_RULE:
+            speeds.append(_BY_RULE[rule] * _KM_H)
+    valid = [one for one in speeds if 0.0 < one <= _FASTEST]
+    return min(valid, default=None)

@@ -1,0 +1,527 @@
+"""Lanes of OpenStreetMap's streets, joined at junctions, for traffic."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise, product
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.angles import wrapped
+from cns_drake.imports.drives.city_drives import SHARPEST_TURN_DEG, Street
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.foreign_city import Imported, StreetPlaces
+from cns_drake.imports.openstreetmap.tags import (
+    LaneLayout,
+    lane_layout,
+    speed_limit,
+)
+from cns_drake.imports.openstreetmap.walkways import StreetWalkways
+from cns_drake.imports.options import DriveOn
+from cns_drake.roads.centreline import blend
+from cns_drake.traffic.lane_file import lane_text
+from cns_drake.traffic.lane_graph import SPACING, LaneGraph
+from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
+
+# Beyond this change of heading a way through a junction is a turn.
+_STRAIGHT_DEG = 35.0
+# Length of the means that round a street's corners [m].
+_ROUND = 7.0
+# Distance of lanes from the corner of two streets, and from the place where
+# just one street goes on, and greatest distance from a junction [m].
+_BEFORE_CORNER, _JOINT, _FARTHEST_STOP = 1.0, 3.0, 25.0
+# Least length of a lane between its junctions [m].
+_SHORTEST = 1.0
+# A street's direction at its end is that of its last piece of this length [m].
+_ARM = 6.0
+# Streets for other traffic.
+_NO_TRAFFIC = frozenset({"track"})
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A street between two junctions.
+
+    Attributes:
+        street: the whole one.
+        line: (N, 2) its middle, with rounded corners, evenly spaced [m].
+        nodes: numbers of its first and last place.
+        layout: its lanes.
+    """
+
+    street: Street
+    line: np.ndarray
+    nodes: tuple[int, int]
+    layout: LaneLayout
+
+    @cached_property
+    def length(self) -> float:
+        return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
+
+    def heading(self, end: int) -> float:
+        """Returns the direction away from an end, 0 or -1 [rad]."""
+        line = self.line if end == 0 else self.line[::-1]
+        reach = min(len(line) - 1, max(1, round(_ARM / SPACING)))
+        return float(np.arctan2(*(line[reach] - line[0])[::-1]))
+
+
+# An end of a stretch: its number, and 0 for the first end or -1 for the last.
+_Arm = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class _Lane:
+    """A lane of a stretch.
+
+    Attributes:
+        stretch: number of the stretch.
+        is_forward: whether it leads along the stretch's line.
+        number: 0 for the innermost lane of its direction.
+        points: (N, 2) in driving direction [m].
+    """
+
+    stretch: int
+    is_forward: bool
+    number: int
+    points: np.ndarray
+
+    @property
+    def exit_arm(self) -> _Arm:
+        return self.stretch, -1 if self.is_forward else 0
+
+    @property
+    def entry_arm(self) -> _Arm:
+        return self.stretch, 0 if self.is_forward else -1
+
+
+class StreetTraffic:
+    """The lanes of streets, and what follows what.
+
+    Attributes:
+        stretches: the streets with traffic, cut at their junctions.
+        lanes: those of the stretches, then the ways between them.
+        links: pairs of lane numbers; the second lane follows the first.
+        beside: number of a lane -> that of the lane on its outer side, in the
+            same direction.
+    """
+
+    def __init__(
+        self,
+        streets: Sequence[Street],
+        crossed: AbstractSet[int],
+        surface: BaseGeometry,
+        side: float,
+    ):
+        """Makes the lanes.
+
+        Args:
+            streets: they meet at common nodes.
+            crossed: nodes at which people cross.
+            surface: of all streets; ways that leave it are left out.
+            side: 1 if traffic keeps right, -1 if left.
+        """
+        self.stretches = list(_stretches(streets, crossed))
+        self._side, self._crossed = side, crossed
+        self._arms: defaultdict[int, list[_Arm]] = defaultdict(list)
+        for k, stretch in enumerate(self.stretches):
+            for end, node in zip((0, -1), stretch.nodes, strict=True):
+                self._arms[node].append((k, end))
+        lanes = list(self._stretch_lanes())
+        self.beside = _beside(lanes)
+        self.lanes = [
+            DirectedLane(
+                _level(lane.points),
+                speed_limit(
+                    self.stretches[lane.stretch].street.tags, lane.is_forward
+                ),
+                False,
+            )
+            for lane in lanes
+        ]
+        self.links: list[tuple[int, int]] = []
+        shapely.prepare(surface)
+        for first, last, is_junction, line in self._ways(lanes):
+            if not surface.covers(shapely.LineString(line)):
+                continue
+            self.links += [
+                (first, len(self.lanes)),
+                (len(self.lanes), last),
+            ]
+            limit = min(self.lanes[k].limit for k in (first, last))
+            self.lanes.append(DirectedLane(_level(line), limit, is_junction))
+
+    def junctions(self) -> list[int]:
+        """Returns the nodes where three or more streets meet."""
+        return [node for node, arms in self._arms.items() if len(arms) > 2]
+
+    def setback(self, arm: _Arm) -> float:
+        """Returns the distance of lanes from an end of their stretch [m]."""
+        stretch = self.stretches[arm[0]]
+        wanted = [self._wanted_setback((arm[0], end)) for end in (0, -1)]
+        room = max(stretch.length - _SHORTEST, 0.0)
+        return wanted[arm[1]] * min(1.0, room / sum(wanted))
+
+    def _wanted_setback(self, arm: _Arm) -> float:
+        stretch = self.stretches[arm[0]]
+        arms = self._arms[stretch.nodes[arm[1]]]
+        if len(arms) < 3:
+            return _JOINT
+        farthest = 0.0
+        half = stretch.street.width / 2.0
+        for other in arms:
+            if other == arm:
+                continue
+            crossed = self.stretches[other[0]]
+            angle = abs(
+                wrapped(crossed.heading(other[1]) - stretch.heading(arm[1]))
+            )
+            # Where the edges of both streets meet.
+            corner = crossed.street.width / 2.0 + half * np.cos(angle)
+            farthest = max(farthest, corner / max(np.sin(angle), 0.1))
+        return float(min(farthest + _BEFORE_CORNER, _FARTHEST_STOP))
+
+    def _stretch_lanes(self) -> Iterator[_Lane]:
+        for k, stretch in enumerate(self.stretches):
+            along = np.linspace(0.0, stretch.length, len(stretch.line))
+            low = self.setback((k, 0))
+            high = stretch.length - self.setback((k, -1))
+            places = np.linspace(
+                low, high, max(2, int((high - low) / SPACING) + 1)
+            )
+            middle = np.column_stack(
+                [np.interp(places, along, x) for x in stretch.line.T]
+            )
+            tangent = np.gradient(stretch.line, axis=0)
+            tangent = np.column_stack(
+                [np.interp(places, along, x) for x in tangent.T]
+            )
+            tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+            right = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+            for is_forward, count in (
+                (True, stretch.layout.forward),
+                (False, stretch.layout.backward),
+            ):
+                for number in range(count):
+                    offset = stretch.layout.offset(is_forward, number)
+                    offset *= self._side * (1.0 if is_forward else -1.0)
+                    points = middle + offset * right
+                    yield _Lane(
+                        k,
+                        is_forward,
+                        number,
+                        points if is_forward else points[::-1],
+                    )
+
+    def _ways(
+        self, lanes: Sequence[_Lane]
+    ) -> Iterator[tuple[int, int, bool, np.ndarray]]:
+        """Yields lane, next lane, whether at a junction, and the way."""
+        leaving: defaultdict[_Arm, list[int]] = defaultdict(list)
+        entering: defaultdict[_Arm, list[int]] = defaultdict(list)
+        for k, lane in enumerate(lanes):
+            leaving[lane.entry_arm].append(k)
+            entering[lane.exit_arm].append(k)
+        for node, arms in self._arms.items():
+            # Vehicles enter a crossing as they enter a junction.
+            is_junction = len(arms) > 2 or node in self._crossed
+            for a, b in product(arms, arms):
+                if a == b:
+                    continue
+                for first, last in product(entering[a], leaving[b]):
+                    one, other = lanes[first], lanes[last]
+                    before, after = _direction(one, -1), _direction(other, 0)
+                    turn = float(np.degrees(wrapped(after - before)))
+                    if abs(turn) > SHARPEST_TURN_DEG:
+                        continue
+                    if not self._is_legal(one, other, turn, len(arms) > 2):
+                        continue
+                    line = blend(
+                        one.points[-1], before, other.points[0], after, SPACING
+                    )
+                    yield first, last, is_junction, line
+
+    def _is_legal(
+        self, first: _Lane, last: _Lane, turn_deg: float, is_junction: bool
+    ) -> bool:
+        """Returns whether traffic may go from one lane to another.
+
+        A turn across the other direction leads from the innermost lane to the
+        innermost, the other turn from the outermost to the outermost. Straight
+        on, and between one-way streets, lanes keep their number.
+        """
+        layouts = [self.stretches[one.stretch].layout for one in (first, last)]
+        here, there = (
+            layout.forward if one.is_forward else layout.backward
+            for layout, one in zip(layouts, (first, last), strict=True)
+        )
+        outer = (here - 1 - first.number, there - 1 - last.number)
+        if all(layout.forward * layout.backward == 0 for layout in layouts):
+            return outer[1] == min(outer[0], there - 1)
+        if not is_junction or abs(turn_deg) <= _STRAIGHT_DEG:
+            return last.number == min(first.number, there - 1)
+        if turn_deg * self._side > 0:
+            return first.number == last.number == 0
+        return outer == (0, 0)
+
+
+def _stretches(
+    streets: Sequence[Street], crossed: AbstractSet[int]
+) -> Iterator[Stretch]:
+    layouts: list[tuple[Street, LaneLayout]] = []
+    uses: defaultdict[int, int] = defaultdict(int)
+    for street in streets:
+        layout = lane_layout(street.tags, street.width)
+        if street.tags.get("highway") in _NO_TRAFFIC or not layout.width:
+            continue
+        layouts.append((street, layout))
+        for node in street.nodes:
+            uses[node] += 1
+    for street, layout in layouts:
+        last = len(street.nodes) - 1
+        cuts = [
+            k
+            for k, node in enumerate(street.nodes)
+            if k in (0, last) or uses[node] > 1 or node in crossed
+        ]
+        for first, after in pairwise(cuts):
+            line = street.line[first : after + 1]
+            if shapely.LineString(line).length > SPACING:
+                ends = street.nodes[first], street.nodes[after]
+                yield Stretch(street, _rounded(line), ends, layout)
+
+
+def _rounded(line: np.ndarray) -> np.ndarray:
+    """Returns evenly spaced points (N, 2) along a line, without corners."""
+    whole = shapely.LineString(line)
+    count = max(3, round(whole.length / SPACING) + 1)
+    places = np.linspace(0.0, 1.0, count)
+    points = shapely.get_coordinates(
+        shapely.line_interpolate_point(whole, places, normalized=True)
+    )
+    window = min(int(_ROUND / SPACING), count // 3) // 2 * 2 + 1
+    reach = window // 2
+    # Mirrored at both ends, which stay where they are.
+    longer = np.concatenate(
+        [
+            2 * points[0] - points[reach:0:-1],
+            points,
+            2 * points[-1] - points[-2 : -reach - 2 : -1],
+        ]
+    )
+    smooth = uniform_filter1d(longer, window, axis=0)
+    return smooth[reach : reach + count]
+
+
+def _beside(lanes: Sequence[_Lane]) -> Mapping[int, int]:
+    number = {
+        (lane.stretch, lane.is_forward, lane.number): k
+        for k, lane in enumerate(lanes)
+    }
+    return {
+        k: number[outer]
+        for (stretch, is_forward, of), k in number.items()
+        if (outer := (stretch, is_forward, of + 1)) in number
+    }
+
+
+def _direction(lane: _Lane, end: int) -> float:
+    step = (
+        lane.points[1] - lane.points[0]
+        if end == 0
+        else (lane.points[-1] - lane.points[-2])
+    )
+    return float(np.arctan2(step[1], step[0]))
+
+
+def _level(line: np.ndarray) -> np.ndarray:
+    return np.column_stack([line, np.zeros(len(line))])
+
+
+# Traffic keeps to the streets near drives [m].
+_WITHIN = 300.0
+# Half of the room of a vehicle beside the middle of its lane [m].
+_HALF_WIDTH = 1.3
+# A signal stands within this distance of its junction, and a way of the
+# junction passes it within this distance [m].
+_SIGNAL_NEAR, _WAY_NEAR = 25.0, 6.0
+_KERB = 0.12
+# A height above which things do not stop a vehicle, and below [m].
+_ABOVE, _BELOW = 0.3, 3.5
+
+
+def lanes_of_streets(
+    streets: Sequence[Street],
+    places: StreetPlaces,
+    structures: Sequence[Imported],
+    added: Sequence[Imported],
+    drives: Sequence[WaypointDrive],
+    drive_on: DriveOn,
+) -> str | None:
+    """Returns the text of a file of lanes; None if no vehicle can drive on.
+
+    Args:
+        streets: of the file.
+        places: signals, crossings and paths.
+        structures: of the city.
+        added: parked cars and other things that were put beside the streets;
+            those that stand in a lane are named in the file.
+        drives: traffic keeps to the streets near them.
+        drive_on: the side of the streets on which traffic keeps.
+    """
+    if not drives:
+        return None
+    paths = shapely.MultiLineString([drive.path for drive in drives])
+    lines = [shapely.LineString(street.line) for street in streets]
+    near = [
+        street
+        for street, line in zip(streets, lines, strict=True)
+        if line.dwithin(paths, _WITHIN)
+    ]
+    if not near:
+        return None
+    walks = StreetWalkways(
+        near,
+        places.paths,
+        places.crossed,
+        _sidewalks(structures, paths),
+        _KERB,
+    )
+    surface = shapely.union_all(
+        [
+            line.buffer(street.width / 2.0, 4)
+            for street, line in zip(streets, lines, strict=True)
+            if line.dwithin(paths, 2.0 * _WITHIN)
+        ]
+    )
+    side = 1.0 if drive_on is DriveOn.RIGHT else -1.0
+    traffic = StreetTraffic(near, set(walks.crossings), surface, side)
+    free = _free(traffic, structures)
+    outer = traffic.beside
+    graph = join_lanes(
+        traffic.lanes,
+        [pair for pair in traffic.links if free[list(pair)].all()],
+        outer if side > 0 else {b: a for a, b in outer.items()},
+    )
+    if not graph.pieces:
+        return None
+    graph = _with_signals(graph, _signals(traffic, near, places.signals))
+    graph = replace(graph, crossings=tuple(walks.crossings.values()))
+    return lane_text(graph, walks.walkways, _in_the_way(graph, added))
+
+
+def _sidewalks(
+    structures: Iterable[Imported], paths: BaseGeometry
+) -> BaseGeometry:
+    """Returns the area of sidewalks near drives."""
+    triangles = [
+        one.triangles[:, :, :2] for one in structures if one.kind == "Sidewalk"
+    ]
+    if not triangles:
+        return shapely.Polygon()
+    corners = np.round(np.concatenate(triangles), 3)
+    flat = np.asarray(shapely.polygons(corners))
+    near = shapely.dwithin(flat, paths, _WITHIN) & shapely.is_valid(flat)
+    return shapely.union_all(flat[near], grid_size=0.001)
+
+
+def _free(traffic: StreetTraffic, structures: Iterable[Imported]) -> np.ndarray:
+    """Returns which lanes nothing of the file stands in, (L,) bool."""
+    solid = [
+        one.triangles
+        for one in structures
+        if not one.is_ground
+        and one.kind not in ("Sidewalk", "Lane mark")
+        and not one.kind.startswith("Water")
+    ]
+    free = np.ones(len(traffic.lanes), bool)
+    if not solid:
+        return free
+    triangles = np.concatenate(solid)
+    z = triangles[:, :, 2]
+    low = triangles[(z.max(axis=1) > _ABOVE) & (z.min(axis=1) < _BELOW)]
+    tree = shapely.STRtree(shapely.linearrings(low[:, [0, 1, 2, 0], :2]))
+    strips = [_strip(lane.points) for lane in traffic.lanes]
+    free[np.unique(tree.query(strips, "intersects")[0])] = False
+    return free
+
+
+def _strip(points: np.ndarray) -> BaseGeometry:
+    return shapely.LineString(points[:, :2]).buffer(
+        _HALF_WIDTH, cap_style="flat", quad_segs=2
+    )
+
+
+def _in_the_way(graph: LaneGraph, added: Sequence[Imported]) -> list[str]:
+    """Returns the names of things that stand where vehicles drive."""
+    if not added:
+        return []
+    tree = shapely.STRtree([_strip(piece.points) for piece in graph.pieces])
+    outlines = [one.structure.footprint_W for one in added]
+    hit = np.unique(tree.query(outlines, "intersects")[0])
+    return [added[k].structure.name for k in hit]
+
+
+def _signals(
+    traffic: StreetTraffic, streets: Iterable[Street], signals: np.ndarray
+) -> list[BaseGeometry]:
+    """Returns the places (2,) of junctions with signals."""
+    if not len(signals):
+        return []
+    places = {
+        node: street.line[k]
+        for street in streets
+        for k, node in enumerate(street.nodes)
+    }
+    junctions = shapely.points([places[n] for n in traffic.junctions()])
+    if not len(junctions):
+        return []
+    pairs = shapely.STRtree(junctions).query_nearest(
+        shapely.points(signals), max_distance=_SIGNAL_NEAR
+    )
+    return list(junctions[np.unique(pairs[1])])
+
+
+def _with_signals(
+    graph: LaneGraph, signals: Sequence[BaseGeometry]
+) -> LaneGraph:
+    """Returns lanes with signals of two phases at some junctions.
+
+    One phase is along the way on which a junction is entered first, the other
+    across it.
+    """
+    ways = [k for k, piece in enumerate(graph.pieces) if piece.is_way]
+    if not signals or not ways:
+        return graph
+    lines = [shapely.LineString(graph.pieces[k].points[:, :2]) for k in ways]
+    near = shapely.STRtree(signals).query(lines, "dwithin", _WAY_NEAR)
+    # Lanes that never cross have junctions of their own; signals join them.
+    group = {k: k for k in range(len(graph.phases))}
+    controlled: dict[int, int] = {}
+    for k, signal in near.T.tolist():
+        junction = graph.pieces[ways[k]].junction
+        first = group[controlled.setdefault(signal, junction)]
+        joined = group[junction]
+        group = {a: first if b == joined else b for a, b in group.items()}
+    switched = {group[k] for k in controlled.values()}
+    pieces = list(graph.pieces)
+    axes: dict[int, float] = {}
+    phases = list(graph.phases)
+    for k, piece in enumerate(pieces):
+        junction = group[piece.junction]
+        pieces[k] = replace(piece, junction=junction)
+        if not piece.is_way or junction not in switched:
+            continue
+        step = piece.points[1] - piece.points[0]
+        heading = float(np.arctan2(step[1], step[0]))
+        axis = axes.setdefault(junction, heading)
+        across = abs(np.sin(wrapped(heading - axis))) > np.sin(np.pi / 4)
+        pieces[k] = replace(pieces[k], phase=int(across))
+        phases[junction] = 2
+    return replace(graph, pieces=tuple(pieces), phases=tuple(phases))

@@ -1,0 +1,120 @@
+"""Options of an import, the faults that it counts, and its report."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from cns_drake.imports.building_years import Undated
+
+_LONGEST = 100
+
+
+class ImportFaults:
+    """Counts of repaired and omitted parts, with one example of each kind."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._examples: dict[str, str] = {}
+
+    def add(self, kind: str, example: str, number: int = 1) -> None:
+        """Counts faults.
+
+        Args:
+            kind: the fault and its remedy, in words.
+            example: name of the object that has it.
+            number: the number of faults.
+        """
+        kind = _printable(kind)
+        self._counts[kind] += number
+        self._examples.setdefault(kind, _printable(example))
+
+    def extend(self, others: ImportFaults) -> None:
+        """Adds the counts of others, found later."""
+        self._counts += others._counts
+        self._examples = {**others._examples, **self._examples}
+
+    def take_back(self, kind: str) -> None:
+        """Counts one fault less of a kind that has some."""
+        kind = _printable(kind)
+        self._counts[kind] -= 1
+        if not self._counts[kind]:
+            del self._counts[kind], self._examples[kind]
+
+    def rows(self) -> list[tuple[str, int, str]]:
+        """Returns kind, number and example, most frequent first."""
+        return [
+            (kind, number, self._examples[kind])
+            for kind, number in sorted(
+                self._counts.items(), key=lambda item: (-item[1], item[0])
+            )
+        ]
+
+
+def _printable(text: str) -> str:
+    """Returns a text of a file without control characters."""
+    shown = "".join(c if c.isprintable() else " " for c in text)
+    return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST - 3]}..."
+
+
+class DriveOn(str, Enum):
+    """The side of a street on which cars drive."""
+
+    RIGHT = "right"
+    LEFT = "left"
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """The options of an import.
+
+    Attributes:
+        years: of the stages, increasing; without any there is one stage.
+        year_attribute: the attribute with the year of construction; the usual
+            ones if None.
+        undated: the first stage of buildings without a year.
+        lod: level of detail; the highest of each object if None.
+        seed: of the draws of `grow`, and of buildings along a file's roads.
+        along: waypoints of a drive, in place of the two proposed ones.
+        grow: share of the buildings that an added first stage lacks, or has
+            lower, at random; no such stage if None.
+        drive_on: side of the streets; if None, the file's, or else the right.
+        within: greatest distance of structures from the drives [m]; no limit if
+            None.
+        dressed: whether looks that the file leaves open are drawn at random.
+    """
+
+    years: tuple[int, ...] = ()
+    year_attribute: str | None = None
+    undated: Undated = Undated.FIRST
+    lod: float | None = None
+    seed: int = 0
+    along: Path | None = None
+    within: float | None = None
+    drive_on: DriveOn | None = None
+    grow: float | None = None
+    dressed: bool = False
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """The result of an import.
+
+    Attributes:
+        kinds: type of object -> number of structures.
+        triangles: of all.
+        stages: stage -> number of structures.
+        undated, dated: buildings without a year, and with one.
+        drives: lengths of the proposed drives [m].
+        faults: kind, number, example.
+    """
+
+    kinds: dict[str, int]
+    triangles: int
+    stages: dict[str, int]
+    undated: int
+    dated: int
+    drives: tuple[float, ...]
+    faults: list[tuple[str, int, str]]
