@@ -13,8 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.garbage import uncollected
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, print_rows
-from cns_drake.imports.building_years import Undated
-from cns_drake.imports.options import DriveOn, ImportOptions
+from cns_drake.imports.options import DriveOn, ImportOptions, Undated
 
 if TYPE_CHECKING:
     from cns_drake.imports.options import ImportReport

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 import datetime
 from datetime import date
-from enum import Enum
 from itertools import pairwise
 import re
 from typing import Any
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.options import ImportFaults, Undated
 
 # Position in a period of "early", "mid", "late" and of no such word.
 _PARTS = {"early": 0.2, "mid": 0.5, "late": 0.8, "": 0.5}
@@ -73,14 +72,6 @@ _USUAL = (
 _PLACEHOLDER = 9999
 _DUTCH_PLACEHOLDER = 1005
 _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
-
-
-class Undated(str, Enum):
-    """The first stage that has the buildings without a year."""
-
-    FIRST = "first"
-    LAST = "last"
-    NEVER = "never"
 
 
 def construction_year(

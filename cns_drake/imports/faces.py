@@ -316,40 +316,7 @@ def _ridge(
     return (slopes + ends, []) if roof == "hipped" else (slopes, ends)
 
 
-# The Earth's axes, WGS 84 [m].
-_SEMI_MAJOR = 6378137.0
-_FLATTENING = 1.0 / 298.257223563
 _LEAST_PART = 0.01  # [m^2]
-
-
-class Local:
-    """Places in metres east and north of an origin.
-
-    By the Earth's radii of curvature there: right to 1 in 10,000 within
-    10 km.
-    """
-
-    def __init__(self, longitude: float, latitude: float):
-        e2 = _FLATTENING * (2.0 - _FLATTENING)
-        s = math.sin(math.radians(latitude))
-        w2 = 1.0 - e2 * s * s
-        north = _SEMI_MAJOR * (1.0 - e2) / w2**1.5
-        east = _SEMI_MAJOR / math.sqrt(w2) * math.cos(math.radians(latitude))
-        self._origin = np.array([longitude, latitude])
-        self._metres = np.radians(1.0) * np.array([east, north])
-
-    def __call__(self, places: np.ndarray) -> np.ndarray:
-        offset = places - self._origin
-        # The shorter way round, also across the 180th meridian.
-        offset[..., 0] -= 360.0 * np.rint(offset[..., 0] / 360.0)
-        return self.metres(offset)
-
-    def metres(self, offset: np.ndarray) -> np.ndarray:
-        """Returns a distance (..., 2) in degrees as one in metres."""
-        return np.asarray(offset * self._metres)
-
-    def polygon(self, polygon: Polygon) -> Polygon:
-        return shapely.transform(polygon, self)
 
 
 def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:

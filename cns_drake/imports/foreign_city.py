@@ -17,7 +17,6 @@ from cns_drake.city.geometry.structures import (
     Part,
     Structure,
 )
-from cns_drake.imports.drives.city_drives import Street
 from cns_drake.imports.options import ImportFaults
 
 
@@ -39,6 +38,8 @@ def _number(seed: int, purpose: str, name: str) -> int:
 
 Rgb = tuple[float, float, float]
 
+# Sharpest turn from one street into another.
+SHARPEST_TURN_DEG = 125.0
 RED_ROOF: Rgb = (0.55, 0.30, 0.24)
 WATER: Rgb = (0.16, 0.34, 0.45)
 LAWN: Rgb = (0.42, 0.55, 0.30)
@@ -106,6 +107,30 @@ class Thing:
     kind: str
     xy: tuple[float, float]
     yaw: float | None
+
+
+@dataclass(frozen=True)
+class Street:
+    """A street of a map; cars drive along its line, against it, or both.
+
+    Attributes:
+        line: (N, 2) its middle [m].
+        nodes: number of each place; streets with a common number meet there.
+        forward, backward: whether it is driven along its line, and against.
+        aside: from its middle to that of the outermost lane [m].
+        width: of its carriageway; 0 if unknown [m].
+        name: of its element in the file.
+        tags: its tags in the file.
+    """
+
+    line: np.ndarray
+    nodes: tuple[int, ...]
+    forward: bool
+    backward: bool
+    aside: float
+    width: float = 0.0
+    name: str = ""
+    tags: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

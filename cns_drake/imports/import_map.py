@@ -24,6 +24,7 @@ from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
 from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
 from cns_drake.imports.drives.search import (
     WaypointDrive,
+    driven_path,
     find_drives,
     steerable_drive,
 )
@@ -43,12 +44,10 @@ from cns_drake.imports.options import (
     ImportOptions,
     ImportReport,
 )
-from cns_drake.imports.staged_city import (
-    StagedCity,
-    drive_along,
-    grow,
-    stage_city,
-)
+from cns_drake.imports.staged_city import StagedCity, grow, stage_city
+from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.roads.u_turn import TIGHTEST_RADIUS
+from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 
 Progress = Callable[[str], None]
 # Receives the folder, and the numbers of structures and triangles by stage.
@@ -240,6 +239,24 @@ def _side(city: ForeignCity, options: ImportOptions) -> DriveOn:
     if options.drive_on is not None:
         return options.drive_on
     return DriveOn.LEFT if city.keeps_left else DriveOn.RIGHT
+
+
+def drive_along(path: Path) -> WaypointDrive:
+    """Returns a drive along waypoints of a file, without their heights.
+
+    Raises:
+        InputError: if the file cannot be used, or a bend is too tight.
+    """
+    points, _ = read_waypoints(path)
+    control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
+    driven, radii = driven_path(control)
+    radius, (x, y) = radii.min(), driven[radii.argmin()]
+    if radius < TIGHTEST_RADIUS:
+        raise InputError(
+            f"{path}: a bend at {x:.1f}, {y:.1f} has a radius of {radius:.2f} "
+            f"m; the car needs {TIGHTEST_RADIUS:.2f} m"
+        )
+    return WaypointDrive(points[:, :2], control)
 
 
 def _lifted(

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from cns_drake.imports.building_years import Undated
-
 _LONGEST = 100
 
 
@@ -57,6 +55,14 @@ def _printable(text: str) -> str:
     """Returns a text of a file without control characters."""
     shown = "".join(c if c.isprintable() else " " for c in text)
     return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST - 3]}..."
+
+
+class Undated(str, Enum):
+    """The first stage that has the buildings without a year."""
+
+    FIRST = "first"
+    LAST = "last"
+    NEVER = "never"
 
 
 class DriveOn(str, Enum):

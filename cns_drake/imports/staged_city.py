@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -23,30 +22,9 @@ from cns_drake.imports.building_years import (
     stands_at,
     stands_today,
 )
-from cns_drake.imports.drives.search import WaypointDrive, driven_path
+from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported, lot
 from cns_drake.imports.options import ImportFaults, ImportOptions
-from cns_drake.motion.control_points import POINT_SPACING
-from cns_drake.roads.u_turn import TIGHTEST_RADIUS
-from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
-
-
-def drive_along(path: Path) -> WaypointDrive:
-    """Returns a drive along waypoints of a file, without their heights.
-
-    Raises:
-        InputError: if the file cannot be used, or a bend is too tight.
-    """
-    points, _ = read_waypoints(path)
-    control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
-    driven, radii = driven_path(control)
-    radius, (x, y) = radii.min(), driven[radii.argmin()]
-    if radius < TIGHTEST_RADIUS:
-        raise InputError(
-            f"{path}: a bend at {x:.1f}, {y:.1f} has a radius of {radius:.2f} "
-            f"m; the car needs {TIGHTEST_RADIUS:.2f} m"
-        )
-    return WaypointDrive(points[:, :2], control)
 
 
 def keep_near(

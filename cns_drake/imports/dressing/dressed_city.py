@@ -35,9 +35,8 @@ from cns_drake.imports.dressing.wall_panels import (
     Panel,
     find_panels,
 )
-from cns_drake.imports.drives.city_drives import Street
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import Imported, lot_generator
+from cns_drake.imports.foreign_city import Imported, Street, lot_generator
 from cns_drake.imports.ground import Ground
 
 # Walls that are farther from all drives have no windows, and roofs no

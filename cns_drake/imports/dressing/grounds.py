@@ -19,10 +19,9 @@ from cns_drake.city.geometry.structures import (
     Structure,
 )
 from cns_drake.imports.dressing.upper_sides import looks_up, turned_up
-from cns_drake.imports.drives.city_drives import Street
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.faces import flat_surface, parts_of
-from cns_drake.imports.foreign_city import Imported, make_imported
+from cns_drake.imports.foreign_city import Imported, Street, make_imported
 from cns_drake.imports.options import ImportFaults
 
 # Within this distance of drives, sidewalks get kerbs, and missing ones are

@@ -9,9 +9,8 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiLineString
 
-from cns_drake.imports.drives.city_drives import Street
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import Imported, Rgb, make_imported
+from cns_drake.imports.foreign_city import Imported, Rgb, Street, make_imported
 
 # Streets get marks if they are this near to drives, and at least this wide [m].
 _WITHIN, _LEAST_WIDTH = 80.0, 6.0

@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import LineString, Point
 
 from cns_drake.city.placement.frontage import station_at
-from cns_drake.imports.drives.city_drives import Street
+from cns_drake.imports.foreign_city import Street
 
 # A thing on a carriageway is moved beside it, to this distance from its edge
 # [m].

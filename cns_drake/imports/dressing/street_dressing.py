@@ -26,9 +26,13 @@ from cns_drake.imports.dressing.street_room import (
     StreetThings,
     title_of,
 )
-from cns_drake.imports.drives.city_drives import Street
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import Imported, Thing, lot_generator
+from cns_drake.imports.foreign_city import (
+    Imported,
+    Street,
+    Thing,
+    lot_generator,
+)
 from cns_drake.imports.ground import Ground
 
 # Things farther from all drives are left out [m].

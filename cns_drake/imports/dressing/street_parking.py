@@ -10,8 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.plan.weighted import pick
 from cns_drake.imports.dressing.roadside import place_along
 from cns_drake.imports.dressing.street_room import StreetRoom
-from cns_drake.imports.drives.city_drives import Street
-from cns_drake.imports.foreign_city import Imported, lot_generator
+from cns_drake.imports.foreign_city import Imported, Street, lot_generator
 
 # Cars farther from all drives are left out [m].
 ROWS_WITHIN = 70.0

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise, product
 
 import numpy as np
@@ -20,34 +20,8 @@ from cns_drake.imports.drives.search import (
     WaypointDrive,
     steerable_drive,
 )
+from cns_drake.imports.foreign_city import SHARPEST_TURN_DEG, Street
 from cns_drake.imports.options import DriveOn
-
-# Sharpest turn from one street into another.
-SHARPEST_TURN_DEG = 125.0
-
-
-@dataclass(frozen=True)
-class Street:
-    """A street of a map; cars drive along its line, against it, or both.
-
-    Attributes:
-        line: (N, 2) its middle [m].
-        nodes: number of each place; streets with a common number meet there.
-        forward, backward: whether it is driven along its line, and against.
-        aside: from its middle to that of the outermost lane [m].
-        width: of its carriageway; 0 if unknown [m].
-        name: of its element in the file.
-        tags: its tags in the file.
-    """
-
-    line: np.ndarray
-    nodes: tuple[int, ...]
-    forward: bool
-    backward: bool
-    aside: float
-    width: float = 0.0
-    name: str = ""
-    tags: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

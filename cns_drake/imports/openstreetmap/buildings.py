@@ -14,9 +14,14 @@ from shapely.geometry import Polygon
 from shapely.strtree import STRtree
 
 from cns_drake.imports.building_years import construction_year, year_of_date
-from cns_drake.imports.faces import Local, extruded, parts_of, sound_parts
+from cns_drake.imports.faces import extruded, parts_of, sound_parts
 from cns_drake.imports.foreign_city import RED_ROOF, Imported, make_imported
-from cns_drake.imports.openstreetmap.reading import OsmArea, Tags, has_tag
+from cns_drake.imports.openstreetmap.reading import (
+    Local,
+    OsmArea,
+    Tags,
+    has_tag,
+)
 from cns_drake.imports.openstreetmap.tags import heights, why_absent
 from cns_drake.imports.options import ImportFaults
 

@@ -18,7 +18,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.side_by_side import side_by_side
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
-from cns_drake.imports.faces import Local, extruded, parts_of, sound_parts
+from cns_drake.imports.faces import extruded, parts_of, sound_parts
 from cns_drake.imports.foreign_city import (
     ForeignCity,
     Imported,
@@ -32,6 +32,7 @@ from cns_drake.imports.openstreetmap.buildings import (
 )
 from cns_drake.imports.openstreetmap.grounds import coasts_of, ground_areas, sea
 from cns_drake.imports.openstreetmap.reading import (
+    Local,
     OsmArea,
     OsmFeatures,
     OsmWay,

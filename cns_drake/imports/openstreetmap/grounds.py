@@ -13,7 +13,7 @@ import shapely
 from shapely.geometry import LineString, Point, box
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.faces import Local, flat_surface, parts_of, sound_parts
+from cns_drake.imports.faces import flat_surface, parts_of, sound_parts
 from cns_drake.imports.foreign_city import (
     LAWN,
     WATER,
@@ -22,6 +22,7 @@ from cns_drake.imports.foreign_city import (
     make_imported,
 )
 from cns_drake.imports.openstreetmap.reading import (
+    Local,
     OsmArea,
     OsmWay,
     Tags,

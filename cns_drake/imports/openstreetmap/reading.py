@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -18,6 +20,9 @@ from cns_drake.imports.options import ImportFaults
 
 Tags = Mapping[str, str]
 
+# The Earth's axes, WGS 84 [m].
+_SEMI_MAJOR = 6378137.0
+_FLATTENING = 1.0 / 298.257223563
 # Less than the area of a point and its rounding, some 0.01 m^2 [deg^2].
 _NO_AREA = 1e-12
 _OPEN = "whose outline does not close"
@@ -77,6 +82,36 @@ _LIFECYCLE = (
     "removed",
     "was",
 )
+
+
+class Local:
+    """Places in metres east and north of an origin.
+
+    By the Earth's radii of curvature there: right to 1 in 10,000 within
+    10 km.
+    """
+
+    def __init__(self, longitude: float, latitude: float):
+        e2 = _FLATTENING * (2.0 - _FLATTENING)
+        s = math.sin(math.radians(latitude))
+        w2 = 1.0 - e2 * s * s
+        north = _SEMI_MAJOR * (1.0 - e2) / w2**1.5
+        east = _SEMI_MAJOR / math.sqrt(w2) * math.cos(math.radians(latitude))
+        self._origin = np.array([longitude, latitude])
+        self._metres = np.radians(1.0) * np.array([east, north])
+
+    def __call__(self, places: np.ndarray) -> np.ndarray:
+        offset = places - self._origin
+        # The shorter way round, also across the 180th meridian.
+        offset[..., 0] -= 360.0 * np.rint(offset[..., 0] / 360.0)
+        return self.metres(offset)
+
+    def metres(self, offset: np.ndarray) -> np.ndarray:
+        """Returns a distance (..., 2) in degrees as one in metres."""
+        return np.asarray(offset * self._metres)
+
+    def polygon(self, polygon: Polygon) -> Polygon:
+        return shapely.transform(polygon, self)
 
 
 class OsmWay(NamedTuple):

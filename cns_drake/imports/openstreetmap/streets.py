@@ -12,9 +12,7 @@ from shapely import STRtree
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.drives.city_drives import Street
 from cns_drake.imports.faces import (
-    Local,
     extruded,
     flat_surface,
     parts_of,
@@ -22,10 +20,12 @@ from cns_drake.imports.faces import (
 )
 from cns_drake.imports.foreign_city import (
     Imported,
+    Street,
     StreetPlaces,
     make_imported,
 )
 from cns_drake.imports.openstreetmap.reading import (
+    Local,
     OsmFeatures,
     OsmWay,
     Tags,

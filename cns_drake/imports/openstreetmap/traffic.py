@@ -15,9 +15,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.angles import wrapped
-from cns_drake.imports.drives.city_drives import SHARPEST_TURN_DEG, Street
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import Imported, StreetPlaces
+from cns_drake.imports.foreign_city import (
+    SHARPEST_TURN_DEG,
+    Imported,
+    Street,
+    StreetPlaces,
+)
 from cns_drake.imports.openstreetmap.tags import (
     LaneLayout,
     lane_layout,

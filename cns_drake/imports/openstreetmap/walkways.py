@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from cns_drake.imports.drives.city_drives import Street
+from cns_drake.imports.foreign_city import Street
 from cns_drake.traffic.lane_graph import Crossing, make_crossing, resampled
 from cns_drake.traffic.walkways import Walkway
 

@@ -12,9 +12,9 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
-from cns_drake.imports.building_years import Undated, year_of_date
+from cns_drake.imports.building_years import year_of_date
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.options import ImportOptions, Undated
 
 
 def run(*arguments):

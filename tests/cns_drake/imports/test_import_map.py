@@ -15,9 +15,9 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
-from cns_drake.imports.building_years import Undated, construction_year
+from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.options import ImportOptions, Undated
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
 from evaluation.clouds.cloud_files import read_cloud

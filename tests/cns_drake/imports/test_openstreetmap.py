@@ -8,7 +8,6 @@ import pytest
 from shapely.geometry import Polygon
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.building_years import Undated
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
@@ -20,7 +19,7 @@ from cns_drake.imports.openstreetmap.tags import (
     street_width,
     why_absent,
 )
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.options import ImportFaults, Undated
 
 
 def read(path, year_attribute=None):
