@@ -5,7 +5,6 @@ Solids may have the roofs that OpenStreetMap describes."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-import math
 
 import numpy as np
 import shapely
@@ -36,10 +35,6 @@ def face_triangles(
         name: of the object, for the faults.
         faults: counts repaired faces and those left out.
     """
-    if len(rings) == 1 and len(rings[0]) in (3, 4):
-        plain = _plain_face(rings[0])
-        if plain is not None:
-            return plain
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
         faults.add("face without area, left out", name)
@@ -68,40 +63,10 @@ def face_triangles(
     return _filled(_Plane(normal, rings), outer, holes, name, faults)
 
 
-def _plain_face(ring: np.ndarray) -> np.ndarray | None:
-    """Returns the triangles of a face that needs no repair.
-
-    Most faces of a city are triangles and convex quadrilaterals. None for all
-    others.
-
-    Args:
-        ring: (3, 3) or (4, 3) its corners [m].
-    """
-    corners = ring.tolist()
-    rounded = [[round(value * _MM) for value in corner] for corner in corners]
-    if any(rounded[k] == rounded[k - 1] for k in range(len(rounded))):
-        return None
-    nx, ny, nz = normal = _newell(corners)
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if 0.5 * size < _LEAST_AREA:
-        return None
-    if len(corners) == 3:
-        return ring[None]
-    x, y, z = corners[0]
-    heights = [
-        (a - x) * nx + (b - y) * ny + (c - z) * nz for a, b, c in corners
-    ]
-    is_bent = max(heights) - min(heights) > 2.0 * _BENT * size
-    if is_bent or not _is_convex(corners, normal):
-        return None
-    return ring[[[0, 1, 2], [0, 2, 3]]]
-
-
 def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
     """Returns a ring without repeated corners."""
     if len(ring) == 0:
         return ring
-    # Plain numbers are faster here: most rings have only four corners.
     rounded = np.rint(ring * _MM).tolist()
     kept = [k for k in range(len(ring)) if rounded[k] != rounded[k - 1]]
     if len(kept) < len(ring):

@@ -38,9 +38,9 @@ from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.rosbag2_metadata import (
     Topic,
+    channel_metadata,
+    describe_topic,
     make_bag_information,
-    make_qos_yaml,
-    make_topic_metadata,
     to_yaml,
 )
 
@@ -358,12 +358,7 @@ class BagWriter:
                 topic.name,
                 "cdr",
                 schema_ids[topic.message_type],
-                {
-                    "offered_qos_profiles": make_qos_yaml(topic),
-                    "topic_type_hash": ros_types.message_hash(
-                        topic.message_type
-                    ),
-                },
+                channel_metadata(topic),
             )
             for topic in self._topics
         }
@@ -429,10 +424,15 @@ class BagWriter:
         last_ns = first_ns if self._last_ns is None else self._last_ns
         return make_bag_information(
             self._files.mcap.name,
-            {
-                make_topic_metadata(topic): self._counts[topic.name]
+            [
+                describe_topic(
+                    topic.name,
+                    topic.message_type,
+                    self._counts[topic.name],
+                    channel_metadata(topic),
+                )
                 for topic in self._topics
-            },
+            ],
             start_ns=first_ns,
             end_ns=last_ns,
             custom_data=self._custom_data,

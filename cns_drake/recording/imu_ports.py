@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterator
+from typing import Any
+
 from pydrake.math import RotationMatrix
 from pydrake.systems.framework import Context, LeafSystem
 
 from cns_drake.recording import messages
-from cns_drake.recording.imu_messages import ImuMessages
 from cns_drake.recording.input_values import declare_object, value_of
 from cns_drake.recording.recorded_topics import IMU_TOPIC
 from cns_drake.recording.schedule import Schedule
@@ -24,12 +25,12 @@ class ImuPorts:
         self._angular_velocity = system.DeclareVectorInputPort(
             "angular_velocity", 3
         )
-        self._messages = ImuMessages(variances)
+        self._variances = variances
 
     def message(
         self, context: Context, R_WI: RotationMatrix | None, stamp_ns: int
-    ) -> bytes | None:
-        """Returns the message, serialised; None if no port is connected.
+    ) -> Any | None:
+        """Returns the message; None if no port is connected.
 
         Args:
             context: of the recorder.
@@ -41,12 +42,13 @@ class ImuPorts:
         if angular_velocity is None and specific_force is None:
             return None
         quat_xyzw = None if R_WI is None else messages.to_quat_xyzw(R_WI)
-        values = (quat_xyzw, angular_velocity, specific_force)
-        quats, turns, forces = (
-            None if value is None else np.array([value]) for value in values
+        return messages.make_imu(
+            quat_xyzw,
+            angular_velocity,
+            specific_force,
+            stamp_ns,
+            self._variances,
         )
-        (message,) = self._messages.encode(quats, turns, forces, [stamp_ns])
-        return message
 
 
 class ImuSamplesPort:
@@ -55,7 +57,7 @@ class ImuSamplesPort:
     def __init__(self, system: LeafSystem, variances: tuple[float, float]):
         """Declares the port; for the variances see `make_imu`."""
         self._samples = declare_object(system, "imu_samples")
-        self._messages = ImuMessages(variances)
+        self._variances = variances
 
     def messages(
         self,
@@ -64,8 +66,8 @@ class ImuSamplesPort:
         since: int,
         tick: int,
         start_ns: int,
-    ) -> list[tuple[int, int, bytes]]:
-        """Returns number, stamp [ns] and message of each new sample.
+    ) -> Iterator[tuple[int, int, Any]]:
+        """Yields number, stamp [ns] and message of each new sample.
 
         Args:
             context: of the recorder.
@@ -82,18 +84,17 @@ class ImuSamplesPort:
         numbers = range(since // step + 1, last // step + 1)
         samples = value_of(self._samples, context)
         if samples is None or not numbers:
-            return []
+            return
         first = numbers[0] - samples.first
         if first < 0:
             raise ValueError("imu_samples: the oldest samples are missing")
-        rows = slice(first, first + len(numbers))
-        stamps_ns = [
-            start_ns + schedule.time_ns(number * step) for number in numbers
-        ]
-        packed = self._messages.encode(
-            samples.quat_xyzw[rows],
-            samples.angular_velocity[rows],
-            samples.specific_force[rows],
-            stamps_ns,
-        )
-        return list(zip(numbers, stamps_ns, packed, strict=True))
+        for row, number in enumerate(numbers, first):
+            stamp_ns = start_ns + schedule.time_ns(number * step)
+            message = messages.make_imu(
+                samples.quat_xyzw[row],
+                samples.angular_velocity[row],
+                samples.specific_force[row],
+                stamp_ns,
+                self._variances,
+            )
+            yield number, stamp_ns, message

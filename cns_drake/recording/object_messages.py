@@ -11,14 +11,19 @@ from cns_drake.base.recordings.ros_types import (
     DETECTIONS_3D,
     SCENE_UPDATE,
     message_class,
-)
-from cns_drake.recording.message_template import (
-    STAMP_MARK_NS,
-    MessageTemplate,
-    number_marks,
+    serialize,
 )
 from cns_drake.recording.messages import MAP_FRAME, make_vector
 
+# Placeholders of numbers in a message: this and the following integers, which
+# are exact in double precision and larger than any measurement.
+_FIRST_MARK = 2.0**52
+# Placeholder of the stamp: seconds and nanoseconds. No stamp of a drive has
+# more than 10^9 nanoseconds.
+STAMP_MARK_NS = (0x5A17C0DE, 0x71B3E5A9)
+# CDR begins with its encoding; alignment counts from behind it.
+_ENCAPSULATION = 4
+_NS_PER_S = 1_000_000_000
 # Position, orientation and size of a box.
 _NUMBERS = 10
 # A record of the table of velocities.
@@ -73,6 +78,68 @@ class RecordedObjects(Protocol):
 
     @property
     def is_moving(self) -> np.ndarray: ...
+
+
+class MessageTemplate:
+    """The CDR form of a message, with places for float64 and for a stamp.
+
+    It is made once: to fill in the numbers of a hundred boxes takes a tenth of
+    the time that making their messages takes.
+    """
+
+    def __init__(self, message: Any, num_numbers: int):
+        """Finds the places.
+
+        Args:
+            message: made with `number_marks(num_numbers)` and with times of
+                the seconds and nanoseconds of `STAMP_MARK_NS`.
+            num_numbers: N.
+
+        Raises:
+            ValueError: a number is missing.
+        """
+        self._data = np.frombuffer(serialize(message), np.uint8)
+        numbers, words = self._views(self._data)
+        with np.errstate(invalid="ignore"):
+            which = numbers - _FIRST_MARK
+            self._places = np.flatnonzero(
+                (which >= 0) & (which < num_numbers) & (which % 1 == 0)
+            )
+        self._which = which[self._places].astype(int)
+        if len(np.unique(self._which)) != num_numbers:
+            raise ValueError("a message lacks some of its numbers")
+        sec, nanosec = STAMP_MARK_NS
+        self._stamps = np.flatnonzero(
+            (words[:-1] == sec) & (words[1:] == nanosec)
+        )
+
+    @staticmethod
+    def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns what can be a float64, and what can be a uint32.
+
+        Args:
+            data: (L,) bytes of the message.
+        """
+        body = data[_ENCAPSULATION:]
+        return (
+            body[: len(body) // 8 * 8].view("<f8"),
+            body[: len(body) // 4 * 4].view("<u4"),
+        )
+
+    def fill(self, numbers: np.ndarray, stamp_ns: int) -> bytes:
+        """Returns the CDR form of the message with N numbers and a stamp."""
+        data = self._data.copy()
+        floats, words = self._views(data)
+        floats[self._places] = numbers[self._which]
+        words[self._stamps], words[self._stamps + 1] = divmod(
+            stamp_ns, _NS_PER_S
+        )
+        return data.tobytes()
+
+
+def number_marks(count: int) -> np.ndarray:
+    """Returns (count,) placeholder numbers for the message of a template."""
+    return _FIRST_MARK + np.arange(count)
 
 
 class BoxMessages:

@@ -33,7 +33,7 @@ from cns_drake.base.files import (
 from cns_drake.base.version import __version__
 from cns_drake.recording.mcap_recovery import Fault, read_records
 from cns_drake.recording.rosbag2_metadata import (
-    TopicMetadata,
+    describe_topic,
     make_bag_information,
     to_yaml,
 )
@@ -262,10 +262,16 @@ class _Copy:
         if self._profile == "ros2":
             information = make_bag_information(
                 file_name,
-                {
-                    self._topic_metadata(channel): self.counts[number]
+                [
+                    describe_topic(
+                        channel.topic,
+                        self._type(channel),
+                        self.counts[number],
+                        channel.metadata,
+                        channel.message_encoding,
+                    )
                     for number, channel in self._channels.items()
-                },
+                ],
                 start_ns=self.start_ns,
                 end_ns=self.end_ns,
                 custom_data={},
@@ -296,12 +302,6 @@ class _Copy:
         self.num_faults += 1
         self.first_fault = self.first_fault or text
 
-    def _topic_metadata(self, channel: Channel) -> TopicMetadata:
+    def _type(self, channel: Channel) -> str:
         schema = self._schemas.get(channel.schema_id)
-        return TopicMetadata(
-            name=channel.topic,
-            message_type=schema.name if schema else "",
-            serialization_format=channel.message_encoding,
-            qos_yaml=channel.metadata.get("offered_qos_profiles", ""),
-            message_hash=channel.metadata.get("topic_type_hash", ""),
-        )
+        return schema.name if schema else ""

@@ -6,7 +6,7 @@ those of rosbag2's own MCAP files.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,39 +33,45 @@ class Topic:
     latched: bool = False
 
 
-@dataclass(frozen=True)
-class TopicMetadata:
-    """The metadata of a topic for rosbag2.
+def channel_metadata(topic: Topic) -> dict[str, str]:
+    """Returns what rosbag2 wants of a channel: QoS, and the type's hash."""
+    return {
+        "offered_qos_profiles": _qos_yaml(topic),
+        "topic_type_hash": ros_types.message_hash(topic.message_type),
+    }
 
-    Attributes:
-        name: e.g. `/lidar/points`.
+
+def describe_topic(
+    name: str,
+    message_type: str,
+    count: int,
+    metadata: Mapping[str, str],
+    encoding: str = "cdr",
+) -> dict:
+    """Returns the description of a topic and its messages.
+
+    Args:
+        name: the topic's name.
         message_type: e.g. `sensor_msgs/msg/PointCloud2`.
-        serialization_format: e.g. `cdr`.
-        qos_yaml: the publishers' quality of service.
-        message_hash: the message type's REP-2011 hash.
+        count: number of its messages.
+        metadata: its channel's; see `channel_metadata`.
+        encoding: how the messages are serialised.
     """
-
-    name: str
-    message_type: str
-    serialization_format: str
-    qos_yaml: str
-    message_hash: str
-
-
-def make_topic_metadata(topic: Topic) -> TopicMetadata:
-    """Returns the metadata of a topic of ours."""
-    return TopicMetadata(
-        name=topic.name,
-        message_type=topic.message_type,
-        serialization_format="cdr",
-        qos_yaml=make_qos_yaml(topic),
-        message_hash=ros_types.message_hash(topic.message_type),
-    )
+    return {
+        "topic_metadata": {
+            "name": name,
+            "type": message_type,
+            "serialization_format": encoding,
+            "offered_qos_profiles": metadata.get("offered_qos_profiles", ""),
+            "type_description_hash": metadata.get("topic_type_hash", ""),
+        },
+        "message_count": count,
+    }
 
 
 def make_bag_information(
     file_name: str,
-    message_counts: Mapping[TopicMetadata, int],
+    topics: Sequence[dict],
     *,
     start_ns: int,
     end_ns: int,
@@ -75,31 +81,19 @@ def make_bag_information(
 
     Args:
         file_name: name of the MCAP file within its folder.
-        message_counts: number of messages on each topic.
+        topics: the topics, see `describe_topic`.
         start_ns: time of the first message [ns].
         end_ns: time of the last message [ns].
         custom_data: key -> text for `ros2 bag info`.
     """
-    count = sum(message_counts.values())
+    count = sum(topic["message_count"] for topic in topics)
     return {
         "version": _VERSION,
         "storage_identifier": "mcap",
         "duration": {"nanoseconds": end_ns - start_ns},
         "starting_time": {"nanoseconds_since_epoch": start_ns},
         "message_count": count,
-        "topics_with_message_count": [
-            {
-                "topic_metadata": {
-                    "name": topic.name,
-                    "type": topic.message_type,
-                    "serialization_format": topic.serialization_format,
-                    "offered_qos_profiles": topic.qos_yaml,
-                    "type_description_hash": topic.message_hash,
-                },
-                "message_count": topic_count,
-            }
-            for topic, topic_count in message_counts.items()
-        ],
+        "topics_with_message_count": list(topics),
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file_name],
@@ -116,7 +110,7 @@ def make_bag_information(
     }
 
 
-def make_qos_yaml(topic: Topic) -> str:
+def _qos_yaml(topic: Topic) -> str:
     """Returns the publisher's quality of service.
 
     Enums are the integers of rmw's header, since ROS 2 Humble reads no

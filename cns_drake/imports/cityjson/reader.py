@@ -352,10 +352,8 @@ def _read_geometry(
         faults.add("geometry that is not an object, left out", name)
         return None
     faces, kept = [], []
-    found = _sound_faces(boundaries, vertices)
-    if found is None:
-        found = [_face(boundary, vertices) for boundary in boundaries]
-    for face, one in zip(found, kinds, strict=True):
+    for boundary, one in zip(boundaries, kinds, strict=True):
+        face = _face(boundary, vertices)
         if face is None:
             faults.add("face with unknown vertices, left out", name)
         else:
@@ -366,32 +364,6 @@ def _read_geometry(
 
 def _lod(value: object) -> float:
     return float(str(value)) if value is not None else 0.0
-
-
-def _sound_faces(
-    boundaries: Sequence[Any], vertices: np.ndarray
-) -> list[Face | None] | None:
-    """Returns all faces at once; None if any of them has a fault."""
-    try:
-        counts = [[len(ring) for ring in face] for face in boundaries]
-        indices = [index for face in boundaries for r in face for index in r]
-    except TypeError:
-        return None
-    if (
-        not all(face and min(face) for face in counts)
-        or set(map(type, indices)) != {int}
-        or not 0 <= min(indices) <= max(indices) < len(vertices)
-    ):
-        return None
-    points, first = vertices[np.array(indices)], 0
-    faces: list[Face | None] = []
-    for face in counts:
-        rings = []
-        for count in face:
-            rings.append(points[first : first + count])
-            first += count
-        faces.append(rings)
-    return faces
 
 
 def _face(boundary: Any, vertices: np.ndarray) -> Face | None:

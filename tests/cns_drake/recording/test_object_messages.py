@@ -12,16 +12,14 @@ from cns_drake.base.recordings.ros_types import (
     SCENE_UPDATE,
     deserialize,
 )
-from cns_drake.recording.message_template import (
-    MessageTemplate,
-    number_marks,
-)
 from cns_drake.recording.messages import make_odometry
 from cns_drake.recording.object_messages import (
     BoxMessages,
+    MessageTemplate,
     marked_boxes,
     marked_detections,
     motion_table,
+    number_marks,
 )
 
 CLASSES = ("car", "person", "bicyclist")
