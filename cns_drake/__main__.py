@@ -7,12 +7,12 @@ from cns_drake.base.own_packages import check_evaluation, leave_out_folder
 leave_out_folder(sys.path)  # Before anything else is imported.
 
 from cns_drake.base.errors import InputError  # noqa: E402
-from cns_drake.base.garbage import look_seldom  # noqa: E402
 from cns_drake.base.interrupts import (  # noqa: E402
     end_interrupted,
     interrupt_on_termination,
     uninterrupted,
 )
+from cns_drake.base.process import look_seldom  # noqa: E402
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import pytest
 
-from cns_drake.base.garbage import look_seldom
+from cns_drake.base.process import look_seldom
 
 # What is imported is there to stay: nobody looks for garbage in it.
 gc.disable()

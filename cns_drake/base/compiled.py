@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numba
 
-from cns_drake.base.cache_folder import cache_folder
+from cns_drake.base.files import cache_folder
 
 _Function = TypeVar("_Function", bound=Callable)
 

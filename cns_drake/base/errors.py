@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import difflib
+import re
+import typing
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from pydantic import BaseModel, ValidationError
 
 _LONGEST = 2000
+_MISSING = re.compile(
+    r"(lib[\w.+-]+?)\.so[\w.]*: cannot open shared object file"
+)
+# Library -> Debian's package. Drake needs the first, Open3D the others.
+_PACKAGES = {
+    "libglib-2.0": "libglib2.0-0",
+    "libgobject-2.0": "libglib2.0-0",
+    "libgthread-2.0": "libglib2.0-0",
+    "libGL": "libgl1",
+    "libX11": "libx11-6",
+    "libudev": "libudev1",
+    "libgomp": "libgomp1",
+    "libusb-1.0": "libusb-1.0-0",
+}
 
 
 class InputError(Exception):
@@ -83,9 +100,6 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
     """Returns advice on what to write instead; "" if none is obvious."""
     place, given = fault["loc"], fault["input"]
     if fault["type"] == "extra_forbidden" and model is not None and place:
-        # Slow to import, and rarely needed.
-        from cns_drake.base.field_names import nearest_field
-
         name = nearest_field(model, place)
         return f"; did you mean {name}?" if name else ""
     is_number = isinstance(given, int | float) and not isinstance(given, bool)
@@ -95,3 +109,68 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
         text = f"{given:02d}" if is_stage else f"{given}"
         return f'; quote it: {place[-1]}: "{text}"'
     return ""
+
+
+def nearest_field(
+    model: type[BaseModel], place: Sequence[str | int]
+) -> str | None:
+    """Returns the field that is written most like an unknown one.
+
+    Args:
+        model: of the whole file.
+        place: keys and indices that lead to the unknown field; the last is the
+            field itself.
+    """
+    kinds: list[object] = [model]
+    for part in place[:-1]:
+        kinds = [inner for kind in kinds for inner in _inside(kind, part)]
+    names = {
+        field.alias or name
+        for kind in kinds
+        for one in _models(kind)
+        for name, field in one.model_fields.items()
+    }
+    close = difflib.get_close_matches(str(place[-1]), sorted(names), n=1)
+    return close[0] if close else None
+
+
+def _models(kind: Any) -> Iterator[type[BaseModel]]:
+    """Yields the models that an annotation names at its top level."""
+    if hasattr(kind, "model_fields"):
+        yield kind
+    elif typing.get_origin(kind) not in (list, dict, tuple):
+        for inner in typing.get_args(kind):
+            yield from _models(inner)
+
+
+def _inside(kind: Any, part: str | int) -> Iterator[object]:
+    """Yields what an annotation has at a key or index."""
+    if hasattr(kind, "model_fields"):
+        for name, field in kind.model_fields.items():
+            if part in (name, field.alias):
+                yield field.annotation
+        # The place has the name of one of the models to choose from.
+        if part == kind.__name__:
+            yield kind
+        return
+    arguments = typing.get_args(kind)
+    if typing.get_origin(kind) is dict:
+        yield arguments[1]
+    elif typing.get_origin(kind) in (list, tuple):
+        yield from arguments
+    else:
+        for inner in arguments:
+            yield from _inside(inner, part)
+
+
+def missing_library(error: ImportError) -> str | None:
+    """Returns a line about the shared library that an import lacked.
+
+    None if it failed for another reason.
+    """
+    match = _MISSING.search(str(error))
+    if match is None:
+        return None
+    package = _PACKAGES.get(match[1])
+    how = f" (Debian: apt install {package})" if package else ""
+    return f"this system lacks the shared library {match[1]}.so{how}"

@@ -18,6 +18,16 @@ _LONGEST_NAME_BYTES = 120
 _KEPT_CHARACTERS = 20
 
 
+def cache_folder() -> Path:
+    """Returns cns-drake's folder in the cache of the user.
+
+    Source: the XDG base directory specification. The folder may not exist.
+    """
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    folder = Path(base) if os.path.isabs(base) else Path("~/.cache")
+    return Path(os.path.expanduser(folder)) / "cns-drake"
+
+
 def part_path(path: Path) -> Path:
     """Returns the name that a file has until it is complete."""
     return path.with_name(f"{path.name}.part")

@@ -13,15 +13,14 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.garbage import look_seldom
+from cns_drake.base.errors import InputError, missing_library
 from cns_drake.base.interrupts import (
     INTERRUPTED,
     end_interrupted,
     ignore_interrupts,
     interrupt_on_termination,
 )
-from cns_drake.base.libraries import missing_library
+from cns_drake.base.process import look_seldom
 from cns_drake.base.progress import LINE_INTERVAL
 from cns_drake.base.version import __version__
 

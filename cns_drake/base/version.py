@@ -1,3 +1,18 @@
 """The version of the release, which recordings and reports carry."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+import contextlib
+import importlib.metadata
+
 __version__ = "1.0.0"
+
+
+def installed_versions(packages: Iterable[str]) -> dict[str, str]:
+    """Returns package -> version, of the packages that are installed."""
+    versions = {}
+    for name in packages:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions[name] = importlib.metadata.version(name)
+    return versions

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from rich.progress import Progress, TaskID
+
 from cns_drake.base import terminal
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.progress_bars import print_note, show_progress
-from cns_drake.command_line.frame_progress import frame_progress
+from cns_drake.base.progress_bars import (
+    count_progress,
+    print_note,
+    show_progress,
+)
 from cns_drake.command_line.options import (
     Frames,
     Graphviz,
@@ -18,6 +23,29 @@ from cns_drake.command_line.options import (
     Overwrite,
     Recording,
 )
+from cns_drake.recording.schedule import FRAME_PERIOD
+
+
+def frame_progress(
+    progress: Progress, task: TaskID, period: float = FRAME_PERIOD
+) -> Callable[[int, int], None]:
+    """Returns a callback that shows the frames of a simulation.
+
+    It is `count_progress` with simulated time and real-time factor.
+
+    Args:
+        progress: where to show it.
+        task: as which task.
+        period: time between frames [s].
+    """
+
+    def note(done: int, new: int, elapsed: float) -> str:
+        factor = new * period / max(elapsed, 1e-9)
+        simulated = done * period
+        return f"{simulated:.1f} s simulated, {factor:.1f} x real time"
+
+    return count_progress(progress, task, note)
+
 
 if TYPE_CHECKING:
     from cns_drake.scenarios.weather_config import WeatherConfig
@@ -65,7 +93,7 @@ def run_drive(
         run_drive("downtown_01", Path("recordings"), frames=20)
     """
     with uninterrupted():  # Slow to import, not needed for `--help`.
-        from cns_drake.base.processors import num_cores
+        from cns_drake.base.process import num_cores
         from cns_drake.scenarios.rates import frame_period
         from cns_drake.scenarios.scenario_loading import load_scenario
         from cns_drake.simulation.simulation import simulate

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.garbage import uncollected
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
 from cns_drake.imports.options import DriveOn, ImportOptions, Undated
 

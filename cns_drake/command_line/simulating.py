@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
-from cns_drake.command_line.families import family_members
 from cns_drake.command_line.options import (
     LIDAR_OPTION,
     Frames,
@@ -23,13 +23,104 @@ from cns_drake.command_line.options import (
     Recording,
     Scheduler,
 )
-from cns_drake.command_line.return_options import (
-    Fog,
-    Rain,
-    Returns,
-    Snowfall,
-    choose_returns,
-)
+
+if TYPE_CHECKING:
+    from cns_drake.base.jobs.cluster import Cluster
+    from cns_drake.scenarios.scenario import Scenario
+
+Kind = Literal["ideal", "calibrated"]
+Fog = Annotated[
+    float | None,
+    typer.Option(
+        metavar="METRES",
+        help="Visibility in fog. Weather switches calibrated returns on.",
+    ),
+]
+Rain = Annotated[float, typer.Option(metavar="MM_H", help="Rate of rain.")]
+Snowfall = Annotated[
+    float, typer.Option(metavar="MM_H", help="Rate of snowfall, as water.")
+]
+
+
+def family_members(
+    vary: Path, output: Path, cluster: Cluster
+) -> list[Scenario]:
+    """Returns the members of a family.
+
+    Their scenario files go to `<output>/scenarios`, cities of their own to
+    `<output>/cities`.
+
+    Raises:
+        InputError: the family cannot be used.
+    """
+    from cns_drake.scenarios.variation import load_family, write_scenarios
+    from cns_drake.studies.redrawing import redraw_cities
+
+    def redraw(
+        map_folder: Path, stage: str, seeds: Sequence[int]
+    ) -> dict[int, Path]:
+        return redraw_cities(
+            map_folder, stage, seeds, output / "cities", cluster
+        )
+
+    members = load_family(vary, redraw)
+    write_scenarios(members, output / "scenarios")
+    return members
+
+
+if TYPE_CHECKING:
+    from cns_drake.scenarios.weather_config import WeatherConfig
+
+
+class ReturnsName(str, Enum):
+    """Models of LiDAR returns."""
+
+    IDEAL = "ideal"
+    CALIBRATED = "calibrated"
+
+
+Returns = Annotated[
+    ReturnsName | None,
+    typer.Option(
+        help="Ideal returns, or those of the unit's data sheet with noise, "
+        "losses and calibrated reflectivity as intensity."
+    ),
+]
+
+
+_KINDS: dict[ReturnsName, Kind] = {
+    ReturnsName.IDEAL: "ideal",
+    ReturnsName.CALIBRATED: "calibrated",
+}
+
+
+def choose_returns(
+    returns: ReturnsName | None,
+    fog: float | None,
+    rain: float,
+    snowfall: float,
+) -> tuple[Kind | None, WeatherConfig | None]:
+    """Returns the returns and the weather of the options; None if not given.
+
+    Raises:
+        InputError: a value is out of range; the message names its option.
+    """
+    if fog is None and not rain and not snowfall:
+        return None if returns is None else _KINDS[returns], None
+    from pydantic import ValidationError
+
+    from cns_drake.scenarios.weather_config import WeatherConfig
+
+    if returns is ReturnsName.IDEAL:
+        raise InputError("--returns ideal: weather needs calibrated returns")
+    try:
+        weather = WeatherConfig(visibility=fog, rain=rain, snowfall=snowfall)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        field = str(fault["loc"][0])
+        option = "fog" if field == "visibility" else field
+        raise InputError(f"--{option}: {fault['msg']}") from None
+    return "calibrated", weather
 
 
 def simulate(

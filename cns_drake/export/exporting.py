@@ -12,6 +12,7 @@ import os
 from pathlib import Path
 import shutil
 
+from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import (
     complete_part,
@@ -19,12 +20,8 @@ from cns_drake.base.files import (
     user_errors,
     write_part,
 )
-from cns_drake.base.recordings.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.export.cns_layout import CNS
-from cns_drake.export.drive_layout import Layout
-from cns_drake.export.kitti_layout import KITTI
-from cns_drake.export.tum_layout import TUM
+from cns_drake.export.layouts import CNS, KITTI, TUM, Layout
 from cns_drake.recording.rosbag2_metadata import to_yaml
 
 _LAYOUTS = {"cns": CNS, "kitti": KITTI, "tum": TUM}

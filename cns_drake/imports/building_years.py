@@ -25,6 +25,25 @@ _DAY = re.compile(r"jd:(\d{7})(?:\.\d+)?", re.ASCII)
 _YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)", re.ASCII)
 # The Julian day of the day before 1 January of the year 1.
 _DAY_ZERO = 1721425
+# The usual attributes, small letters, most reliable first: 3DBAG, CityGML, 3D
+# BAG's forerunners, OpenStreetMap.
+_USUAL = (
+    "oorspronkelijkbouwjaar",
+    "yearofconstruction",
+    "year_of_construction",
+    "dateofconstruction",
+    "constructionyear",
+    "construction_year",
+    "yearbuilt",
+    "year_built",
+    "bouwjaar",
+    "baujahr",
+    "start_date",
+)
+# Placeholders for an unknown year; the second one in Dutch registers only.
+_PLACEHOLDER = 9999
+_DUTCH_PLACEHOLDER = 1005
+_DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 def year_of_date(text: str) -> int | None:
@@ -51,27 +70,6 @@ def year_of_date(text: str) -> int | None:
         return 10 * int(period[3]) + round(10 * part)
     match = _YEAR.search(text)
     return (int(match[1]) or None) if match else None
-
-
-# The usual attributes, small letters, most reliable first: 3DBAG, CityGML, 3D
-# BAG's forerunners, OpenStreetMap.
-_USUAL = (
-    "oorspronkelijkbouwjaar",
-    "yearofconstruction",
-    "year_of_construction",
-    "dateofconstruction",
-    "constructionyear",
-    "construction_year",
-    "yearbuilt",
-    "year_built",
-    "bouwjaar",
-    "baujahr",
-    "start_date",
-)
-# Placeholders for an unknown year; the second one in Dutch registers only.
-_PLACEHOLDER = 9999
-_DUTCH_PLACEHOLDER = 1005
-_DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 def construction_year(

@@ -22,6 +22,7 @@ _LEAST_AREA = 1e-5
 _BENT = 0.05
 # Corners closer than this are the same [m].
 _MM = 1000.0
+_LEAST_PART = 0.01  # [m^2]
 
 
 def face_triangles(
@@ -279,9 +280,6 @@ def _ridge(
     ]
     ends = [np.array([[b, c, end]]), np.array([[d, a, start]])]
     return (slopes + ends, []) if roof == "hipped" else (slopes, ends)
-
-
-_LEAST_PART = 0.01  # [m^2]
 
 
 def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:

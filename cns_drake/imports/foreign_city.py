@@ -19,6 +19,13 @@ from cns_drake.city.geometry.structures import (
 )
 from cns_drake.imports.options import ImportFaults
 
+Rgb = tuple[float, float, float]
+# Sharpest turn from one street into another.
+SHARPEST_TURN_DEG = 125.0
+RED_ROOF: Rgb = (0.55, 0.30, 0.24)
+WATER: Rgb = (0.16, 0.34, 0.45)
+LAWN: Rgb = (0.42, 0.55, 0.30)
+
 
 def lot(seed: int, purpose: str, name: str) -> float:
     """Returns a number from 0 to 1 that depends on the arguments only."""
@@ -34,15 +41,6 @@ def _number(seed: int, purpose: str, name: str) -> int:
     text = f"{seed}/{purpose}/{name}".encode()
     digest = hashlib.blake2b(text, digest_size=8).digest()
     return int.from_bytes(digest, "big")
-
-
-Rgb = tuple[float, float, float]
-
-# Sharpest turn from one street into another.
-SHARPEST_TURN_DEG = 125.0
-RED_ROOF: Rgb = (0.55, 0.30, 0.24)
-WATER: Rgb = (0.16, 0.34, 0.45)
-LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
 # Compared by identity: a city has thousands, and comparing meshes takes long.

@@ -38,6 +38,11 @@ from cns_drake.scene.semantics import CLASS_RGB
 OF_BOX = 12  # triangles
 # Meshes are written in this many parts, side by side.
 _PARTS = 12
+_CRUISE = 8.0  # [m/s]
+_ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
+_DPI = 130
+_INCHES = 9.0
+_ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
 
 
 @contextmanager
@@ -209,10 +214,6 @@ def with_column(table: str, name: str, values: Sequence[str]) -> str:
     return "".join(f"{line},{value}\n" for line, value in rows)
 
 
-_CRUISE = 8.0  # [m/s]
-_ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
-
-
 def write_drives(
     folder: Path,
     stages: Mapping[str, str],
@@ -248,11 +249,6 @@ def write_drives(
             }
             text = yaml.safe_dump(scenario, sort_keys=False)
             (folder / f"{kind}_{stage}.yaml").write_text(text, "utf-8")
-
-
-_DPI = 130
-_INCHES = 9.0
-_ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
 
 
 def draw_overview(

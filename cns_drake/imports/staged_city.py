@@ -26,6 +26,22 @@ from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported, lot
 from cns_drake.imports.options import ImportFaults, ImportOptions
 
+# A building that shares so much of the smaller outline stands in the place of
+# the other.
+_SHARED = 0.3
+# Greatest distance from the middle of a city [m].
+_FARTHEST = 10_000.0
+# Buildings this near to each other are of one block [m].
+_SAME_BLOCK = 4.0
+# The part of the changing buildings that is drawn block by block, and the part
+# that is lower at first; the others are missing.
+_BY_BLOCK = 0.5
+_LOWER = 1.0 / 3.0
+# Only buildings at least this high [m] can be lower, with this part of their
+# height.
+_LEAST_HEIGHT = 7.0
+_HEIGHTS = (0.4, 0.7)
+
 
 def keep_near(
     structures: Sequence[Imported],
@@ -92,11 +108,6 @@ def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
     return replace(one, structure=structure, triangles=one.triangles[near])
 
 
-# A building that shares so much of the smaller outline stands in the place of
-# the other.
-_SHARED = 0.3
-
-
 def with_gone(
     gone: Sequence[Imported], others: Iterable[Imported]
 ) -> list[Imported]:
@@ -132,10 +143,6 @@ def with_gone(
 def _shares(one: BaseGeometry, other: BaseGeometry) -> bool:
     shared = one.intersection(other).area
     return bool(shared > _SHARED * min(one.area, other.area))
-
-
-# Greatest distance from the middle of a city [m].
-_FARTHEST = 10_000.0
 
 
 @dataclass(frozen=True)
@@ -339,18 +346,6 @@ def _has_years(one: Imported) -> bool:
     is_building = one.kind.startswith("Building")
     is_dated = one.year is not None or one.until is not None
     return not one.is_ground and (is_dated or is_building)
-
-
-# Buildings this near to each other are of one block [m].
-_SAME_BLOCK = 4.0
-# The part of the changing buildings that is drawn block by block, and the part
-# that is lower at first; the others are missing.
-_BY_BLOCK = 0.5
-_LOWER = 1.0 / 3.0
-# Only buildings at least this high [m] can be lower, with this part of their
-# height.
-_LEAST_HEIGHT = 7.0
-_HEIGHTS = (0.4, 0.7)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.recordings.motion import ImuSamples
+from cns_drake.base.drives.drive import ImuSamples
 from cns_drake.motion.trajectory import Trajectory
 
 # Samples computed at a time, and greatest distance of a wanted time from a

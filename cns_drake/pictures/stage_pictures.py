@@ -19,7 +19,7 @@ from cns_drake.base.files import (
 )
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.pictures.stage_scene import StageScene, View
-from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 
 # As many pixels as a panel has.

@@ -5,12 +5,11 @@ when it is whole, and `metadata.yaml` is written last: a folder with that file
 is complete and consistent.
 
 An interrupted run leaves a part file. A later run of the same recording takes
-over its messages by writing them again; see PartFile.
-"""
+over its messages by writing them again; see PartFile."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 import io
 import json
@@ -22,6 +21,7 @@ from typing import Any, NamedTuple
 from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
 
+from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import (
     complete_part,
@@ -30,12 +30,9 @@ from cns_drake.base.files import (
     user_errors,
     write_part,
 )
-from cns_drake.base.recordings import ros_types
 from cns_drake.base.version import __version__
-from cns_drake.recording.mcap_recovery import Fault, read_records
-from cns_drake.recording.message_order import MessageOrder
-from cns_drake.recording.part_file import PartFile
-from cns_drake.recording.recording_folder import RecordingFolder
+from cns_drake.recording.recording_folder import PartFile, RecordingFolder
+from cns_drake.recording.repair import Fault, read_records
 from cns_drake.recording.rosbag2_metadata import (
     Topic,
     channel_metadata,
@@ -43,12 +40,54 @@ from cns_drake.recording.rosbag2_metadata import (
     make_bag_information,
     to_yaml,
 )
+from cns_drake.recording.schedule import START_NS, Schedule
 
 _CHUNK_BYTES = 1024 * 1024
 # A killed process loses the open chunk. Without a LiDAR a chunk of 1 MiB lasts
 # for many seconds, hence the flush by time. A kill may cost a second, with a
 # part of it reserved for frames on their way to the file.
 _FLUSH_PERIOD_NS = 800_000_000
+
+
+class MessageOrder:
+    """The stamps of the last messages on each topic."""
+
+    def __init__(self, folder: Path, topics: Iterable[Topic]):
+        """Begins without messages.
+
+        Args:
+            folder: of the recording; errors name it.
+            topics: of the recording.
+        """
+        self._folder = folder
+        self._latched = {topic.name for topic in topics if topic.latched}
+        self._last_ns: dict[str, int] = {}
+
+    def takes(self, topic: str, stamp_ns: int) -> bool:
+        """Returns whether the recording takes the next message.
+
+        It does not take a latched message twice.
+
+        Raises:
+            InputError: the message is not later than the one before on its
+                topic, or before the epoch.
+        """
+        last_ns = self._last_ns.get(topic)
+        if last_ns is not None and topic in self._latched:
+            return False
+        if stamp_ns < 0:
+            raise InputError(
+                f"{self._folder}: {topic}: a message at {stamp_ns / 1e9:g} s, "
+                "before the epoch; begin the recording with a later start_ns"
+            )
+        if last_ns is not None and stamp_ns <= last_ns:
+            raise InputError(
+                f"{self._folder}: {topic}: a message at {stamp_ns / 1e9:g} s "
+                f"comes after that at {last_ns / 1e9:g} s; where a simulator "
+                "begins again, or its clock goes back, begin a new recording"
+            )
+        self._last_ns[topic] = stamp_ns
+        return True
 
 
 class RecordedMessage(NamedTuple):
@@ -445,3 +484,58 @@ def _encode(name: str, value: Any) -> tuple[str, bytes]:
         return "application/yaml", to_yaml(value).encode()
     text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
     return "application/json", text.encode()
+
+
+def take_over_frames(
+    bag: BagWriter,
+    topics: Sequence[Topic],
+    schedule: Schedule,
+    frame_topic: str,
+) -> int:
+    """Writes the complete frames of an interrupted run into its successor.
+
+    A frame has all messages from one message on `frame_topic` until the next;
+    latched topics have one message, at tick 0.
+
+    Args:
+        bag: an open bag, to which nothing has been written.
+        topics: the bag's topics.
+        schedule: ticks of the topics that are not latched, by name.
+        frame_topic: the topic with one message a frame.
+
+    Returns:
+        The number of frames, from frame 0 on.
+    """
+    frames = tick = 0
+    frame: list[RecordedMessage] = []
+    missing = {topic.name for topic in topics if topic.latched}
+    missing.update(schedule.due(0))
+    # After the end of all streams, if they have one, no message is due.
+    last = None
+    if schedule.ends.keys() >= schedule.steps.keys():
+        last = max(schedule.ends.values())
+    for message in bag.interrupted():
+        if (
+            message.topic not in missing
+            or message.stamp_ns != START_NS + schedule.time_ns(tick)
+            or message.sequence != tick // schedule.steps.get(message.topic, 1)
+        ):
+            break
+        frame.append(message)
+        missing.remove(message.topic)
+        while not missing and tick != last:
+            tick += 1
+            missing.update(schedule.due(tick))
+            if frame_topic in missing:
+                frames += _write_frame(bag, frame)
+    if not missing:
+        frames += _write_frame(bag, frame)
+    return frames
+
+
+def _write_frame(bag: BagWriter, frame: list[RecordedMessage]) -> int:
+    """Writes a complete frame; returns 1."""
+    for message in frame:
+        bag.write(*message)
+    frame.clear()
+    return 1

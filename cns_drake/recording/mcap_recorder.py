@@ -10,7 +10,7 @@ import warnings
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-from cns_drake.base.recordings import ros_types
+from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter

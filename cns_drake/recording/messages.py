@@ -1,8 +1,7 @@
 """ROS 2 messages of a recording, made from values.
 
 Poses go in as Drake types; stamps are whole nanoseconds, so that no rounding
-happens here. Quaternions leave in ROS order (x, y, z, w).
-"""
+happens here. Quaternions leave in ROS order (x, y, z, w)."""
 
 from __future__ import annotations
 
@@ -14,10 +13,11 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
+from pydrake.systems.sensors import CameraInfo
 
-from cns_drake.base.recordings import ros_types
-from cns_drake.base.recordings.point_cloud2 import point_field_datatype
-from cns_drake.base.recordings.ros_types import (
+from cns_drake.base.drives import ros_types
+from cns_drake.base.drives.point_layouts import point_field_datatype
+from cns_drake.base.drives.ros_types import (
     IMU,
     ODOMETRY,
     POINT_CLOUD,
@@ -32,6 +32,10 @@ _NS_PER_S = 1_000_000_000
 # Stands for numbers that change, in a message that is made once. It can be the
 # nanoseconds of a stamp, and no part of a text.
 _MARK = 0x3A17C0DE
+IMAGE = "sensor_msgs/msg/Image"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+# Kind of image -> its encoding in ROS.
+ENCODINGS = {"color": "rgba8", "depth": "32FC1", "label": "16SC1"}
 
 
 def encode_point_cloud(
@@ -263,4 +267,53 @@ def make_vector(xyz: np.ndarray) -> Any:
 def _make_point(xyz: np.ndarray) -> Any:
     return message_class("geometry_msgs/msg/Point")(
         x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
+    )
+
+
+def make_image(
+    pixels: np.ndarray, encoding: str, frame_id: str, stamp_ns: int
+) -> Any:
+    """Returns an Image message.
+
+    Args:
+        pixels: (height, width, channels), little-endian; depth in metres.
+        encoding: one of `ENCODINGS`.
+        frame_id: the camera's frame, z ahead and y down.
+        stamp_ns: the time of the image [ns].
+    """
+    height, width, _ = pixels.shape
+    data = np.ascontiguousarray(pixels).view(np.uint8).reshape(-1)
+    return message_class(IMAGE)(
+        header=make_header(frame_id, stamp_ns),
+        height=height,
+        width=width,
+        encoding=encoding,
+        is_bigendian=0,
+        step=len(data) // height,
+        data=data,
+    )
+
+
+def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
+    """Returns a CameraInfo message of a pinhole without distortion.
+
+    Args:
+        camera: its intrinsics.
+        frame_id: the camera's frame, z ahead and y down.
+        stamp_ns: the time of the image [ns].
+    """
+    K = camera.intrinsic_matrix()
+    region = message_class("sensor_msgs/msg/RegionOfInterest")
+    return message_class(CAMERA_INFO)(
+        header=make_header(frame_id, stamp_ns),
+        height=camera.height(),
+        width=camera.width(),
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=K.ravel(),
+        r=np.eye(3).ravel(),
+        p=np.column_stack([K, np.zeros(3)]).ravel(),
+        binning_x=0,
+        binning_y=0,
+        roi=region(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
     )

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from cns_drake.base.recordings.ros_types import (
+from cns_drake.base.drives.ros_types import (
     DETECTIONS_3D,
     SCENE_UPDATE,
     message_class,

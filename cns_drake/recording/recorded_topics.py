@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 
 from pydrake.math import RigidTransform
 
-from cns_drake.base.recordings import ros_types
+from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
-from cns_drake.recording.image_messages import CAMERA_INFO, ENCODINGS, IMAGE
+from cns_drake.recording.messages import CAMERA_INFO, ENCODINGS, IMAGE
 from cns_drake.recording.rosbag2_metadata import Topic
 
 TF_STATIC_TOPIC = Topic("/tf_static", ros_types.TF, latched=True)

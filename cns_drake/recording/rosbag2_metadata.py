@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from cns_drake.base.recordings import ros_types
+from cns_drake.base.drives import ros_types
 
 _VERSION = 8
 

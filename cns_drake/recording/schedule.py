@@ -1,4 +1,4 @@
-"""Times of a recording's messages; each stream has its own rate."""
+"""Times of a recording's frames and messages; each stream has its own rate."""
 
 from __future__ import annotations
 
@@ -7,9 +7,33 @@ from dataclasses import dataclass
 from fractions import Fraction
 import math
 
+# Time between frames [s], unless a LiDAR turns more slowly: the paper's 20 Hz.
+FRAME_PERIOD = 0.05
+# Stamp of frame 0 [ns]. Zero would mean "latest" to tf2. The clock's time would
+# give other bytes at each run.
+START_NS = 1_700_000_000_000_000_000
 _NS_PER_S = 1_000_000_000
 # Finer than any clock: a period such as 1/30 s is found again in a double.
 _FINEST = 10**9
+
+
+def frame_stamp_ns(
+    frame: int, *, start_ns: int = START_NS, period: float = FRAME_PERIOD
+) -> int:
+    """Returns the stamp of a frame [ns]."""
+    return start_ns + round(frame * period * 1e9)
+
+
+def frames_within(duration: float, period: float = FRAME_PERIOD) -> int:
+    """Returns the number of frames of a drive.
+
+    The first frame is taken at its start.
+
+    Args:
+        duration: of the drive [s].
+        period: time between frames [s].
+    """
+    return math.floor(duration / period) + 1
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cns_drake.recording.frame_clock import frames_within
+from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario

@@ -12,8 +12,8 @@ from pydantic import (
     model_validator,
 )
 
+from cns_drake.base.drives.point_layouts import LayoutName
 from cns_drake.base.errors import InputError, describe_validation_error
-from cns_drake.base.recordings.point_layouts import LayoutName
 from cns_drake.scenarios.mount import Mount, Triple
 from cns_drake.scenarios.section import field_off_by_default
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS

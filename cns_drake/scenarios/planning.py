@@ -11,7 +11,7 @@ from cns_drake.motion.suspension import (
     load_suspension_rates,
 )
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.recording.frame_clock import frames_within
+from cns_drake.recording.schedule import frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS

@@ -9,9 +9,8 @@ from pathlib import Path
 import platform
 
 from cns_drake.base.files import user_errors
-from cns_drake.base.installed_versions import installed_versions
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
-from cns_drake.base.version import __version__
+from cns_drake.base.version import __version__, installed_versions
 from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file

@@ -8,8 +8,8 @@ import shutil
 import tarfile
 import tempfile
 
-from cns_drake.base.cache_folder import cache_folder
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import cache_folder
 
 
 def unpacked(archive: Path) -> Path:

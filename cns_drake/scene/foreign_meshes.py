@@ -16,7 +16,7 @@ from types import ModuleType
 
 import numpy as np
 
-from cns_drake.base.libraries import missing_library
+from cns_drake.base.errors import missing_library
 
 
 class ForeignMeshes:

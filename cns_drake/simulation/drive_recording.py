@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from cns_drake.base.version import __version__
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.frame_clock import START_NS
+from cns_drake.recording.bag_writer import BagWriter, take_over_frames
 from cns_drake.recording.recorded_topics import make_calibration
-from cns_drake.recording.resuming import take_over_frames
+from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
 from cns_drake.scenarios.provenance import (
     INPUTS_KEY,

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.errors import InputError
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.recording.frame_clock import frames_within
+from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import (
     digest_inputs,

@@ -9,10 +9,10 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cns_drake.base import poses
-from cns_drake.base.recordings.drive import Drive
+from cns_drake.base.drives.drive import Drive
 from cns_drake.motion.trajectory import Trajectory, pose_at
-from cns_drake.recording.frame_clock import frame_stamp_ns
 from cns_drake.recording.messages import MAP_FRAME, to_quat_xyzw
+from cns_drake.recording.schedule import frame_stamp_ns
 from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario

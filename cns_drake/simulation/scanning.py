@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.base.cloud_writing import (
-    encode_bin,
-    encode_pcd,
-    to_xyzi,
-)
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import (
     complete_part,
     part_path,
     user_errors,
+)
+from cns_drake.base.points import (
+    encode_bin,
+    encode_pcd,
+    to_xyzi,
 )
 from cns_drake.scene.world import World
 from cns_drake.sensors.beam_pattern import BeamPattern

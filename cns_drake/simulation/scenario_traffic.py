@@ -11,7 +11,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import count_frames
 from cns_drake.scenarios.rates import frame_period

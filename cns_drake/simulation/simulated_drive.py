@@ -14,8 +14,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, FixedInputPortValue
 
+from cns_drake.base.drives.drive import index_instances
 from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.base.recordings.drive import index_instances
 from cns_drake.motion.sweep import Sweep
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.planning import count_frames, plan_drive

@@ -10,13 +10,13 @@ import time
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.files import (
     check_writable,
     complete_part,
     write_part,
 )
 from cns_drake.base.interrupts import interrupts_wait
-from cns_drake.base.recordings.drive import Drive
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.recording_folder import RecordingFolder

@@ -12,8 +12,8 @@ from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.frame_clock import START_NS
 from cns_drake.recording.mcap_recorder import McapRecorder
+from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.imu_making import imu_rate, make_imu_noise
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.rates import frame_period

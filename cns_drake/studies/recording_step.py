@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 import shutil
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.recordings.drive import Drive
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.scenarios.planning import shown_beside

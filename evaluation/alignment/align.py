@@ -21,9 +21,9 @@ from typing import Literal
 import numpy as np
 
 from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive, check_same_map
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive, check_same_map
 from evaluation.alignment.alignment_report import AlignmentReport
 from evaluation.alignment.anchor_search import (
     find_candidates,

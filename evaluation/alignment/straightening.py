@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track
-from cns_drake.base.recordings.drive import Drive
 from evaluation.alignment.anchoring import straighten
 from evaluation.alignment.loop_search import find_self_loops
 from evaluation.alignment.loops import loop_errors

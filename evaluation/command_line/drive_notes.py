@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from cns_drake.base import terminal
 
 if TYPE_CHECKING:
-    from cns_drake.base.recordings.drive import Drive
+    from cns_drake.base.drives.drive import Drive
 
 
 def print_notes(drive: Drive) -> None:

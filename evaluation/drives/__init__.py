@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.recordings.drive import (
+from cns_drake.base.drives.drive import (
     Drive,
     Placed,
     PlacedDrive,
     check_same_world,
 )
+from cns_drake.base.errors import InputError
 
 __all__ = [
     "Drive",
@@ -44,7 +44,7 @@ def open_drive(path: Path, lidar: str | None = None) -> Drive:
     """
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
-    from cns_drake.base.recordings import mcap_drive
+    from cns_drake.base.drives import mcap_drive
     from evaluation.drives import cns_folder, helipr, kitti, mulran
 
     readers = (

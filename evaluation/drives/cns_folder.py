@@ -22,10 +22,9 @@ import numpy as np
 import yaml
 
 from cns_drake.base import poses
+from cns_drake.base.drives.drive import IMU_DTYPE, read_scenario
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.base.recordings.motion import IMU_DTYPE
-from cns_drake.base.recordings.scenario_file import read_scenario
 from cns_drake.base.yaml_files import parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.pose_table import (

@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.recordings.drive import Drive
 
 # Number of poses before and after a scan from which its motion is interpolated.
 # The ends of the splines are free; an error there fades to about a quarter from

@@ -32,11 +32,10 @@ import re
 import numpy as np
 
 from cns_drake.base import poses
+from cns_drake.base.drives.drive import index_instances, read_scenario
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
-from cns_drake.base.recordings.drive import index_instances
-from cns_drake.base.recordings.scenario_file import read_scenario
 from evaluation.drives.pose_table import pose_matrices
 from evaluation.drives.scan_files import (
     FileDrive,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cns_drake.base.recordings.drive import Drive
+from cns_drake.base.drives.drive import Drive
 from evaluation.drives.drive_view import DriveView
 
 

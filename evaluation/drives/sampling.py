@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.recordings.drive import Drive
+from cns_drake.base.drives.drive import Drive
 from evaluation.drives.cropped_cloud import CroppedCloud
 
 

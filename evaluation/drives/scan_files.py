@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.points import FARTHEST_RETURN
-from cns_drake.base.recordings.drive import Drive
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.drives.text_tables import (
     check_increasing,

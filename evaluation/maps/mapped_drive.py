@@ -6,8 +6,8 @@ from collections import OrderedDict
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive
 from evaluation.drives.drive_view import DriveView
 from evaluation.maps.voxel_maps import (
     VOXEL_SIZE,

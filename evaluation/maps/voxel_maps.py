@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive
 from evaluation.geometry.sorting import cell_order
 from evaluation.maps.voxel_table import SLOT, enter, locate, move
 

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import (

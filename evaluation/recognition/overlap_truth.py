@@ -18,8 +18,8 @@ from typing import Protocol
 import numpy as np
 
 from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
     Mode,

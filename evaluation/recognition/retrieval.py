@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive, check_same_world
 from evaluation.methods.method import Method
 from evaluation.recognition.description import (
     DescribedDrive,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
+from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError, one_line
-from cns_drake.base.recordings.driven_way import driven_way
 from evaluation.drives import open_drive
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.drive_source import DriveSource, RecordedDrive

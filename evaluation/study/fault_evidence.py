@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.recordings.drive import Drive
 from evaluation.drives.sampling import within_range
 from evaluation.geometry.coinciding import CoincidingPoints
 from evaluation.maps.thinning import thin

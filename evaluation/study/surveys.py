@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.recordings.drive import Drive
 from evaluation.drives.moved import MovedDrive
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
+from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.recordings.driven_way import driven_way
 from evaluation.drives import Drive, check_same_world, open_drive
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,

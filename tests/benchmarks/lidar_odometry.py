@@ -38,7 +38,7 @@ from rosbags.highlevel import AnyReader
 import yaml
 
 from cns_drake.base import poses
-from cns_drake.recording.frame_clock import START_NS
+from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario

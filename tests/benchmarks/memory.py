@@ -39,7 +39,7 @@ def print_growth(drive: str, frames: int) -> None:
     """Prints how the memory of a long recording grows."""
     import numpy as np
 
-    from cns_drake.recording.frame_clock import FRAME_PERIOD
+    from cns_drake.recording.schedule import FRAME_PERIOD
     from cns_drake.roads.network import load_road_network
     from cns_drake.roads.route_drawing import draw_route
     from cns_drake.scenarios.scenario_files import map_folder

@@ -30,14 +30,14 @@ from processes import in_process
 from stages import Open3dStage, read_stage
 import zstandard
 
-from cns_drake.base.processors import num_cores
-from cns_drake.base.recordings import ros_types
+from cns_drake.base.drives import ros_types
+from cns_drake.base.process import num_cores
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording import messages
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.frame_clock import FRAME_PERIOD
-from cns_drake.recording.part_file import PartFile
+from cns_drake.recording.recording_folder import PartFile
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_loading import load_scenario

@@ -27,9 +27,9 @@ import sys
 import tempfile
 
 from cns_drake.base.compiled import start_compiler
-from cns_drake.base.garbage import look_seldom
 from cns_drake.base.jobs import job_server
 from cns_drake.base.jobs.job_process import ALLOCATION
+from cns_drake.base.process import look_seldom
 
 _CLIENT = """#!{python} -IS
 import json, os, socket, sys

@@ -19,9 +19,9 @@ from cns_drake.export.exporting import export_drive
 from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.pictures.stage_pictures import load_views
-from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.repair import repair_mcap
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
 from cns_drake.scenarios.drive_table import drive_rows

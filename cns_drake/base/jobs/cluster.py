@@ -8,7 +8,7 @@ import os
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.workers import Listener, Workers, local_workers
-from cns_drake.base.processors import num_cores
+from cns_drake.base.process import num_cores
 
 # Environment variable with the address of a scheduler; the name is Dask's.
 _ADDRESS_VARIABLE = "DASK_SCHEDULER_ADDRESS"

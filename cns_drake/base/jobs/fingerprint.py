@@ -19,7 +19,7 @@ import re
 from typing import NamedTuple
 
 from cns_drake.base.files import user_errors
-from cns_drake.base.installed_versions import installed_versions
+from cns_drake.base.version import installed_versions
 
 # The folder of the packages, and their names.
 _ROOT = Path(__file__).parents[3]

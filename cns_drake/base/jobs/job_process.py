@@ -20,9 +20,8 @@ import threading
 import traceback
 from typing import Protocol
 
-from cns_drake.base.errors import InputError, one_line
+from cns_drake.base.errors import InputError, missing_library, one_line
 from cns_drake.base.files import exclusive
-from cns_drake.base.garbage import look_seldom
 from cns_drake.base.interrupts import (
     end_interrupted,
     ignore_interrupts,
@@ -30,7 +29,7 @@ from cns_drake.base.interrupts import (
     uninterrupted,
 )
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.libraries import missing_library
+from cns_drake.base.process import look_seldom
 
 # How long a process may take to close its files after SIGTERM [s].
 PATIENCE = 30.0

@@ -22,7 +22,6 @@ import sys
 import threading
 import time
 
-from cns_drake.base.garbage import look_seldom
 from cns_drake.base.jobs.job_process import (
     ProcessDiedError,
     StartedProcess,
@@ -30,6 +29,7 @@ from cns_drake.base.jobs.job_process import (
     work,
 )
 from cns_drake.base.jobs.step import Step
+from cns_drake.base.process import look_seldom
 
 # How often the server checks whether a process has ended [s].
 _LOOK_INTERVAL = 0.01

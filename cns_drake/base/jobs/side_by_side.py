@@ -23,7 +23,7 @@ from typing import Any, NoReturn, TypeVar
 
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.job_process import end_with_parent
-from cns_drake.base.processors import num_cores
+from cns_drake.base.process import num_cores
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")

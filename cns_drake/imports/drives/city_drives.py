@@ -23,6 +23,31 @@ from cns_drake.imports.drives.search import (
 from cns_drake.imports.foreign_city import SHARPEST_TURN_DEG, Street
 from cns_drake.imports.options import DriveOn
 
+# Paths prefer this distance from walls [m].
+_COMFORT = 6.0
+# An arm keeps this distance from the drive it leaves, except at the joint [m].
+_APART = 10.0
+# Cells within this distance of an obstacle are closed [m].
+_OBSTRUCTED = 3.0
+# Greatest distance of waypoints, for their heights, and least distance from
+# corners [m].
+_WAYPOINT_SPACING = 15.0
+# Tolerances, tried in turn, of waypoints against the found path [m].
+_SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
+# Cells in a running mean, chosen by trial.
+_STRAIGHTENED = (5, 11, 17)
+_SPACING = 1.0
+# Share of their lateral offset that cars keep in a turn: in narrow streets and
+# sharp corners they have to swing out.
+_AT_TURNS = (1.0, 0.6, 0.2)
+# Distance of the start and end of a turn from its sharpest place [m].
+_TURN = 12.0
+_SHARP_DEG_PER_M = 4.0
+# Tolerances, tried in turn, of waypoints against the lanes [m].
+_TOLERANCES = (0.2, 0.4, 0.8, 1.2)
+# Lengths of the means that round corners, and lateral offsets [m].
+_ROUND, _SMOOTH_ASIDE = 7, 15
+
 
 @dataclass(frozen=True, eq=False)
 class Lane:
@@ -123,21 +148,6 @@ def _rows(
         yield from zip(x, y, np.full(count, lane.aside), strict=True)
 
 
-# Paths prefer this distance from walls [m].
-_COMFORT = 6.0
-# An arm keeps this distance from the drive it leaves, except at the joint [m].
-_APART = 10.0
-# Cells within this distance of an obstacle are closed [m].
-_OBSTRUCTED = 3.0
-# Greatest distance of waypoints, for their heights, and least distance from
-# corners [m].
-_WAYPOINT_SPACING = 15.0
-# Tolerances, tried in turn, of waypoints against the found path [m].
-_SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
-# Cells in a running mean, chosen by trial.
-_STRAIGHTENED = (5, 11, 17)
-
-
 class CellGraph(WayGraph):
     """Cells with room, each linked to the eight beside it."""
 
@@ -230,19 +240,6 @@ def _densified(corners: np.ndarray) -> np.ndarray:
             points.append(a + parts[:, None] * (b - a))
         points.append(b[None])
     return np.concatenate(points)
-
-
-_SPACING = 1.0
-# Share of their lateral offset that cars keep in a turn: in narrow streets and
-# sharp corners they have to swing out.
-_AT_TURNS = (1.0, 0.6, 0.2)
-# Distance of the start and end of a turn from its sharpest place [m].
-_TURN = 12.0
-_SHARP_DEG_PER_M = 4.0
-# Tolerances, tried in turn, of waypoints against the lanes [m].
-_TOLERANCES = (0.2, 0.4, 0.8, 1.2)
-# Lengths of the means that round corners, and lateral offsets [m].
-_ROUND, _SMOOTH_ASIDE = 7, 15
 
 
 class StreetGraph(WayGraph):

@@ -36,6 +36,25 @@ SHORTEST = 80.0
 # Takes places (N, 2) along a path [m] and returns the first (2,) where a car
 # has no room, or None.
 Room = Callable[[np.ndarray], np.ndarray | None]
+# Least and greatest length of the second drive's own arms [m].
+_SHORTEST_ARM = 40.0
+_LONGEST_ARM = LONGEST / 3
+# Parts of the first drive: where the second one may join it (from, to), and
+# where it must have left; the same for the second trial; the least part they
+# share.
+_SHARED = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
+_LEAST_SHARED = 0.15
+# Number of places to join and to leave that are tried, and their least distance
+# [m].
+_MOST_PLACES = 12
+_APART = 10.0
+# Number of ways that are tried as first drive, and as second drive.
+_MOST_TRIES = 30
+# Number of ends of ways that are tried until a way meets no place twice.
+_MOST_ENDS = 20
+# Number of pieces from which ways are searched; fewer in large graphs.
+_MOST_STARTS = 200
+_MOST_REACHED = 400_000
 
 
 @dataclass(frozen=True)
@@ -119,27 +138,6 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     (x1, y1), (x2, y2) = spline(u, 1).T, spline(u, 2).T
     curvature = np.abs(x1 * y2 - y1 * x2) / np.hypot(x1, y1) ** 3
     return spline(u), 1.0 / np.maximum(curvature, 1e-12)
-
-
-# Least and greatest length of the second drive's own arms [m].
-_SHORTEST_ARM = 40.0
-_LONGEST_ARM = LONGEST / 3
-# Parts of the first drive: where the second one may join it (from, to), and
-# where it must have left; the same for the second trial; the least part they
-# share.
-_SHARED = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
-_LEAST_SHARED = 0.15
-# Number of places to join and to leave that are tried, and their least distance
-# [m].
-_MOST_PLACES = 12
-_APART = 10.0
-# Number of ways that are tried as first drive, and as second drive.
-_MOST_TRIES = 30
-# Number of ends of ways that are tried until a way meets no place twice.
-_MOST_ENDS = 20
-# Number of pieces from which ways are searched; fewer in large graphs.
-_MOST_STARTS = 200
-_MOST_REACHED = 400_000
 
 
 class WayGraph(ABC):

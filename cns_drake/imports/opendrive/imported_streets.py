@@ -38,6 +38,22 @@ _SLENDER, _LONGEST = 10.0, 6.0
 # Places where a taper may end are at most this far apart; corners this near to
 # a straight edge are none [m].
 _SPACING, _SIMPLE = 0.25, 0.005
+# Slits up to twice this width between lanes are closed [m].
+_SEAM = 0.05
+# Vertices closer to an outline than this are dropped [m].
+_SIMPLIFY = 0.005
+# Ground that lanes enclose beside a junction is part of it up to this size
+# [m^2]; larger ground is an island.
+_LARGEST_GAP = 60.0
+_LEVEL = ("road", "parking", "sidewalk", "other-ground")
+_LEAST_AREA = 1e-6
+_NOWHERE = Polygon()
+_ISLAND_RGB = (0.55, 0.53, 0.50)
+_PATH_RGB = (0.52, 0.42, 0.38)
+_DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
+_LEAST_CROSS = 1e-6
+# Wider than a kerb [m].
+_END = 0.2
 
 
 def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
@@ -122,20 +138,6 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
 
 def _reach(xy: np.ndarray) -> float:
     return float(np.hypot(*np.diff(xy, axis=0).T).sum())
-
-
-# Slits up to twice this width between lanes are closed [m].
-_SEAM = 0.05
-# Vertices closer to an outline than this are dropped [m].
-_SIMPLIFY = 0.005
-# Ground that lanes enclose beside a junction is part of it up to this size
-# [m^2]; larger ground is an island.
-_LARGEST_GAP = 60.0
-_LEVEL = ("road", "parking", "sidewalk", "other-ground")
-_LEAST_AREA = 1e-6
-_NOWHERE = Polygon()
-_ISLAND_RGB = (0.55, 0.53, 0.50)
-_PATH_RGB = (0.52, 0.42, 0.38)
 
 
 class ImportedStreets:
@@ -302,12 +304,6 @@ def _cut_at_tiles(area: MultiPolygon) -> MultiPolygon:
 
 def _multi(area: BaseGeometry) -> MultiPolygon:
     return MultiPolygon(polygons_of(area))
-
-
-_DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
-_LEAST_CROSS = 1e-6
-# Wider than a kerb [m].
-_END = 0.2
 
 
 def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:

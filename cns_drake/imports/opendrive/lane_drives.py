@@ -35,6 +35,13 @@ _SPACING = 2.0
 # Numbers of waypoints to both sides over which drives are smoothed, tried in
 # turn.
 _SMOOTHING = (0, 1, 2, 3)
+# Speed limit of roads without one [m/s].
+_LIMIT = 13.9
+_SIDEWALKS = frozenset({"sidewalk", "walking"})
+# Walkers' least distance from the edges of a sidewalk, and greatest from its
+# middle [m].
+_MARGIN, _MOST_HALF_WIDTH = 0.45, 1.05
+_LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
 
 
 class BandGraph(WayGraph):
@@ -175,15 +182,6 @@ def _resampled(line: np.ndarray) -> np.ndarray:
     count = max(1, round(along[-1] / _SPACING))
     wanted = np.linspace(0.0, along[-1], count + 1)
     return np.column_stack([np.interp(wanted, along, x) for x in line.T])
-
-
-# Speed limit of roads without one [m/s].
-_LIMIT = 13.9
-_SIDEWALKS = frozenset({"sidewalk", "walking"})
-# Walkers' least distance from the edges of a sidewalk, and greatest from its
-# middle [m].
-_MARGIN, _MOST_HALF_WIDTH = 0.45, 1.05
-_LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
 
 
 def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:

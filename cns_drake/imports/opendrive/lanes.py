@@ -48,6 +48,31 @@ _CLASSES = {
 _RAISED = frozenset({"sidewalk", "walking", "curb"})
 # From this height on a lane has a kerb [m].
 _LEAST_KERB = 0.03
+# Greatest distance of two places on a border, and greatest error of chords of
+# the reference line, of widths and of heights: borders are then true to 5 mm
+# [m].
+_SPACING = 2.0
+_SAG = 0.002
+_MOST_STATIONS = 200_000
+# No lane is farther from the reference line, or higher [m].
+_FARTHEST, _HIGHEST = 50_000.0, 10_000.0
+# Places nearer to each other than this, counted from the joints, are one [m].
+_INWARDS = 1e-6
+# A road at least this much above another one is a bridge [m].
+_HEADROOM = 3.0
+# Cell size for finding places above one another, and length of a bridge beyond
+# the crossed road [m].
+_NEAR, _BEYOND = 2.5, 8.0
+_LEAST_WIDTH = 0.1
+# Number of nearby places whose planes give a height, as their mean.
+_NEIGHBOURS = 8
+# Distance of the places of a lane [m].
+_PLACE_SPACING = 0.5
+# Nearer places count more; this distance bounds their weight [m].
+_CORE = 0.05
+# Places at a time.
+_BLOCK = 200_000
+_LEVEL = 1e-9
 
 
 def lane_class(kind: str) -> str | None:
@@ -63,18 +88,6 @@ def is_raised(kind: str, height: float) -> bool:
         height: of its inner edge above the road in the file [m].
     """
     return kind in _RAISED or height >= _LEAST_KERB
-
-
-# Greatest distance of two places on a border, and greatest error of chords of
-# the reference line, of widths and of heights: borders are then true to 5 mm
-# [m].
-_SPACING = 2.0
-_SAG = 0.002
-_MOST_STATIONS = 200_000
-# No lane is farther from the reference line, or higher [m].
-_FARTHEST, _HIGHEST = 50_000.0, 10_000.0
-# Places nearer to each other than this, counted from the joints, are one [m].
-_INWARDS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -229,14 +242,6 @@ def _stations(
     return np.concatenate(places), np.concatenate(inside)
 
 
-# A road at least this much above another one is a bridge [m].
-_HEADROOM = 3.0
-# Cell size for finding places above one another, and length of a bridge beyond
-# the crossed road [m].
-_NEAR, _BEYOND = 2.5, 8.0
-_LEAST_WIDTH = 0.1
-
-
 def split_levels(
     bands: Sequence[LaneBand],
 ) -> tuple[list[LaneBand], list[LaneBand]]:
@@ -295,17 +300,6 @@ def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
 def _cut(band: LaneBand, run: slice) -> LaneBand:
     names = ("inner", "outer", "middle", "heading", "roll", "grade", "s")
     return replace(band, **{name: getattr(band, name)[run] for name in names})
-
-
-# Number of nearby places whose planes give a height, as their mean.
-_NEIGHBOURS = 8
-# Distance of the places of a lane [m].
-_PLACE_SPACING = 0.5
-# Nearer places count more; this distance bounds their weight [m].
-_CORE = 0.05
-# Places at a time.
-_BLOCK = 200_000
-_LEVEL = 1e-9
 
 
 class RoadHeights:

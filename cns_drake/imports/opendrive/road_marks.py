@@ -30,6 +30,22 @@ _INWARDS = 0.05
 # Lines are cut with the carriageway of one such square at a time [m].
 _SQUARE = 64.0
 _MM = 0.001
+# Default length of a dash and its gap; distance from the middle of a double
+# line to its lines; height above the road [m].
+_DASH, _GAP = 3.0, 6.0
+_ASIDE = 0.12
+_ABOVE = 0.015
+_SHORTEST = 0.05
+_COLOURS: dict[str, Rgb] = {
+    "standard": (0.86, 0.86, 0.84),
+    "white": (0.86, 0.86, 0.84),
+    "yellow": (0.86, 0.70, 0.22),
+    "red": (0.70, 0.20, 0.18),
+    "blue": (0.20, 0.32, 0.62),
+    "green": (0.22, 0.48, 0.28),
+    "orange": (0.85, 0.50, 0.15),
+}
+_STYLES = ("solid", "broken")
 
 
 def moved_off_kerbs(
@@ -103,24 +119,6 @@ def _raised(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
     )[0]
     z = middle[2] + (flat - middle[:2]) @ slope
     return np.concatenate([flat, z[..., None]], axis=2)
-
-
-# Default length of a dash and its gap; distance from the middle of a double
-# line to its lines; height above the road [m].
-_DASH, _GAP = 3.0, 6.0
-_ASIDE = 0.12
-_ABOVE = 0.015
-_SHORTEST = 0.05
-_COLOURS: dict[str, Rgb] = {
-    "standard": (0.86, 0.86, 0.84),
-    "white": (0.86, 0.86, 0.84),
-    "yellow": (0.86, 0.70, 0.22),
-    "red": (0.70, 0.20, 0.18),
-    "blue": (0.20, 0.32, 0.62),
-    "green": (0.22, 0.48, 0.28),
-    "orange": (0.85, 0.50, 0.15),
-}
-_STYLES = ("solid", "broken")
 
 
 def road_marks(

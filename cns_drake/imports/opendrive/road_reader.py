@@ -37,6 +37,73 @@ from cns_drake.imports.options import ImportFaults
 _MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
 # Shortest distance between the starts of two dashes [m].
 _CLOSEST_DASHES = 0.1
+_ENDS = ("predecessor", "successor")
+_KNOWN = frozenset(
+    (
+        "OpenDRIVE",
+        "arc",
+        "border",
+        "bridge",
+        "center",
+        "connection",
+        "cornerLocal",
+        "cornerRoad",
+        "elevation",
+        "elevationProfile",
+        "geoReference",
+        "geometry",
+        "header",
+        "height",
+        "junction",
+        "lane",
+        "laneOffset",
+        "laneSection",
+        "lanes",
+        "lateralProfile",
+        "left",
+        "line",
+        "link",
+        "object",
+        "objects",
+        "outline",
+        "outlines",
+        "paramPoly3",
+        "planView",
+        "poly3",
+        "predecessor",
+        "repeat",
+        "right",
+        "road",
+        "roadMark",
+        "shape",
+        "signal",
+        "signals",
+        "speed",
+        "spiral",
+        "successor",
+        "superelevation",
+        "tunnel",
+        "type",
+        "width",
+    )
+)
+_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
+# Longer networks, such as whole countries, are refused [m].
+_LARGEST = 20_000.0
+_LONGEST_ROAD = 100_000.0
+_LONGEST_TOGETHER = 2_000_000.0
+# Roads farther from the origin are moved to it [m].
+_FAR = 10_000.0
+# Lengths that differ by less are equal [m].
+_ROUNDING = 0.01
+# Greatest width of a lane, and curvature of a curve [m, 1/m].
+_WIDEST = 100.0
+_SHARPEST = 100.0
+_SHORTEST = 1e-5
+# Banked test tracks have up to 49 deg [rad].
+_MOST_BANKED = math.radians(50.0)
+# Longest part of a name that is used in other names.
+_LONGEST_NAME = 60
 
 
 def read_marks(
@@ -105,9 +172,6 @@ def _mark_lines(mark: Element, usual: float) -> Iterator[MarkLine]:
             gap=gap,
             width=stated if 0.0 < stated <= _WIDEST_MARK else usual,
         )
-
-
-_ENDS = ("predecessor", "successor")
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
@@ -188,74 +252,6 @@ def _linked_sections(road: Element) -> list[Element]:
 def _linked_lanes(section: Element) -> Iterator[Element]:
     for side in ("left", "center", "right"):
         yield from section.all(side, "lane")
-
-
-_KNOWN = frozenset(
-    (
-        "OpenDRIVE",
-        "arc",
-        "border",
-        "bridge",
-        "center",
-        "connection",
-        "cornerLocal",
-        "cornerRoad",
-        "elevation",
-        "elevationProfile",
-        "geoReference",
-        "geometry",
-        "header",
-        "height",
-        "junction",
-        "lane",
-        "laneOffset",
-        "laneSection",
-        "lanes",
-        "lateralProfile",
-        "left",
-        "line",
-        "link",
-        "object",
-        "objects",
-        "outline",
-        "outlines",
-        "paramPoly3",
-        "planView",
-        "poly3",
-        "predecessor",
-        "repeat",
-        "right",
-        "road",
-        "roadMark",
-        "shape",
-        "signal",
-        "signals",
-        "speed",
-        "spiral",
-        "successor",
-        "superelevation",
-        "tunnel",
-        "type",
-        "width",
-    )
-)
-_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
-# Longer networks, such as whole countries, are refused [m].
-_LARGEST = 20_000.0
-_LONGEST_ROAD = 100_000.0
-_LONGEST_TOGETHER = 2_000_000.0
-# Roads farther from the origin are moved to it [m].
-_FAR = 10_000.0
-# Lengths that differ by less are equal [m].
-_ROUNDING = 0.01
-# Greatest width of a lane, and curvature of a curve [m, 1/m].
-_WIDEST = 100.0
-_SHARPEST = 100.0
-_SHORTEST = 1e-5
-# Banked test tracks have up to 49 deg [rad].
-_MOST_BANKED = math.radians(50.0)
-# Longest part of a name that is used in other names.
-_LONGEST_NAME = 60
 
 
 def read_roads(path: Path, faults: ImportFaults) -> RoadMap:

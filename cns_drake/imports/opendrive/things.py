@@ -25,6 +25,31 @@ _MOST_REPEATS = 10_000
 # An object repeated without a distance is cut into pieces of this length [m].
 _PIECE = 4.0
 _LARGEST = 1000.0  # [m]
+# Traffic signs of the Vienna convention, by the beginning of their type,
+# numbered as in most files.
+_SIGNS = (
+    (("206", "stop"), "sign_stop"),
+    (("205", "1"), "sign_triangular"),
+    (("2",), "sign_round"),
+)
+# Beginning of a type -> class; all others are other objects.
+_CLASSES = (
+    (("building",), "building"),
+    (
+        ("barrier", "railing", "guard", "fence", "wall", "soundbarrier"),
+        "fence",
+    ),
+    (("vegetation", "bush", "hedge", "plant"), "vegetation"),
+    (("pole", "streetlamp", "lamp", "permanentdelineator"), "pole"),
+    (("gantry", "bridge", "tunnel"), "other-structure"),
+    (("trafficisland",), "other-ground"),
+)
+# These are painted, or flat on the ground.
+_FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
+_LEAST_HEIGHT = 0.05
+_LEAST_SIDE = 0.05
+_LEAST_AREA = 1e-4
+_HALF_TURN = math.pi
 
 
 def read_things(
@@ -142,33 +167,6 @@ def _repeated(
             size=size,
             outline=thing.outline,
         )
-
-
-# Traffic signs of the Vienna convention, by the beginning of their type,
-# numbered as in most files.
-_SIGNS = (
-    (("206", "stop"), "sign_stop"),
-    (("205", "1"), "sign_triangular"),
-    (("2",), "sign_round"),
-)
-# Beginning of a type -> class; all others are other objects.
-_CLASSES = (
-    (("building",), "building"),
-    (
-        ("barrier", "railing", "guard", "fence", "wall", "soundbarrier"),
-        "fence",
-    ),
-    (("vegetation", "bush", "hedge", "plant"), "vegetation"),
-    (("pole", "streetlamp", "lamp", "permanentdelineator"), "pole"),
-    (("gantry", "bridge", "tunnel"), "other-structure"),
-    (("trafficisland",), "other-ground"),
-)
-# These are painted, or flat on the ground.
-_FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
-_LEAST_HEIGHT = 0.05
-_LEAST_SIDE = 0.05
-_LEAST_AREA = 1e-4
-_HALF_TURN = math.pi
 
 
 def thing_structures(

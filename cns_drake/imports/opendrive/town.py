@@ -64,6 +64,18 @@ _LONGEST_SIDE = 9000.0
 _BAY = (5.8, 7.4)
 _FILL = 0.6
 _BAY_WIDTH = 1.9
+_CROWN = 1.5  # [m]
+# Limits of the speed of a drive [m/s].
+_SPEEDS = (3.0, 12.0)
+# Classes in the picture from above; small things would not show.
+_SHOWN = (
+    "road",
+    "parking",
+    "sidewalk",
+    "other-ground",
+    "building",
+    "vegetation",
+)
 
 
 @dataclass(frozen=True)
@@ -293,20 +305,6 @@ def _kinds(
         ),
     }
     return {kind: number for kind, number in kinds.items() if number}
-
-
-_CROWN = 1.5  # [m]
-# Limits of the speed of a drive [m/s].
-_SPEEDS = (3.0, 12.0)
-# Classes in the picture from above; small things would not show.
-_SHOWN = (
-    "road",
-    "parking",
-    "sidewalk",
-    "other-ground",
-    "building",
-    "vegetation",
-)
 
 
 def write_town(

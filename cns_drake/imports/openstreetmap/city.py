@@ -77,6 +77,14 @@ _OBJECTS = (
     ("traffic_sign", "", "sign_round"),
 )
 _TREE_DISTANCE = 8.0  # [m]
+# Sizes of barriers and trees [m].
+_TALLEST = 150.0
+_HEDGE = (0.8, 1.2)
+_WALL = (0.2, 1.6)
+# How far the sea reaches beyond the buildings [m].
+_SEA = 60.0
+# Larger areas, such as whole countries, are refused.
+_LARGEST = 20_000.0  # [m]
 
 
 def object_of(tags: Tags) -> str | None:
@@ -143,16 +151,6 @@ def _direction(tags: Tags) -> float | None:
     if not re.fullmatch(r"\d{1,3}(\.\d+)?", text):
         return None
     return float(np.radians(90.0 - float(text)))
-
-
-# Sizes of barriers and trees [m].
-_TALLEST = 150.0
-_HEDGE = (0.8, 1.2)
-_WALL = (0.2, 1.6)
-# How far the sea reaches beyond the buildings [m].
-_SEA = 60.0
-# Larger areas, such as whole countries, are refused.
-_LARGEST = 20_000.0  # [m]
 
 
 def import_openstreetmap(

@@ -44,6 +44,11 @@ from cns_drake.imports.options import ImportFaults
 # Parapets: distance from the edge of the street, thickness, height [m].
 _FROM_EDGE, _THICK, _HIGH = 0.2, 0.25, 1.0
 _BESIDE_BRIDGE = 2.0
+_SIDEWALK = 2.0
+_KERB = 0.12
+_WHITE = (0.86, 0.86, 0.84)
+# Width of the stripes of a zebra crossing, and of the gaps [m].
+_STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -121,13 +126,6 @@ def parapets(
                 {"body": np.concatenate(solids)},
                 {"body": (0.62, 0.60, 0.57)},
             )
-
-
-_SIDEWALK = 2.0
-_KERB = 0.12
-_WHITE = (0.86, 0.86, 0.84)
-# Width of the stripes of a zebra crossing, and of the gaps [m].
-_STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 
 
 def street_surfaces(

@@ -41,56 +41,6 @@ _FEET_AND_INCHES = re.compile(
 _BETWEEN = re.compile(r"\s*;\s*|(?<=[^\s;])\s*(?:-|–|\bto\b)\s*(?=[\d.,])")
 _ABOUT = re.compile(r"^\s*(?:~|≈|ca\.?|about|approx\.?)\s*")
 _QUOTES = str.maketrans({"’": "'", "′": "'", "”": '"', "″": '"'})
-
-
-def length(text: str | None) -> float | None:
-    """Returns a length in metres; None if it is missing or no length.
-
-    The greatest, where there is a list or a range.
-    """
-    found = [_length(part) for part in _parts(text)]
-    return _greatest(found)
-
-
-def count(text: str | None) -> float | None:
-    """Returns a number, such as of levels; None if it is missing or none.
-
-    The greatest, where there is a list or a range.
-    """
-    found = [
-        float(part.replace(",", ".")) if re.fullmatch(_NUMBER, part) else None
-        for part in _parts(text)
-    ]
-    return _greatest(found)
-
-
-def _parts(text: str | None) -> Iterator[str]:
-    if text is None or len(text) > 255:  # OpenStreetMap allows no more.
-        return
-    plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
-    for part in _BETWEEN.split(plain):
-        if part.strip():
-            yield _ABOUT.sub("", part).strip()
-
-
-def _length(text: str) -> float | None:
-    both = _FEET_AND_INCHES.fullmatch(text)
-    if both:
-        feet, inches = (float(one.replace(",", ".")) for one in both.groups())
-        return 0.3048 * (feet + inches / 12.0)
-    match = _LENGTH.fullmatch(text)
-    if match is None or match[2] not in _UNITS:
-        return None
-    return float(match[1].replace(",", ".")) * _UNITS[match[2]]
-
-
-def _greatest(values: list[float | None]) -> float | None:
-    """Returns the greatest value; None without any, or if one is None."""
-    if not values or None in values:
-        return None
-    return max(value for value in values if value is not None)
-
-
 STOREY = 3.0  # [m]
 LANE = 3.0  # [m]
 # Least width for two cars to pass each other [m].
@@ -149,6 +99,87 @@ _ABSENT = {
     "planned": "proposed",
     "construction": "unfinished",
 }
+# Least width of a lane that carries any vehicle, the width that drivers use,
+# and the width of street for each lane where the file gives no number [m].
+_LEAST, _USED, _USUAL = 2.75, 3.25, 3.5
+_MOST_LANES = 8
+_KM_H = 1.0 / 3.6
+_MILES_H = 0.44704
+_FASTEST = 60.0  # [m/s]
+_WALKING_PACE = 7.0 * _KM_H
+# Limits of streets without a tag for it, and of the values that name a rule of
+# a country, such as `DE:urban` [km/h].
+_BY_CLASS = {
+    "motorway": 120.0,
+    "trunk": 80.0,
+    "primary": 50.0,
+    "secondary": 50.0,
+    "tertiary": 50.0,
+    "unclassified": 50.0,
+    "residential": 30.0,
+    "living_street": 7.0,
+    "service": 20.0,
+}
+_LINKS = 50.0
+_BY_RULE = {
+    "motorway": 120.0,
+    "trunk": 80.0,
+    "rural": 90.0,
+    "urban": 50.0,
+    "zone30": 30.0,
+    "zone:30": 30.0,
+    "living_street": 7.0,
+    "bicycle_road": 30.0,
+}
+_SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
+
+
+def length(text: str | None) -> float | None:
+    """Returns a length in metres; None if it is missing or no length.
+
+    The greatest, where there is a list or a range.
+    """
+    found = [_length(part) for part in _parts(text)]
+    return _greatest(found)
+
+
+def count(text: str | None) -> float | None:
+    """Returns a number, such as of levels; None if it is missing or none.
+
+    The greatest, where there is a list or a range.
+    """
+    found = [
+        float(part.replace(",", ".")) if re.fullmatch(_NUMBER, part) else None
+        for part in _parts(text)
+    ]
+    return _greatest(found)
+
+
+def _parts(text: str | None) -> Iterator[str]:
+    if text is None or len(text) > 255:  # OpenStreetMap allows no more.
+        return
+    plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
+    for part in _BETWEEN.split(plain):
+        if part.strip():
+            yield _ABOUT.sub("", part).strip()
+
+
+def _length(text: str) -> float | None:
+    both = _FEET_AND_INCHES.fullmatch(text)
+    if both:
+        feet, inches = (float(one.replace(",", ".")) for one in both.groups())
+        return 0.3048 * (feet + inches / 12.0)
+    match = _LENGTH.fullmatch(text)
+    if match is None or match[2] not in _UNITS:
+        return None
+    return float(match[1].replace(",", ".")) * _UNITS[match[2]]
+
+
+def _greatest(values: list[float | None]) -> float | None:
+    """Returns the greatest value; None without any, or if one is None."""
+    if not values or None in values:
+        return None
+    return max(value for value in values if value is not None)
 
 
 def tag_value(
@@ -371,41 +402,6 @@ def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
     ):
         return "LandUse", "terrain"
     return None
-
-
-# Least width of a lane that carries any vehicle, the width that drivers use,
-# and the width of street for each lane where the file gives no number [m].
-_LEAST, _USED, _USUAL = 2.75, 3.25, 3.5
-_MOST_LANES = 8
-_KM_H = 1.0 / 3.6
-_MILES_H = 0.44704
-_FASTEST = 60.0  # [m/s]
-_WALKING_PACE = 7.0 * _KM_H
-# Limits of streets without a tag for it, and of the values that name a rule of
-# a country, such as `DE:urban` [km/h].
-_BY_CLASS = {
-    "motorway": 120.0,
-    "trunk": 80.0,
-    "primary": 50.0,
-    "secondary": 50.0,
-    "tertiary": 50.0,
-    "unclassified": 50.0,
-    "residential": 30.0,
-    "living_street": 7.0,
-    "service": 20.0,
-}
-_LINKS = 50.0
-_BY_RULE = {
-    "motorway": 120.0,
-    "trunk": 80.0,
-    "rural": 90.0,
-    "urban": 50.0,
-    "zone30": 30.0,
-    "zone:30": 30.0,
-    "living_street": 7.0,
-    "bicycle_road": 30.0,
-}
-_SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
 
 
 class LaneLayout(NamedTuple):

@@ -47,6 +47,18 @@ _SHORTEST = 1.0
 _ARM = 6.0
 # Streets for other traffic.
 _NO_TRAFFIC = frozenset({"track"})
+# An end of a stretch: its number, and 0 for the first end or -1 for the last.
+_Arm = tuple[int, int]
+# Traffic keeps to the streets near drives [m].
+_WITHIN = 300.0
+# Half of the room of a vehicle beside the middle of its lane [m].
+_HALF_WIDTH = 1.3
+# A signal stands within this distance of its junction, and a way of the
+# junction passes it within this distance [m].
+_SIGNAL_NEAR, _WAY_NEAR = 25.0, 6.0
+_KERB = 0.12
+# A height above which things do not stop a vehicle, and below [m].
+_ABOVE, _BELOW = 0.3, 3.5
 
 
 @dataclass(frozen=True)
@@ -74,10 +86,6 @@ class Stretch:
         line = self.line if end == 0 else self.line[::-1]
         reach = min(len(line) - 1, max(1, round(_ARM / SPACING)))
         return float(np.arctan2(*(line[reach] - line[0])[::-1]))
-
-
-# An end of a stretch: its number, and 0 for the first end or -1 for the last.
-_Arm = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -346,18 +354,6 @@ def _direction(lane: _Lane, end: int) -> float:
 
 def _level(line: np.ndarray) -> np.ndarray:
     return np.column_stack([line, np.zeros(len(line))])
-
-
-# Traffic keeps to the streets near drives [m].
-_WITHIN = 300.0
-# Half of the room of a vehicle beside the middle of its lane [m].
-_HALF_WIDTH = 1.3
-# A signal stands within this distance of its junction, and a way of the
-# junction passes it within this distance [m].
-_SIGNAL_NEAR, _WAY_NEAR = 25.0, 6.0
-_KERB = 0.12
-# A height above which things do not stop a vehicle, and below [m].
-_ABOVE, _BELOW = 0.3, 3.5
 
 
 def lanes_of_streets(

@@ -10,7 +10,7 @@ import typer
 
 from cns_drake.base import progress_bars, terminal
 from cns_drake.base.errors import FailedJobsError, InputError
-from cns_drake.command_line.frame_progress import frame_progress
+from cns_drake.command_line.drive_script import frame_progress
 
 
 @pytest.mark.parametrize(

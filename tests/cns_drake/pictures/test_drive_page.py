@@ -18,7 +18,7 @@ from cns_drake.pictures.meshcat_recording import (
     _MAX_POINTS_PER_SCAN,
     _MAX_SCANS,
 )
-from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scene.world import load_world

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.recording.message_order import MessageOrder
+from cns_drake.recording.bag_writer import MessageOrder
 
 
 def test_stamps_are_not_before_the_epoch():

@@ -5,7 +5,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.recordings import ros_types
+from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
 from cns_drake.sensors.beam_pattern import POINT_DTYPE
 

@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 import pytest
 
-from cns_drake.base.recordings.ros_types import (
+from cns_drake.base.drives.ros_types import (
     DETECTIONS_3D,
     SCENE_UPDATE,
     deserialize,

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.recordings.point_cloud2 import to_points, to_records
-from cns_drake.base.recordings.point_layouts import (
+from cns_drake.base.drives.point_layouts import (
     from_layout,
     to_labels,
     to_layout,
+    to_points,
+    to_records,
 )
-from cns_drake.base.recordings.ros_types import (
+from cns_drake.base.drives.ros_types import (
     POINT_CLOUD,
     deserialize,
 )

@@ -15,13 +15,13 @@ from rosbags.highlevel import AnyReader
 import yaml
 import zstandard
 
+from cns_drake.base.drives.mcap_file import CHUNK_LIMIT_BYTES
 from cns_drake.base.errors import InputError
-from cns_drake.base.recordings.mcap_records import CHUNK_LIMIT_BYTES
-from cns_drake.recording.mcap_recovery import (
+from cns_drake.recording.repair import (
     Fault,
     read_records,
+    repair_mcap,
 )
-from cns_drake.recording.repair import repair_mcap
 
 COMPRESSIONS = (CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD)
 

@@ -15,7 +15,7 @@ import pytest
 
 from cns_drake.base import files
 from cns_drake.base.errors import InputError
-from cns_drake.recording.frame_clock import frame_stamp_ns
+from cns_drake.recording.schedule import frame_stamp_ns
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
-from cns_drake.recording.frame_clock import START_NS
+from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.scenario_loading import load_scenario

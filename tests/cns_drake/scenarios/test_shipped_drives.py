@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial import cKDTree
 from shapely import contains, distance, linestrings, points, polygons, prepare
 
-from cns_drake.recording.frame_clock import FRAME_PERIOD, frames_within
+from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.road_surface import RoadSurface
 from cns_drake.scenarios.drive_facts import drive_facts

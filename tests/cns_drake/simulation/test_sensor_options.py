@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 import pytest
 from scipy.special import lambertw
 
-from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import make_scenario
 from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose

@@ -10,10 +10,10 @@ import pytest
 from rosbags.highlevel import AnyReader
 import yaml
 
+from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
-from cns_drake.base.recordings.mcap_drive import McapDrive
 from cns_drake.export.exporting import export_drive
-from cns_drake.recording.frame_clock import START_NS
+from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulation import simulate

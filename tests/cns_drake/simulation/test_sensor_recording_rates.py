@@ -10,7 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.base.recordings.mcap_drive import McapDrive
+from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.sensors.imu import add_imu
 from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
 from cns_drake.sensors.lidar_adding import add_lidar

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
-from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.scenario_loading import make_scenario
 from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.simulation.stage_loading import load_stage

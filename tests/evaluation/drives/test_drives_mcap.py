@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
+from cns_drake.base.drives import mcap_file
+from cns_drake.base.drives.point_layouts import to_points
 from cns_drake.base.errors import InputError
-from cns_drake.base.recordings import mcap_file
-from cns_drake.base.recordings.point_cloud2 import to_points
 from evaluation import drives
 from evaluation.drives import check_same_world, open_drive
 

@@ -3,7 +3,7 @@
 from helpers.small_towns import ROUTES, drive
 import pytest
 
-from cns_drake.base.recordings.driven_way import driven_way
+from cns_drake.base.drives.drive import driven_way
 from evaluation.study.collection import find_recordings, group_cities
 
 LEGS = ROUTES["a"]

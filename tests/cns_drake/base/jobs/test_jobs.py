@@ -26,7 +26,7 @@ from cns_drake.base.jobs.job_process import (
 from cns_drake.base.jobs.job_server import JobServer
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.processors import num_cores
+from cns_drake.base.process import num_cores
 
 pytestmark = pytest.mark.slow
 

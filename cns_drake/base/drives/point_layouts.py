@@ -1,20 +1,31 @@
-"""Layouts of points: our own, and those of common LiDAR drivers.
+"""Points of PointCloud2 messages, and their layouts.
 
-`ouster` is the layout of Ouster's driver with `ring` as uint8, which LIO-SAM
-and FAST-LIO2 read; `velodyne` is PointXYZIRT of Velodyne's ROS 2 driver;
-`autoware` is PointXYZIRCAEDT. These layouts have no field for labels and
-instances, which come in another message.
-"""
+`cns` is our own layout. `ouster` is that of Ouster's driver with `ring` as
+uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is PointXYZIRT of Velodyne's
+ROS 2 driver; `autoware` is PointXYZIRCAEDT. These layouts have no field for
+labels and instances, which come in another message."""
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+import itertools
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+# Datatype constant of sensor_msgs/msg/PointField -> NumPy type, without the
+# order of bytes.
+_DATATYPES = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    8: "f8",
+}
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
-
 _XYZ = [("x", "<f4", 0), ("y", "<f4", 4), ("z", "<f4", 8)]
 _LABEL_FIELDS = ("label", "instance")
 _NS_PER_S = 1e9
@@ -22,6 +33,115 @@ _MM_PER_M = 1e3
 _LONGEST_NS = 2.0**32
 # Autoware's type of the only, and strongest, return of a beam.
 _SINGLE_STRONGEST = 1
+
+
+def point_field_datatype(dtype: np.dtype) -> int:
+    """Returns PointField's constant for a scalar type of NumPy.
+
+    Raises:
+        ValueError: if PointField has none.
+    """
+    for constant, name in _DATATYPES.items():
+        if dtype == np.dtype(f"<{name}"):
+            return constant
+    raise ValueError(f"a point cloud cannot hold numbers of type {dtype}")
+
+
+def to_points(message: Any) -> np.ndarray:
+    """Returns the records of a cloud as they are, without copying them.
+
+    Args:
+        message: a deserialised PointCloud2, with any fields and padding.
+
+    Returns:
+        Structured array of shape (height * width,) under the message's field
+        names.
+
+    Raises:
+        ValueError: if the message contradicts itself, or has no scalar
+            floating-point `x`, `y` and `z` beside each other.
+    """
+    dtype = _record_type(message)
+    for name in "xyz":
+        if name not in (dtype.names or ()) or dtype[name].kind != "f":
+            raise ValueError(f"the point cloud has no field {name} of floats")
+    _check_apart(dtype)
+    return _records(message, dtype)
+
+
+def to_records(message: Any) -> np.ndarray:
+    """Returns the records of a cloud that may have no coordinates.
+
+    Args:
+        message: a deserialised PointCloud2.
+
+    Returns:
+        (height * width,) under the message's field names.
+
+    Raises:
+        ValueError: if the message contradicts itself.
+    """
+    return _records(message, _record_type(message))
+
+
+def _records(message: Any, dtype: np.dtype) -> np.ndarray:
+    data = np.frombuffer(message.data, dtype=np.uint8)
+    if message.row_step < message.width * message.point_step:
+        raise ValueError("the point cloud's rows overlap")
+    if len(data) != message.height * message.row_step:
+        raise ValueError(
+            f"the point cloud has {len(data)} bytes instead of"
+            f" {message.height} x {message.row_step}"
+        )
+    rows = data.reshape(message.height, message.row_step)
+    used = rows[:, : message.width * message.point_step]
+    return np.ascontiguousarray(used).reshape(-1).view(dtype)
+
+
+def _check_apart(dtype: np.dtype) -> None:
+    """Refuses coordinates that share bytes.
+
+    Raises:
+        ValueError: if so.
+    """
+    assert dtype.fields is not None  # There are x, y and z.
+    places = sorted((dtype.fields[n][1], n, dtype[n].itemsize) for n in "xyz")
+    for (start, name, size), (following, other, _) in itertools.pairwise(
+        places
+    ):
+        if start + size > following:
+            raise ValueError(
+                f"the point cloud's fields {name} at byte {start} and {other}"
+                f" at byte {following} overlap"
+            )
+
+
+def _record_type(message: Any) -> np.dtype:
+    order = ">" if message.is_bigendian else "<"
+    names: list[str] = []
+    formats = []
+    for field in message.fields:
+        if field.datatype not in _DATATYPES:
+            raise ValueError(
+                f"the point cloud's field {field.name} has the unknown"
+                f" datatype {field.datatype}"
+            )
+        scalar = order + _DATATYPES[field.datatype]
+        if field.name in names:
+            raise ValueError(
+                f"the point cloud's field {field.name} is there twice"
+            )
+        names.append(field.name)
+        # Some writers leave the count of a scalar at zero.
+        formats.append((scalar, (field.count,)) if field.count > 1 else scalar)
+    return np.dtype(
+        {
+            "names": names,
+            "formats": formats,
+            "offsets": [field.offset for field in message.fields],
+            "itemsize": message.point_step,
+        }
+    )
 
 
 def _make_dtype(fields: list[tuple[str, str, int]], size: int) -> np.dtype:

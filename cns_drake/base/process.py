@@ -1,14 +1,22 @@
-"""Garbage collection, and work that is better off without it."""
+"""What a process may use: processors, and Python's search for garbage."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
 import gc
+import os
 
 # How many more objects there must be than at the last look; Python's own number
 # is 700 or 2,000.
 _OBJECTS = 50_000
+
+
+def num_cores() -> int:
+    """Returns how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @contextlib.contextmanager

@@ -6,11 +6,99 @@ import abc
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+import re
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.yaml_files import parse_yaml
+
+# W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
+# velocities are those of B in W, expressed in B [m/s, rad/s].
+ODOMETRY_DTYPE = np.dtype(
+    [
+        ("stamp_ns", "<i8"),
+        ("position", "<f8", 3),
+        ("quat_xyzw", "<f8", 4),
+        ("velocity", "<f8", 3),
+        ("angular_velocity", "<f8", 3),
+    ]
+)
+
+# The orientation is R_WI; the other values are expressed in I [rad/s, m/s^2].
+IMU_DTYPE = np.dtype(
+    [
+        ("stamp_ns", "<i8"),
+        ("quat_xyzw", "<f8", 4),
+        ("angular_velocity", "<f8", 3),
+        ("specific_force", "<f8", 3),
+    ]
+)
+# Fields of a scenario that lead the vehicle.
+_PATHS = ("route", "waypoints")
+# Fields that move the vehicle beside its path, or turn it round.
+_CHANGES = ("aside", "u_turns")
+# A drive's name also names files.
+_NAME = re.compile(r"\w[\w.-]*")
+
+
+class ImuSamples(NamedTuple):
+    """Samples of an IMU that follow each other at an even rate.
+
+    Attributes:
+        first: number of the first one; that at time zero is 0.
+        quat_xyzw: (N, 4) R_WI.
+        angular_velocity: (N, 3) w_WI, expressed in I [rad/s].
+        specific_force: (N, 3) expressed in I [m/s^2].
+    """
+
+    first: int
+    quat_xyzw: np.ndarray
+    angular_velocity: np.ndarray
+    specific_force: np.ndarray
+
+
+def driven_way(scenario: Mapping | None) -> dict | None:
+    """Returns the fields of a scenario that determine the path of a drive.
+
+    Two drives with the same way differ at most in their surroundings and their
+    sensors.
+
+    Args:
+        scenario: its fields, as a recording holds them.
+
+    Returns:
+        The fields that have an effect, to be compared with those of other
+        drives; None if the scenario does not determine the path.
+    """
+    if scenario is None or not any(scenario.get(name) for name in _PATHS):
+        return None
+    return {
+        name: scenario[name] for name in _PATHS + _CHANGES if scenario.get(name)
+    }
+
+
+def read_scenario(folder: Path) -> Mapping | None:
+    """Returns the content of an exported drive's `scenario.yaml`, if any.
+
+    Raises:
+        InputError: if it is not a mapping in YAML.
+    """
+    path = folder / "scenario.yaml"
+    if not path.is_file():
+        return None
+    try:
+        scenario = parse_yaml(read_bytes(path))
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+    if not isinstance(scenario, dict):
+        raise InputError(f"{path}: not a mapping of a scenario's fields")
+    name = scenario.get("name")
+    if name is not None and not _NAME.fullmatch(str(name)):
+        raise InputError(f"{path}: name: {name!r} is no name of a drive")
+    return scenario
 
 
 class Drive(abc.ABC):

@@ -10,18 +10,25 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import points as point_arrays
-from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import parse_json
-from cns_drake.base.recordings import mcap_messages, ros_types
-from cns_drake.base.recordings.drive import Drive, index_instances
-from cns_drake.base.recordings.mcap_file import McapFile
-from cns_drake.base.recordings.motion import IMU_DTYPE, ODOMETRY_DTYPE
-from cns_drake.base.recordings.point_cloud2 import to_points, to_records
-from cns_drake.base.recordings.point_layouts import from_layout
-from cns_drake.base.recordings.static_transforms import (
+from cns_drake.base.drives import mcap_messages, ros_types
+from cns_drake.base.drives.drive import (
+    IMU_DTYPE,
+    ODOMETRY_DTYPE,
+    Drive,
+    index_instances,
+)
+from cns_drake.base.drives.mcap_file import McapFile
+from cns_drake.base.drives.mcap_messages import (
     StaticTransforms,
     checked_poses,
 )
+from cns_drake.base.drives.point_layouts import (
+    from_layout,
+    to_points,
+    to_records,
+)
+from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import parse_json
 
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
