@@ -13,28 +13,49 @@ and kerbs, and bits instead of a Fourier transform, are our ideas.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+import itertools
 import math
 
 import numpy as np
-from pydantic import (
-    NonNegativeInt,
-    PositiveFloat,
-    PositiveInt,
-)
+from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
 from cns_drake.base.poses import make_pose
 from evaluation.methods.method import Method, MethodConfig, register
-from evaluation.methods.overlap_bits import fine_bits, turns
-from evaluation.methods.overlap_coarse import (
-    NUM_HEADINGS,
-    LayeredDatabase,
-    LayeredScan,
-    build_database,
-    search_coarse,
+from evaluation.methods.overlap_maps import (
+    best_overlaps,
+    climb,
+    coarse_maps,
+    layer_cells,
+    turns,
 )
-from evaluation.methods.overlap_layers import layer_cells
-from evaluation.methods.overlap_search import climb
 
+
+def _moves(turn: int, shift: int) -> np.ndarray:
+    """Returns (K, 3) changes of heading, row and column within reach."""
+    near = range(-shift, shift + 1)
+    return np.array([*itertools.product(range(-turn, turn + 1), near, near)])
+
+
+# Coarse maps are those of low with middle, high, poles and kerbs.
+_MAPS = np.array([0, 0, 1, 2, 3])
+# The first search: cells of 4 m and steps of 15 deg. All shifts within reach
+# are tried, except corners, which are too far for a match.
+_FIRST_HALVINGS = 3
+_FIRST_WEIGHTS = np.array([1, 1, 2, 2])
+_FIRST_TURNS = turns(24)
+_FIRST_REACH = 2
+_FIRST_MOVES = _moves(0, _FIRST_REACH)
+_FIRST_MOVES = _FIRST_MOVES[np.abs(_FIRST_MOVES).sum(axis=1) < 2 * _FIRST_REACH]
+# The second and the third: cells of 2 m; steps of 5 deg, then of 2.5 deg.
+_SECOND_HALVINGS = 2
+_SECOND_WEIGHTS = np.array([1, 1, 4, 2])
+_SECOND_TURNS = turns(144)
+_SECOND_MOVES = _moves(1, 1) * [2, 1, 1]
+_THIRD_MOVES = _moves(3, 2)
+_SECOND_MARGIN = 2 * _FIRST_REACH + 3
+# From a pose of the first search to one of the second: place, heading, shifts.
+_TO_SECOND = np.array([1, 6, 2, 2])
 # The last: whole cells; steps of 2.5 deg and 1 m, then of half of that.
 _LAST_TURNS = turns(288)
 _LAST_STEPS = np.array([[2, 4], [1, 2]])
@@ -73,6 +94,48 @@ class LayeredOverlapConfig(MethodConfig):
     least_cells: NonNegativeInt = 150
 
 
+@dataclass(frozen=True)
+class LayeredScan:
+    """Descriptor of one cloud.
+
+    Attributes:
+        cells: (M,) uint16, filled cells of the layers, one after the other.
+        starts: (6,) int64, where each begins, and the last one ends.
+    """
+
+    cells: np.ndarray
+    starts: np.ndarray
+
+
+@dataclass(frozen=True)
+class CoarseMaps:
+    """Coarse maps of places, or of a query at some headings.
+
+    Attributes:
+        bits: (N, R, 4) uint64, R rows of four maps; those of places have more
+            rows without bits on either side.
+        counts: (N, 4) int64 number of bits set in each map.
+    """
+
+    bits: np.ndarray
+    counts: np.ndarray
+
+
+@dataclass(frozen=True)
+class LayeredDatabase:
+    """Descriptors of D places.
+
+    Attributes:
+        places: the D descriptors.
+        first: maps of the first search.
+        second: maps of the second and the third.
+    """
+
+    places: Sequence[LayeredScan]
+    first: CoarseMaps
+    second: CoarseMaps
+
+
 @register("layered-overlap")
 class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     """Layered overlap, in four searches from coarse to fine.
@@ -99,7 +162,11 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         )
 
     def build_database(self, places: Sequence[LayeredScan]) -> LayeredDatabase:
-        return build_database(places)
+        return LayeredDatabase(
+            places,
+            _maps_of_places(places, _FIRST_HALVINGS, _FIRST_REACH),
+            _maps_of_places(places, _SECOND_HALVINGS, _SECOND_MARGIN),
+        )
 
     def score(
         self,
@@ -112,7 +179,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         if len(query.cells) == 0:
             return scores
         config = self.config
-        poses = self._search(
+        poses = _search(
             query, database, config.poses, config.refined, exhaustive
         )
         if not exhaustive:
@@ -144,9 +211,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         if len(query.cells) == 0 or len(scans) == 0:
             return poses
         # Every place with every heading is refined.
-        every = len(scans) * NUM_HEADINGS
+        every = len(scans) * len(_FIRST_TURNS)
         some = self.build_database(scans)
-        for start in self._search(query, some, every, every):
+        for start in _search(query, some, every, every):
             scan = scans[start[0]]
             if len(scan.cells) > 0:
                 found = self._climb(query, scan, start[1:])
@@ -162,18 +229,6 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
             R_PQ, np.array([found[1] * half_cell, found[2] * half_cell, 0.0])
         )
 
-    def _search(
-        self,
-        query: LayeredScan,
-        database: LayeredDatabase,
-        poses: int,
-        refined: int,
-        exhaustive: bool = False,
-    ) -> np.ndarray:
-        """Returns (N, 4) places, each with heading and shifts to climb from."""
-        found = search_coarse(query, database, poses, refined, exhaustive)
-        return found * _TO_LAST
-
     def _climb(
         self, query: LayeredScan, place: LayeredScan, start: np.ndarray
     ) -> np.ndarray:
@@ -181,7 +236,8 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         return climb(
             query.cells,
             query.starts,
-            fine_bits(place.cells, place.starts),
+            place.cells,
+            place.starts,
             np.array(self.config.weights),
             _LAST_TURNS,
             start,
@@ -200,3 +256,118 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         if of_query == 0 or of_place == 0:
             return 0.0
         return common / math.sqrt(of_query * of_place)
+
+
+def _search(
+    query: LayeredScan,
+    database: LayeredDatabase,
+    number: int,
+    refined: int,
+    exhaustive: bool = False,
+) -> np.ndarray:
+    """Searches for the places and poses at which coarse maps overlap most.
+
+    Args:
+        query: not empty.
+        database: with the places.
+        number: how many places with a heading the second search takes.
+        refined: how many of these the third search takes.
+        exhaustive: keep each place to the last search, with its best heading.
+
+    Returns:
+        (N, 4) int64 places, each with heading and shifts to climb from;
+        decreasing by how much the overlap is more than chance would have.
+    """
+    # The first search: every place at every heading.
+    shape = len(database.places), len(_FIRST_TURNS)
+    starts = np.zeros((math.prod(shape), 4), np.int64)
+    starts[:, 0], starts[:, 1] = np.divmod(np.arange(len(starts)), shape[1])
+    surprise, poses = _overlaps(
+        _draw(query, _FIRST_TURNS, _FIRST_HALVINGS),
+        database.first,
+        _FIRST_WEIGHTS,
+        starts,
+        _FIRST_MOVES,
+    )
+    # Overlap at all headings is no sign of a place, since both scans are full
+    # near their sensors. Half of it is subtracted, by trials.
+    surprise = surprise.reshape(shape)
+    surprise -= 0.5 * surprise.mean(axis=1, keepdims=True)
+    if exhaustive:
+        best = surprise.argmax(axis=1) + np.arange(shape[0]) * shape[1]
+        refined = len(best)
+    else:
+        best = _greatest(surprise.ravel(), number)
+    poses = poses[best] * _TO_SECOND
+    maps = _draw(query, _SECOND_TURNS, _SECOND_HALVINGS)
+    for moves in (_SECOND_MOVES, _THIRD_MOVES):
+        surprise, poses = _overlaps(
+            maps, database.second, _SECOND_WEIGHTS, poses, moves
+        )
+        poses = poses[_greatest(surprise, refined)]
+    # The best pose of each place, in the order of the places.
+    _, first = np.unique(poses[:, 0], return_index=True)
+    return poses[np.sort(first)] * _TO_LAST
+
+
+def _overlaps(
+    query: CoarseMaps,
+    places: CoarseMaps,
+    weights: np.ndarray,
+    starts: np.ndarray,
+    moves: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns by how much overlaps near some poses exceed those by chance.
+
+    Args:
+        query: maps at all headings.
+        places: to compare with.
+        weights: (4,) of a common bit of each map.
+        starts: (N, 4) place, heading and shifts to look near.
+        moves: see `best_overlaps`.
+
+    Returns:
+        (N,) standard deviations above chance, and (N, 4) the best poses.
+    """
+    counts, found = best_overlaps(
+        query.bits, places.bits, weights, starts, moves
+    )
+    place = starts[:, 0]
+    product = query.counts[found[:, 0]] * places.counts[place]
+    num_cells = query.bits.shape[1] ** 2
+    # The variance is at least one, for maps without bits.
+    deviation = np.sqrt(product @ weights**2 / num_cells + 1.0)
+    surprise = (counts - product @ weights / num_cells) / deviation
+    return surprise, np.column_stack([place, found])
+
+
+def _maps_of_places(
+    places: Sequence[LayeredScan], halvings: int, margin: int
+) -> CoarseMaps:
+    """Returns maps of places at their own heading, with rows added."""
+    maps = [_draw(place, turns(1), halvings) for place in places]
+    bits = np.concatenate([one.bits for one in maps])
+    return CoarseMaps(
+        np.pad(bits, ((0, 0), (margin, margin), (0, 0))),
+        np.concatenate([one.counts for one in maps]),
+    )
+
+
+def _draw(scan: LayeredScan, at: np.ndarray, halvings: int) -> CoarseMaps:
+    """Returns coarse maps of a scan, at some turns."""
+    return CoarseMaps(
+        *coarse_maps(scan.cells, scan.starts, at, halvings, _MAPS)
+    )
+
+
+def _greatest(values: np.ndarray, number: int) -> np.ndarray:
+    """Returns the indices of the greatest values (N,), decreasing.
+
+    The first of equal ones counts: a partial sort leaves that to the processor.
+    """
+    some = np.arange(len(values))
+    if number < len(values):
+        least = np.partition(values, -number)[-number]
+        some = np.flatnonzero(values >= least)
+    order = some[np.argsort(-values[some], kind="stable")]
+    return order[:number]

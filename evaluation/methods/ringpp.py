@@ -19,19 +19,16 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 import scipy.fft
+import scipy.sparse
+import scipy.special
 
 from cns_drake.base.compiled import compiled
 from cns_drake.base.poses import make_pose
 from evaluation.geometry.neighbours import nearest_neighbours
-from evaluation.geometry.sorting import cell_order
-from evaluation.methods.local_features import (
-    NUM_FEATURES,
-    local_features,
-)
-from evaluation.methods.many_correlations import ManyCorrelations
 from evaluation.methods.method import Method, MethodConfig, register
-from evaluation.methods.radon import radon
 
+# See `local_features`.
+NUM_FEATURES = 6
 # Bounds the normalised spectrum of a channel that hardly varies. It is the
 # default of PyTorch's InstanceNorm2d, which the authors' program uses. It
 # removes a third of the power of the variance of z, and is therefore part of
@@ -104,12 +101,10 @@ class RingDatabase:
 
     Attributes:
         places: the D descriptors.
-        correlations: with their spectra.
         is_empty: (D,) bool, whether a place shows nothing.
     """
 
     places: Sequence[Ring]
-    correlations: ManyCorrelations
     is_empty: np.ndarray
 
 
@@ -155,9 +150,6 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def build_database(self, places: Sequence[Ring]) -> RingDatabase:
         return RingDatabase(
             places=places,
-            correlations=ManyCorrelations(
-                [place.spectrum for place in places], self.config.cells
-            ),
             is_empty=np.array([len(place.filled) == 0 for place in places]),
         )
 
@@ -167,10 +159,12 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         del exhaustive  # It always is.
         if len(query.filled) == 0:
             return np.full(len(database.places), np.nan)
-        found = database.correlations.greatest_sums(self._weigh(query))
-        scores = found.astype(np.float64)
-        scores[database.is_empty] = np.nan
-        return scores
+        weighted = self._weigh(query)
+        scores = [
+            self._correlate(weighted, place.spectrum).max()
+            for place in database.places
+        ]
+        return np.where(database.is_empty, np.nan, scores)
 
     def relative_pose(
         self, query: Ring, database: RingDatabase, place: int
@@ -271,7 +265,12 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         features = local_features(scaled, neighbours)
         cells = ((scaled[:, :2] + 1.0) * (0.5 * config.cells)).astype(np.int64)
         # Rounding can put a value on the limit.
-        _keep_greatest(image, np.minimum(cells, config.cells - 1), features)
+        row, column = np.minimum(cells, config.cells - 1).T
+        cell = row * config.cells + column
+        order = np.argsort(cell)
+        first = np.flatnonzero(np.diff(cell[order], prepend=-1))
+        greatest = np.maximum.reduceat(features[order], first)
+        image.reshape(-1, NUM_FEATURES)[cell[order[first]]] = greatest
         return image
 
     def _weigh(self, query: Ring) -> np.ndarray:
@@ -308,30 +307,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
 
 def _without_duplicates(points: np.ndarray) -> np.ndarray:
     """Returns the different ones of points (N, 3), sorted by z, y and x."""
-    ranks = np.stack([_ranks(values) for values in points.T[::-1]], axis=1)
-    order = cell_order(ranks)
-    differs = np.diff(ranks[order], axis=0, prepend=-1).any(axis=1)
-    return points[order[differs]]
-
-
-def _ranks(values: np.ndarray) -> np.ndarray:
-    """Returns how many different ones of values (N,) are less than each."""
-    order = np.argsort(values)
-    ordered = values[order]
-    ranks = np.zeros(len(values), dtype=np.int64)
-    ranks[order[1:]] = np.cumsum(ordered[1:] != ordered[:-1])
-    return ranks
-
-
-@compiled
-def _keep_greatest(
-    image: np.ndarray, cells: np.ndarray, features: np.ndarray
-) -> None:
-    """Raises the cells (N, 2) of an image to the features (N, C) in them."""
-    for index in range(len(cells)):
-        cell = image[cells[index, 0], cells[index, 1]]
-        for channel in range(len(cell)):
-            cell[channel] = max(cell[channel], features[index, channel])
+    points = points[np.lexsort(points.T)]
+    return points[np.diff(points, axis=0, prepend=np.nan).any(axis=1)]
 
 
 def _frequency_weights(n: int) -> np.ndarray:
@@ -407,3 +384,154 @@ def _best_offset(
 def _signed(shift: int, n: int) -> int:
     """Returns a shift by 0, ..., n - 1 as one of -n // 2, ..., n // 2 - 1."""
     return (shift + n // 2) % n - n // 2
+
+
+def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Returns six numbers that describe the shape of a cloud at each point.
+
+    A selection of the hand-made features of LPD-Net (Liu et al., ICCV 2019).
+    With the covariance of a point's neighbours, its eigenvalues l1 >= l2 >= l3,
+    their sum s, and the eigenvalues m1 >= m2 of its horizontal part:
+
+    - change of curvature l3 / s,
+    - omnivariance (l1 l2 l3)^(1/3) / s,
+    - entropy of the eigenvalues, -sum (li / s) ln (li / s),
+    - horizontal roundness m2 / m1 (there called linearity),
+    - range and variance of z.
+
+    Where the neighbours lie in a plane or on a line, the limits of the
+    formulas count (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
+
+    Args:
+        points: (N, 3) float64.
+        neighbours: (N, K) indices, K >= 2, of points that are not all in
+            one place.
+
+    Returns:
+        (N, 6) float64, in the order above; all are at least 0. Eigenvalues
+        are exact to about 1e-8 of the greatest.
+    """
+    xx, yy, zz, xy, xz, yz, height = _moments(points, neighbours)
+    half_sum = 0.5 * (xx + yy)
+    root = np.hypot(0.5 * (xx - yy), xy)
+    # A vertical line has no horizontal part.
+    greatest = np.where(half_sum > 0.0, half_sum + root, 1.0)
+    roundness = np.maximum(half_sum - root, 0.0) / greatest
+    variance = zz / neighbours.shape[1]
+    # Eigenvalues in closed form (O. K. Smith, Comm. ACM 4 (4), 1961).
+    total = xx + yy + zz
+    xx, yy, zz, xy, xz, yz = (m / total for m in (xx, yy, zz, xy, xz, yz))
+    mean = (xx + yy + zz) / 3.0
+    a, b, c = xx - mean, yy - mean, zz - mean
+    scale = np.sqrt(
+        (a * a + b * b + c * c + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0
+    )
+    determinant = (
+        a * (b * c - yz * yz)
+        - xy * (xy * c - yz * xz)
+        + xz * (xy * yz - b * xz)
+    )
+    cosine = determinant / np.where(scale > 0.0, 2.0 * scale**3, 1.0)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0
+    l1 = mean + 2.0 * scale * np.cos(angle)
+    least = mean + 2.0 * scale * np.cos(angle + 2.0 * math.pi / 3.0)
+    # What rounding makes negative is 0.
+    l2, l3 = np.maximum(3.0 * mean - l1 - least, 0.0), np.maximum(least, 0.0)
+    entropy = sum(scipy.special.entr(one) for one in (l1, l2, l3))
+    return np.stack(
+        [l3, np.cbrt(l1 * l2 * l3), entropy, roundness, height, variance],
+        axis=1,
+    )
+
+
+@compiled
+def _moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Returns the second moments of each point's neighbours about their mean.
+
+    Args:
+        points: (N, 3) float64.
+        neighbours: (N, K) indices.
+
+    Returns:
+        (7, N) sums of products xx, yy, zz, xy, xz and yz, and the range of z.
+    """
+    num_points, num_neighbours = neighbours.shape
+    result = np.empty((7, num_points))
+    for point in range(num_points):
+        mean_x, mean_y, mean_z = 0.0, 0.0, 0.0
+        least, most = np.inf, -np.inf
+        for other in neighbours[point]:
+            mean_x += points[other, 0]
+            mean_y += points[other, 1]
+            mean_z += points[other, 2]
+            least = min(least, points[other, 2])
+            most = max(most, points[other, 2])
+        mean_x /= num_neighbours
+        mean_y /= num_neighbours
+        mean_z /= num_neighbours
+        xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for other in neighbours[point]:
+            dx = points[other, 0] - mean_x
+            dy = points[other, 1] - mean_y
+            dz = points[other, 2] - mean_z
+            xx += dx * dx
+            yy += dy * dy
+            zz += dz * dz
+            xy += dx * dy
+            xz += dx * dz
+            yz += dy * dz
+        found = xx, yy, zz, xy, xz, yz, most - least
+        for row in range(7):
+            result[row, point] = found[row]
+    return result
+
+
+def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Returns the integrals of an image along parallel rays.
+
+    With u the column and v the row of a pixel, counted from the centre of
+    the image, the ray s of angle t is u cos t - v sin t = s, where s counts
+    pixels from the centre, too. Image and value follow torch-radon (Ronchetti
+    2020): a ray samples the image once in each row (or each column, if it
+    is closer to those), interpolates between the two nearest pixels, and its
+    sum counts times the distance between samples; outside of the image
+    everything is zero.
+
+    A pixel at distance d from a ray contributes hat(d / w) / w with w =
+    max(|cos t|, |sin t|) and hat(x) = max(1 - |x|, 0).
+
+    Args:
+        image: (n, n, C) rows, columns, channels.
+        angles: (A,) [rad].
+
+    Returns:
+        (A, n, C) for each angle and s = -(n - 1) / 2, ..., (n - 1) / 2.
+    """
+    size, _, num_channels = image.shape
+    centre = 0.5 * (size - 1)
+    flat = image.reshape(size * size, num_channels)
+    pixels = np.flatnonzero(flat.any(axis=1))
+    row, column = np.divmod(pixels, size)
+    cosines, sines = np.cos(angles), np.sin(angles)
+    width = np.maximum(np.abs(cosines), np.abs(sines))
+    place = (
+        centre
+        + (column - centre)[:, None] * cosines
+        - (row - centre)[:, None] * sines
+    )
+    # width <= 1, so that at most two rays pass near enough.
+    left = np.floor(place)
+    rays = np.stack([left, left + 1.0], axis=1)
+    share = np.maximum(1.0 - np.abs(rays - place[:, None]) / width, 0.0) / width
+    share[(rays < 0.0) | (rays >= size)] = 0.0
+    cells = np.arange(len(angles)) * size + np.clip(rays, 0.0, size - 1.0)
+    # A column for each pixel, with two rays of each angle.
+    shares = scipy.sparse.csc_array(
+        (
+            share.ravel(),
+            cells.ravel().astype(np.int32),
+            np.arange(len(pixels) + 1, dtype=np.int32) * 2 * len(angles),
+        ),
+        shape=(len(angles) * size, len(pixels)),
+    )
+    return (shares @ flat[pixels]).reshape(len(angles), size, num_channels)

@@ -20,8 +20,7 @@ from evaluation.drives.sampling import within_range
 from evaluation.geometry.coinciding import CoincidingPoints
 from evaluation.maps.thinning import thin
 from evaluation.methods import MethodConfig
-from evaluation.methods.layered_overlap import LayeredOverlap
-from evaluation.methods.overlap_coarse import LayeredScan
+from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
 from evaluation.recognition.fault_kinds import NEARLY, PairEvidence
 from evaluation.recognition.overlap_truth import sampled
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -8,7 +8,7 @@ import pytest
 
 from evaluation.methods import make_method
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
-from evaluation.methods.overlap_layers import layer_cells
+from evaluation.methods.overlap_maps import layer_cells
 
 
 def method(**parameters) -> LayeredOverlap:

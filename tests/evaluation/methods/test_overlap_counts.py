@@ -4,111 +4,81 @@ from helpers.layered_scans import image, shifted, some_cells
 import numpy as np
 import pytest
 
-from evaluation.methods.overlap_bits import (
-    coarse_bits,
-    count_bits,
-    fine_bits,
-    shifted_columns,
-    turns,
-)
-from evaluation.methods.overlap_search import (
+from evaluation.methods.overlap_maps import (
     best_overlaps,
     climb,
-    in_lanes,
-    overlaps_nearby,
+    coarse_maps,
+    turns,
 )
 
-MAPS, HALVES = np.array([0, 0, 0, 1, 1]), np.array([0, 0, 1, 0, 1])
+MAPS = np.array([0, 0, 1, 2, 3])
+GROUPS = ([0, 1], [2], [3], [4])
 
 
-def test_coarse_maps():
+@pytest.mark.parametrize("halvings", [2, 3])
+def test_coarse_maps(halvings):
     cells, starts = some_cells(1)
     turned = turns(24)[[0, 5, 17]]
-    bits = coarse_bits(cells, starts, turned, 3, MAPS, HALVES)
-    assert bits.shape == (3, 2, 32)
+    bits, counts = coarse_maps(cells, starts, turned, halvings, MAPS)
+    rows = 256 >> halvings
+    assert bits.shape == (3, rows, 4)
     for heading, turn in enumerate(turned):
-        wanted = np.zeros((2, 32, 64), dtype=bool)
+        wanted = np.zeros((rows, 4, 64), dtype=bool)
         for layer in range(5):
-            picture = image(cells, starts, layer, turn, 3)
-            first = 32 * HALVES[layer]
-            wanted[MAPS[layer], :, first : first + 32] |= picture
+            picture = image(cells, starts, layer, turn, halvings)
+            wanted[:, MAPS[layer], :rows] |= picture
         columns = np.arange(64, dtype=np.uint64)
         found = (bits[heading][..., None] >> columns) & np.uint64(1)
         np.testing.assert_array_equal(found.astype(bool), wanted)
-        counts = count_bits(bits[heading : heading + 1])[0]
-        assert counts.tolist() == wanted.sum(axis=(1, 2)).tolist()
+        assert counts[heading].tolist() == wanted.sum(axis=(0, 2)).tolist()
 
 
-def test_first_search():
-    # More numbers than are handled side by side.
-    query, places = some_cells(2), [some_cells(k) for k in range(20, 30)]
-    turned = turns(3)
-    shifts = np.array([(r, c) for r in range(3) for c in range(3)])
-    bits = coarse_bits(*query, turned, 3, MAPS, HALVES)
-    maps = np.concatenate(
-        [coarse_bits(*p, turned[:1], 3, MAPS, HALVES) for p in places]
-    )
-    counts, found = best_overlaps(
-        shifted_columns(bits, 1), in_lanes(maps, 1), shifts
-    )
-    assert counts.shape == (16, 3)
-    assert not counts[10:].any()
-    for d, place in enumerate(places):
-        for h, turn in enumerate(turned):
-            totals = []
-            for right, up in (shifts - 1).tolist():
-                total = 0
-                for group in ([0, 1], [2], [3], [4]):
-                    a, b = (
-                        np.logical_or.reduce(
-                            [image(*scan, one, t, 3) for one in group]
-                        )
-                        for scan, t in ((query, turn), (place, turned[0]))
-                    )
-                    # The rows of the map were shifted in the opposite
-                    # direction.
-                    common = shifted(a, right, up) & b
-                    total += (1 if group[0] < 3 else 2) * common.sum()
-                totals.append(total)
-            assert counts[d, h] == max(totals)
-            assert found[d, h] == totals.index(max(totals))
-
-
-def test_second_search():
-    query, place = some_cells(5), some_cells(6)
+# Some shifts lead beyond the rows that are added to a place.
+@pytest.mark.parametrize("halvings", [2, 3])
+@pytest.mark.parametrize(
+    "start", [[1, 0, 0, 0], [0, 7, 2, -1], [2, 3, -3, 5], [1, 4, 4, 0]]
+)
+def test_best_overlaps(halvings, start):
+    query, places = some_cells(5), [some_cells(k) for k in range(20, 23)]
     turned, weights = turns(8), np.array([1, 1, 4, 2])
-    maps, halves = np.array([0, 0, 1, 2, 3]), np.zeros(5, np.int64)
-    bits = coarse_bits(*query, turned, 2, maps, halves)
-    padded = np.pad(
-        coarse_bits(*place, turned[:1], 2, maps, halves),
-        ((0, 0), (0, 0), (3, 3)),
+    moves = np.array(
+        [
+            (turn, right, up)
+            for turn in (-1, 0, 1)
+            for right in (-2, 0, 1)
+            for up in (-1, 0, 1)
+        ]
     )
-    counts, poses = overlaps_nearby(
+    bits, _ = coarse_maps(*query, turned, halvings, MAPS)
+    of_places = [
+        coarse_maps(*place, turned[:1], halvings, MAPS)[0] for place in places
+    ]
+    counts, poses = best_overlaps(
         bits,
-        padded,
-        np.array([[0, 7, 2, -1]]),
-        np.array([1, 1]),
+        np.pad(np.concatenate(of_places), ((0, 0), (3, 3), (0, 0))),
+        weights,
+        np.array([start]),
+        moves,
     )
     best = (-1, None)
-    for heading in (6, 7, 0):
-        for right in (1, 2, 3):
-            for up in (-2, -1, 0):
-                total = 0
-                for group, weight in zip(
-                    ([0, 1], [2], [3], [4]), weights, strict=True
-                ):
-                    a, b = (
-                        np.logical_or.reduce(
-                            [image(*scan, one, t, 2) for one in group]
-                        )
-                        for scan, t in (
-                            (query, turned[heading]),
-                            (place, turned[0]),
-                        )
-                    )
-                    total += weight * (shifted(a, right, up) & b).sum()
-                if total > best[0]:
-                    best = (total, [heading, right, up])
+    for move in moves:
+        heading, right, up = (start[1:] + move).tolist()
+        if abs(right) > 3:
+            continue
+        total = 0
+        for group, weight in zip(GROUPS, weights, strict=True):
+            a, b = (
+                np.logical_or.reduce(
+                    [image(*scan, one, turn, halvings) for one in group]
+                )
+                for scan, turn in (
+                    (query, turned[heading % 8]),
+                    (places[start[0]], turned[0]),
+                )
+            )
+            total += weight * (shifted(a, right, up) & b).sum()
+        if total > best[0]:
+            best = (total, [heading % 8, right, up])
     assert (counts[0], poses[0].tolist()) == best
 
 
@@ -178,7 +148,7 @@ def test_last_search_climbs_by_cells_that_meet_neighbours(start, steps):
     turned, weights = turns(288), np.array([3, 3, 2, 60, 5])
     found = climb(
         *query,
-        fine_bits(*place),
+        *place,
         weights,
         turned,
         np.array(start),
@@ -196,7 +166,7 @@ def test_last_search_of_full_layers():
     )
     found = climb(
         *full,
-        fine_bits(*full),
+        *full,
         np.ones(5, np.int64),
         turns(4),
         np.zeros(3, np.int64),
@@ -207,32 +177,20 @@ def test_last_search_of_full_layers():
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_full_maps(share):
-    # The sums have every carry, up to the greatest possible count.
     rng = np.random.default_rng(5)
 
-    def maps(*shape):
-        bits = rng.random((*shape, 64)) < share
+    def maps(number):
+        bits = rng.random((number, 64, 4, 64)) < share
         return np.packbits(bits, -1).view(np.uint64)[..., 0]
 
-    def common(a, b):
-        return [int(n).bit_count() for n in (a & b).ravel()]
-
-    query, places = maps(1, 1, 2, 32), maps(9, 2, 32)
-    counts, _ = best_overlaps(
-        query, in_lanes(places, 0), np.zeros((1, 2), np.int64)
-    )
-    for count, place in zip(counts[:9, 0], places, strict=True):
-        first, second = (common(query[0, 0, s], place[s]) for s in (0, 1))
-        assert count == sum(first) + 2 * sum(second)
-
-    query, places = maps(1, 4, 64), maps(3, 4, 64)
+    query, places = maps(1), maps(3)
     starts = np.array([[d, 0, 0, 0] for d in range(3)])
-    counts, _ = overlaps_nearby(query, places, starts, np.array([0, 0]))
+    weights = np.array([1, 1, 4, 2])
+    counts, _ = best_overlaps(
+        query, places, weights, starts, np.zeros((1, 3), np.int64)
+    )
     for count, place in zip(counts, places, strict=True):
-        totals = [sum(common(query[0, s], place[s])) for s in range(4)]
-        assert count == np.dot(totals, [1, 1, 4, 2])
-
-
-def test_words_of_all_bits():
-    ones = np.full((1, 1, 3), 2**64 - 1, np.uint64)
-    assert count_bits(ones).tolist() == [[192]]
+        common = [
+            [int(word).bit_count() for word in row] for row in query[0] & place
+        ]
+        assert count == np.sum(common, axis=0) @ weights

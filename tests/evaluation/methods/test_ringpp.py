@@ -5,8 +5,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
-from evaluation.methods.radon import radon
-from evaluation.methods.ringpp import RingPlusPlus, _normalise
+from evaluation.methods.ringpp import RingPlusPlus, _normalise, radon
 
 CELL = 140.0 / 120.0
 # Least possible distance of a pair, see `test_no_pair_is_nearer`.
@@ -136,9 +135,9 @@ class TestBev:
 
 
 class TestScore:
-    def test_against_the_definition(self):
+    @pytest.mark.parametrize("n", [12, 13])
+    def test_against_the_definition(self, n):
         """The definition is computed in full: each pair, each shift."""
-        n = 12
         method = ring(cells=n)
         scans = [make_scene(seed) for seed in (3, 4)]
         normalised = []

@@ -1,0 +1,437 @@
+"""Maps of layered overlap: drawn from scans, and compared.
+
+All is integer arithmetic once cells are known: turns are by sines and cosines
+in units of 2^-14, positions in half cells. Counts are therefore the same on
+every processor.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from cns_drake.base.compiled import compiled
+
+# Rows and columns of the grid: a cell's number, row times 256 plus column, is
+# a uint16.
+GRID = 256
+NUM_LAYERS = 5
+_POLES = 3
+
+# Heights above the ground: limit of the ground, and ends of the low and of the
+# middle layer [m].
+_HEIGHTS = np.array([0.35, 1.5, 4.0])
+# Least height of a pole [m].
+_POLE_TOP = 2.0
+# Greatest number of cells of a pole, of 3 x 3; around them, 7 x 7 are free.
+_POLE_CELLS = 4
+# Range of the ground's rise within a cell with a kerb [m].
+_KERB_STEP = (0.08, 0.30)
+
+# The ground is followed outwards in so many sectors, in steps of [m].
+_SECTORS = 90
+_RING = 2.0
+# Greatest rise or fall from one step to the next [m, 1].
+_GROUND_STEP = 0.15
+_GROUND_SLOPE = 0.2
+
+# Bits of a word.
+_WORD = 64
+# The unit of sines and cosines is 2 to minus this power.
+_UNIT_BITS = 14
+# Every second bit, pair of bits and nibble, and the first bit of every byte.
+_EVERY_2ND = np.uint64(0x5555555555555555)
+_PAIRS = np.uint64(0x3333333333333333)
+_NIBBLES = np.uint64(0x0F0F0F0F0F0F0F0F)
+_BYTES = np.uint64(0x0101010101010101)
+# Three counts share a word. A layer has at most GRID * GRID cells.
+_COUNT_BITS = 21
+_COUNT_MASK = np.uint64((1 << _COUNT_BITS) - 1)
+
+
+def layer_cells(
+    points: np.ndarray, sensor_height: float, cell: float, least_points: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the filled cells of each layer: low, middle, high, poles, kerbs.
+
+    The cell of a point follows from sums, products, quotients and square roots
+    only. IEEE 754 defines these to the last bit, so that cells are the same on
+    every processor.
+
+    Args:
+        points: (N, 3) in the frame of the LiDAR [m].
+        sensor_height: above the ground [m].
+        cell: length of a cell [m].
+        least_points: that fill a cell.
+
+    Returns:
+        (M,) uint16 numbers of cells, layer by layer and increasing in each,
+        and (6,) int64 where each layer begins and the last one ends. Rows
+        are along x, columns along y, with the sensor in the middle.
+    """
+    half = 0.5 * GRID * cell
+    x, y, z = points.T
+    is_inside = (-half <= x) & (x < half) & (-half <= y) & (y < half)
+    x, y, z = points.compress(is_inside, axis=0).T
+    # Rounding may reach the limit.
+    row, column = (
+        np.minimum(((along + half) / cell).astype(np.int64), GRID - 1)
+        for along in (x, y)
+    )
+    number = row * GRID + column
+    height = z - _ground_below(x, y, z, half, -sensor_height)
+    layer = np.searchsorted(_HEIGHTS, height)
+    counts = np.bincount(
+        layer * GRID * GRID + number, minlength=4 * GRID * GRID
+    )
+    bottom, top = _extremes(height, number, GRID * GRID)
+    step = top - bottom
+    is_kerb = (
+        (top <= _HEIGHTS[0]) & (_KERB_STEP[0] <= step) & (step <= _KERB_STEP[1])
+    )
+    layers = [
+        *map(np.flatnonzero, counts.reshape(4, -1)[1:] >= least_points),
+        _poles(top.reshape(GRID, GRID) >= _POLE_TOP),
+        np.flatnonzero(is_kerb),
+    ]
+    starts = np.cumsum([0, *map(len, layers)])
+    return np.concatenate(layers).astype(np.uint16), starts
+
+
+def _ground_below(
+    x: np.ndarray, y: np.ndarray, z: np.ndarray, half: float, start: float
+) -> np.ndarray:
+    """Returns the height of the ground below each point (N,) [m].
+
+    In each sector it is followed from ring to ring by the lowest points.
+
+    Args:
+        x: (N,) coordinates [m].
+        y: (N,) likewise.
+        z: (N,) likewise.
+        half: greatest of x and y [m].
+        start: height of the ground below the sensor [m].
+    """
+    # Sectors are equal along a square: its angles need no arc tangent, whose
+    # last bits differ between processors.
+    length = np.abs(x) + np.abs(y)
+    turn = y / np.where(length > 0.0, length, 1.0)
+    turn = np.where(x < 0.0, 2.0 - turn, np.where(turn < 0.0, turn + 4.0, turn))
+    sector = np.minimum((turn * (0.25 * _SECTORS)).astype(int), _SECTORS - 1)
+    ring = (np.sqrt(x * x + y * y) / _RING).astype(int)
+    num_rings = math.ceil(half * math.sqrt(2.0) / _RING) + 1
+    lowest, _ = _extremes(z, ring * _SECTORS + sector, num_rings * _SECTORS)
+    lowest = lowest.reshape(num_rings, _SECTORS)
+    height, last = np.full(_SECTORS, start), np.full(_SECTORS, -1)
+    ground = np.empty_like(lowest)
+    for number, here in enumerate(lowest):
+        limit = _GROUND_STEP + _GROUND_SLOPE * _RING * (number - last)
+        is_ground = np.abs(here - height) <= limit
+        height = np.where(is_ground, here, height)
+        last[is_ground] = number
+        ground[number] = height
+    return ground[ring, sector]
+
+
+def _extremes(
+    values: np.ndarray, cells: np.ndarray, size: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the least and the greatest value in each of some cells.
+
+    Args:
+        values: (N,).
+        cells: (N,) int64, in which cell each is.
+        size: number of cells.
+
+    Returns:
+        (size,) each; infinite, and minus infinite, for a cell without values.
+    """
+    order = np.argsort(cells)
+    first = np.flatnonzero(np.diff(cells[order], prepend=-1))
+    filled = cells[order[first]]
+    least, greatest = np.full(size, np.inf), np.full(size, -np.inf)
+    least[filled] = np.minimum.reduceat(values[order], first)
+    greatest[filled] = np.maximum.reduceat(values[order], first)
+    return least, greatest
+
+
+def _poles(is_tall: np.ndarray) -> np.ndarray:
+    """Returns the numbers of tall cells that stand alone.
+
+    Args:
+        is_tall: (GRID, GRID) bool.
+    """
+    row, column = np.nonzero(is_tall)
+    windows = sliding_window_view(np.pad(is_tall, 3), (7, 7))
+    around = windows[row, column]
+    near = around[:, 2:5, 2:5].sum(axis=(1, 2))
+    is_alone = (near <= _POLE_CELLS) & (near == around.sum(axis=(1, 2)))
+    return (row * GRID + column)[is_alone]
+
+
+def turns(number: int) -> np.ndarray:
+    """Returns (H, 2) int64 cosines and sines of H equal steps of a turn."""
+    unit = 1 << _UNIT_BITS
+    angles = [2.0 * math.pi * step / number for step in range(number)]
+    return np.array(
+        [(round(unit * math.cos(a)), round(unit * math.sin(a))) for a in angles]
+    )
+
+
+@compiled
+def coarse_maps(
+    cells: np.ndarray,
+    starts: np.ndarray,
+    turns: np.ndarray,
+    halvings: int,
+    maps: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns coarse maps of a scan, a word a row, at some headings.
+
+    Args:
+        cells: (M,) uint16, see `layer_cells`.
+        starts: (layers + 1,) where layers begin.
+        turns: (H, 2) int64 by which the cells are turned about the sensor.
+        halvings: of the number of rows and columns; at least 2.
+        maps: (layers,) int64, in which map each layer is drawn.
+
+    Returns:
+        (H, R, S) uint64, R rows of S maps, whose bits are columns; and (H, S)
+        int64, how many bits are set in each map.
+    """
+    rows, num_maps = GRID >> halvings, maps.max() + 1
+    bits = np.zeros((len(turns), rows, num_maps), np.uint64)
+    counts = np.zeros((len(turns), num_maps), np.int64)
+    for heading in range(len(turns)):
+        c, s = turns[heading]
+        for layer in range(NUM_LAYERS):
+            for i in range(starts[layer], starts[layer + 1]):
+                u = 2 * (np.int64(cells[i]) >> 8) + 1 - GRID
+                v = 2 * (np.int64(cells[i]) & 255) + 1 - GRID
+                x = c * u - s * v + (GRID << _UNIT_BITS)
+                y = s * u + c * v + (GRID << _UNIT_BITS)
+                row = x >> (_UNIT_BITS + 1 + halvings)
+                column = y >> (_UNIT_BITS + 1 + halvings)
+                if 0 <= row < rows and 0 <= column < rows:
+                    bit = np.uint64(1) << np.uint64(column)
+                    is_new = bits[heading, row, maps[layer]] & bit == 0
+                    bits[heading, row, maps[layer]] |= bit
+                    counts[heading, maps[layer]] += is_new
+    return bits, counts
+
+
+@compiled
+def best_overlaps(
+    queries: np.ndarray,
+    places: np.ndarray,
+    weights: np.ndarray,
+    starts: np.ndarray,
+    moves: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns how much a query and places overlap at most near some poses.
+
+    Args:
+        queries: (H, R, S) uint64: maps of the query, at headings of equal
+            steps of a full turn.
+        places: (D, R + 2 m, S) uint64: maps of the places, with m rows without
+            bits on either side.
+        weights: (S,) uint64 of a common bit of each map.
+        starts: (N, 4) int64: which place, heading, and shift of the query along
+            rows and along columns.
+        moves: (K, 3) int64: what is added to heading and shifts.
+
+    Returns:
+        (N,) int64 weighted counts of common bits, and (N, 3) where they are
+        found first: heading and shifts.
+    """
+    num_headings, num_rows, num_maps = queries.shape
+    margin = (places.shape[1] - num_rows) // 2
+    size = num_rows * num_maps
+    all_weights = np.empty(size, np.uint64)
+    for i in range(size):
+        all_weights[i] = np.uint64(weights[i % num_maps])
+    query_words = queries.reshape(num_headings, size)
+    place_words = places.reshape(len(places), -1)
+    counts = np.full(len(starts), -1, np.int64)
+    poses = np.zeros((len(starts), 3), np.int64)
+    for n in range(len(starts)):
+        for k in range(len(moves)):
+            heading = (starts[n, 1] + moves[k, 0]) % num_headings
+            right = starts[n, 2] + moves[k, 1]
+            up = starts[n, 3] + moves[k, 2]
+            if abs(right) > margin:
+                continue
+            lower, raise_ = np.uint64(max(-up, 0)), np.uint64(max(up, 0))
+            first = (margin + right) * num_maps
+            query = query_words[heading]
+            place = place_words[starts[n, 0], first : first + size]
+            total = np.uint64(0)
+            for i in range(size):
+                bits = (query[i] << raise_ >> lower) & place[i]
+                # Bits are counted in pairs, nibbles, bytes, then all at once,
+                # for which compilers have an instruction.
+                bits -= (bits >> np.uint64(1)) & _EVERY_2ND
+                bits = (bits & _PAIRS) + ((bits >> np.uint64(2)) & _PAIRS)
+                bits = (bits + (bits >> np.uint64(4))) & _NIBBLES
+                total += all_weights[i] * (bits * _BYTES >> np.uint64(56))
+            if np.int64(total) > counts[n]:
+                counts[n] = total
+                poses[n, 0], poses[n, 1], poses[n, 2] = heading, right, up
+    return counts, poses
+
+
+@compiled
+def climb(
+    cells: np.ndarray,
+    starts: np.ndarray,
+    place_cells: np.ndarray,
+    place_starts: np.ndarray,
+    weights: np.ndarray,
+    turns: np.ndarray,
+    start: np.ndarray,
+    steps: np.ndarray,
+) -> np.ndarray:
+    """Climbs to the pose at which a query overlaps a place most.
+
+    A cell of the query overlaps the place where it meets one of the same layer
+    or a neighbour of one. The best of a pose and its 26 neighbours becomes the
+    next one, until none is better; then steps get smaller.
+
+    Args:
+        cells: (M,) uint16 of the query, see `layer_cells`.
+        starts: (layers + 1,) where its layers begin.
+        place_cells: (N,) uint16 of the place.
+        place_starts: (layers + 1,) likewise.
+        weights: (layers,) int64.
+        turns: (H, 2) int64 cosines and sines of equal steps of a full turn.
+        start: (3,) int64: which turn, shift along rows and along columns in
+            half cells.
+        steps: (K, 2) int64: of the turn and of the shifts, which are even,
+            coarse to fine.
+
+    Returns:
+        (3 + layers,) int64: the pose, and the query's cells that meet some
+        of the place, in each layer.
+    """
+    # The place's layers with the neighbours of all filled cells; a row and a
+    # word without bits on either side, and one word more.
+    num_words = GRID // _WORD + 3
+    wide = np.zeros((NUM_LAYERS, (GRID + 2) * num_words), np.uint64)
+    place = np.zeros_like(wide)
+    for layer in range(NUM_LAYERS):
+        for i in range(place_starts[layer], place_starts[layer + 1]):
+            row, column = int(place_cells[i]) >> 8, int(place_cells[i]) & 255
+            for near in range(max(column - 1, 0), min(column + 2, GRID)):
+                word = (row + 1) * num_words + near // _WORD + 1
+                wide[layer, word] |= np.uint64(1) << np.uint64(near % _WORD)
+        for i in range(num_words, (GRID + 1) * num_words):
+            place[layer, i] = (
+                wide[layer, i - num_words]
+                | wide[layer, i]
+                | wide[layer, i + num_words]
+            )
+    common = np.zeros((3, 3, NUM_LAYERS), np.int64)
+    pose = start.copy()
+    _count_common(cells, starts, place, turns, pose, 1, common)
+    best = np.concatenate((start, common[1, 1]))
+    most = (common[1, 1] * weights).sum()
+    move = (0, 0, 0)
+    for level in range(len(steps)):
+        step = steps[level, 1]
+        # How the centre moved last, in steps; at first, from out of reach.
+        last = (3, 3, 3)
+        while True:
+            centre = best.copy()
+            before = most
+            for dt in range(-1, 2):
+                # Those around the centre before are no better.
+                if abs(last[0] + dt) <= 1 and last[1] == 0 and last[2] == 0:
+                    continue
+                pose[0] = (centre[0] + dt * steps[level, 0]) % len(turns)
+                pose[1], pose[2] = centre[1], centre[2]
+                _count_common(
+                    cells, starts, place, turns, pose, step // 2, common
+                )
+                for dr in range(-1, 2):
+                    for dc in range(-1, 2):
+                        total = 0
+                        for layer in range(NUM_LAYERS):
+                            total += (
+                                common[dr + 1, dc + 1, layer] * weights[layer]
+                            )
+                        if total > most:
+                            most = total
+                            best[0] = pose[0]
+                            best[1] = centre[1] + dr * step
+                            best[2] = centre[2] + dc * step
+                            for layer in range(NUM_LAYERS):
+                                best[3 + layer] = common[dr + 1, dc + 1, layer]
+                            move = (dt, dr, dc)
+            if most == before:
+                break
+            last = move
+    return best
+
+
+@compiled
+def _count_common(
+    cells: np.ndarray,
+    starts: np.ndarray,
+    place: np.ndarray,
+    turns: np.ndarray,
+    pose: np.ndarray,
+    step: int,
+    common: np.ndarray,
+) -> None:
+    """Counts the cells of each layer that meet the place's, near a pose.
+
+    Shifts by whole cells move all cells alike: each is turned once, and of the
+    place's bits those of three columns are read together.
+
+    Args:
+        cells, starts, turns: see `climb`.
+        place: (layers, rows times words) uint64, bits of the place.
+        pose: (3,) int64.
+        step: k, of the shifts in whole cells, from 1 to 6.
+        common: (3, 3, layers) int64 to fill: for shifts by -k, 0 and k
+            along rows and along columns.
+    """
+    c, s = turns[pose[0], 0], turns[pose[0], 1]
+    right, up = (pose[1] + GRID) << _UNIT_BITS, (pose[2] + GRID) << _UNIT_BITS
+    one, k = np.uint64(1), np.uint64(step)
+    # A product takes the three bits of a row, k apart, to where their counts
+    # begin: none of its other terms is there.
+    first, second = np.uint64(_COUNT_BITS), np.uint64(2 * _COUNT_BITS)
+    wanted = one | one << k | one << (k + k)
+    spread = one | one << (first - k) | one << (second - k - k)
+    counted = one | one << first | one << second
+    num_words = place.shape[1] // (GRID + 2)
+    for layer in range(NUM_LAYERS):
+        words = place[layer]
+        before = here = after = np.uint64(0)
+        for i in range(starts[layer], starts[layer + 1]):
+            u = 2 * (np.int64(cells[i]) >> 8) + 1 - GRID
+            v = 2 * (np.int64(cells[i]) & 255) + 1 - GRID
+            row = (c * u - s * v + right) >> (_UNIT_BITS + 1)
+            column = (s * u + c * v + up) >> (_UNIT_BITS + 1)
+            # Beside the map are no bits.
+            bit = _WORD - step + min(max(column, -1 - step), GRID + step)
+            first, shift = num_words + (bit >> 6), np.uint64(bit & 63)
+            # No word is shifted by all its bits at once, which is undefined.
+            back = np.uint64(63) - shift
+            at = np.uint64(first + min(max(row - step, -1), GRID) * num_words)
+            bits = words[at] >> shift | words[at + one] << one << back
+            before += (bits & wanted) * spread & counted
+            at = np.uint64(first + min(max(row, -1), GRID) * num_words)
+            bits = words[at] >> shift | words[at + one] << one << back
+            here += (bits & wanted) * spread & counted
+            at = np.uint64(first + min(max(row + step, -1), GRID) * num_words)
+            bits = words[at] >> shift | words[at + one] << one << back
+            after += (bits & wanted) * spread & counted
+        for dr, counts in enumerate((before, here, after)):
+            for dc in range(3):
+                common[dr, dc, layer] = np.int64(
+                    counts >> np.uint64(dc * _COUNT_BITS) & _COUNT_MASK
+                )
