@@ -19,19 +19,15 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files, map_folder
 from cns_drake.scenarios.traffic_config import TrafficConfig
 from cns_drake.scene.world import World
-from cns_drake.traffic.fcd_trace import read_fcd
-from cns_drake.traffic.fcd_traffic import play_trace
+from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
-from cns_drake.traffic.lane_graph import LaneGraph
-from cns_drake.traffic.presence import EgoBox
-from cns_drake.traffic.road_lanes import make_lane_graph
-from cns_drake.traffic.starting_places import (
-    room_for_vehicles,
-    room_for_walkers,
-)
+from cns_drake.traffic.lane_graph import LaneGraph, Walkway
+from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
+from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_adding import traffic_structures
 from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
-from cns_drake.traffic.walkways import Walkway, make_walkways
+from cns_drake.traffic.vehicles import room_for_vehicles
+from cns_drake.traffic.walkers import room_for_walkers
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)

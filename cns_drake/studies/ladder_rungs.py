@@ -23,7 +23,7 @@ from cns_drake.studies.ladder_causes import (
     in_words,
     plain_drives,
 )
-from cns_drake.traffic.starting_places import room_for_vehicles
+from cns_drake.traffic.vehicles import room_for_vehicles
 
 # Greatest share of the roads' room for traffic: the car needs some, too.
 _MOST_ROOM = 0.5

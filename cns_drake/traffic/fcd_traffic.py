@@ -1,8 +1,12 @@
-"""Traffic that a trace of SUMO has recorded."""
+"""Traffic of a trace of SUMO: floating-car data at even times.
+
+Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 import zlib
 
@@ -10,20 +14,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.errors import InputError
-from cns_drake.traffic.fcd_trace import FcdTrace, TracedObject
-from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.base.xml_elements import Element, read_elements
+from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
-from cns_drake.traffic.presence import EgoBox
+from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
-from cns_drake.traffic.walker_steps import (
-    WALKER_LENGTH,
-    WALKER_WIDTH,
-    gait_rate,
-)
-from cns_drake.traffic.walkways import Walkway
+from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, gait_rate
 
+_TAGS = ("fcd-export", "timestep", "vehicle", "person")
+# Greatest deviation from even times, by rounding in the file [s].
+_TIME_TOLERANCE = 2e-3
 # Half of the vehicles of a map's own trace are nearer to its lanes [m].
 _OFF_ROAD = 5.0
 # Part of the name of a type -> kind; the first that fits counts.
@@ -40,6 +42,141 @@ _KINDS_BY_WORD = (
     ("delivery", "van"),
 )
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
+
+
+@dataclass(frozen=True)
+class TracedObject:
+    """A vehicle or a person of a trace.
+
+    Attributes:
+        name: its id.
+        type_name: of its type, "" if it has none.
+        steps: (M,) numbers of the times at which it is there, ascending.
+        xy: (M, 2) of a vehicle's front, or of a person's middle [m].
+        yaw: (M,) heading, from x towards y [rad].
+        slope: (M,) of the road, upwards positive [rad].
+    """
+
+    name: str
+    type_name: str
+    steps: np.ndarray
+    xy: np.ndarray
+    yaw: np.ndarray
+    slope: np.ndarray
+
+
+@dataclass(frozen=True)
+class FcdTrace:
+    """A trace of K times.
+
+    Attributes:
+        begin: the first time [s].
+        dt: between two times [s].
+        num_steps: K.
+        vehicles, persons: in the order in which they come.
+    """
+
+    begin: float
+    dt: float
+    num_steps: int
+    vehicles: tuple[TracedObject, ...]
+    persons: tuple[TracedObject, ...]
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last time [s]."""
+        return self.dt * (self.num_steps - 1)
+
+
+def read_fcd(path: Path) -> FcdTrace:
+    """Reads a trace.
+
+    Raises:
+        InputError: the file cannot be read or is not a trace, its times are not
+            even, or it is empty.
+    """
+    root = read_elements(path, "fcd-export", _TAGS)
+    steps = list(root.all("timestep"))
+    try:
+        times = np.array([step.number("time") for step in steps])
+        begin, dt = _even(path, times)
+        vehicles = _objects(steps, "vehicle")
+        persons = _objects(steps, "person")
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None
+    if not vehicles and not persons:
+        raise InputError(
+            f"{path}: the trace has no vehicle and no person in any timestep"
+        )
+    return FcdTrace(begin, dt, len(times), vehicles, persons)
+
+
+def _even(path: Path, times: np.ndarray) -> tuple[float, float]:
+    """Returns the first time and the distance of the times.
+
+    Raises:
+        InputError: they are not even.
+    """
+    if len(times) < 2:
+        raise InputError(
+            f"{path}: {len(times)} timesteps are too few; at least two are "
+            "needed"
+        )
+    dt = (times[-1] - times[0]) / (len(times) - 1)
+    expected = times[0] + dt * np.arange(len(times))
+    wrong = np.abs(times - expected) > _TIME_TOLERANCE
+    if dt <= _TIME_TOLERANCE or wrong.any():
+        where = times[int(wrong.argmax())]
+        raise InputError(
+            f"{path}: timestep {where:g}: times are not even; record every "
+            "step of SUMO, without --fcd-output.skip or device.fcd.period"
+        )
+    return float(times[0]), float(dt)
+
+
+def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
+    """Returns the vehicles or persons.
+
+    Raises:
+        ValueError: one lacks a value, or is there twice at a time.
+    """
+    found: dict[str, list[tuple[float, ...]]] = {}
+    types: dict[str, str] = {}
+    for number, step in enumerate(steps):
+        for one in step.all(tag):
+            name = one.text("id")
+            rows = found.setdefault(name, [])
+            if rows and rows[-1][0] == number:
+                raise ValueError(
+                    f"line {one.line}: {tag} {name[:40]!r} is there twice"
+                )
+            types.setdefault(name, one.text("type", ""))
+            rows.append(
+                (
+                    number,
+                    one.number("x"),
+                    one.number("y"),
+                    one.number("angle"),
+                    one.number("slope", 0.0),
+                )
+            )
+    return tuple(
+        _object(name, types[name], np.array(rows))
+        for name, rows in found.items()
+    )
+
+
+def _object(name: str, type_name: str, rows: np.ndarray) -> TracedObject:
+    # Angles are degrees from north, clockwise; y is north.
+    yaw = np.pi / 2 - np.radians(rows[:, 3])
+    return TracedObject(
+        name,
+        type_name,
+        rows[:, 0].astype(int),
+        rows[:, 1:3],
+        np.unwrap(yaw),
+        np.radians(rows[:, 4]),
+    )
 
 
 def play_trace(
@@ -176,7 +313,7 @@ def _vehicle_rows(
 def _person_rows(one: TracedObject, heights: _Heights, dt: float) -> np.ndarray:
     """Returns the (M, 5) coordinates of a walker; see `TrafficPlan`."""
     steps = np.linalg.norm(np.diff(one.xy, axis=0), axis=1)
-    turned = dt * np.array([gait_rate(step / dt) for step in steps])
+    turned = dt * gait_rate(steps / dt)
     start = zlib.crc32(one.name.encode()) % 1000 * 2e-3 * np.pi
     phase = start + np.concatenate([[0.0], np.cumsum(turned)])
     return np.column_stack([one.xy, heights.at(one.xy), one.yaw, phase])
@@ -210,15 +347,12 @@ def _meet_ego(
     # Steps are short enough to notice all that cross the car's way.
     times = np.arange(0.0, tracks.duration, min(tracks.dt, 0.1))
     poses = np.full((len(times), 1 + num, 3), np.nan)
-    xy, yaw = ego(times)
-    middle = (box.rear + box.front) / 2
-    ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
-    poses[:, 0] = np.column_stack([xy + middle * ahead, yaw])
+    poses[:, 0] = box.middles(*ego(times))
     for k, time in enumerate(times):
         there = np.flatnonzero(tracks.is_present(time))
         values, _ = tracks.at(time)
         poses[k, 1 + there] = values[there][:, [0, 1, 3]]
-    halves = np.array([((box.front - box.rear) / 2, box.half_width), *half])
+    halves = np.array([box.half_size, *half])
     found = np.zeros((1 + num, 1 + num), bool)
     find_overlaps(poses, halves, found)
     return found[0, 1:]

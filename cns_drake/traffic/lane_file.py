@@ -17,10 +17,10 @@ from cns_drake.traffic.lane_graph import (
     Crossing,
     LaneGraph,
     Piece,
+    Walkway,
     make_crossing,
     resampled,
 )
-from cns_drake.traffic.walkways import Walkway
 
 # Between the points of a lane in a file [m].
 _FILE_SPACING = 1.0

@@ -1,9 +1,9 @@
-"""Lanes of vehicles, the ways between them, and crossings."""
+"""Lanes of vehicles, the ways between them, crossings and walkways."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely.geometry import LineString
@@ -67,6 +67,24 @@ def make_crossing(line: np.ndarray, width: float) -> Crossing:
 
 
 @dataclass(frozen=True)
+class Walkway:
+    """A strip between two places where others begin.
+
+    Attributes:
+        points: (N, 3) its middle, evenly spaced [m].
+        half_width: greatest distance of a walker from the middle [m].
+        start, end: numbers of the places at its ends.
+        crossing: number of the crossing that it leads over, -1 for none.
+    """
+
+    points: np.ndarray
+    half_width: float
+    start: int
+    end: int
+    crossing: int = -1
+
+
+@dataclass(frozen=True)
 class LaneGraph:
     """Pieces by number, and the crossings over them.
 
@@ -78,17 +96,12 @@ class LaneGraph:
 
     pieces: tuple[Piece, ...]
     crossings: tuple[Crossing, ...] = ()
-    phases: tuple[int, ...] = field(default=())
+    phases: tuple[int, ...] = ()
 
     @property
     def lanes(self) -> list[int]:
         """Numbers of the pieces that are lanes."""
         return [k for k, p in enumerate(self.pieces) if not p.is_way]
-
-    @property
-    def lane_length(self) -> float:
-        """Length of all lanes together [m]."""
-        return sum(self.pieces[k].length for k in self.lanes)
 
 
 def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
@@ -130,15 +143,11 @@ def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
         alive = rest
     number = {old: new for new, old in enumerate(sorted(alive))}
     return [
-        Piece(
-            pieces[k].points,
-            pieces[k].limit,
-            pieces[k].is_way,
-            tuple(number[a] for a in pieces[k].after if a in alive),
-            number.get(pieces[k].left, -1),
-            number.get(pieces[k].right, -1),
-            pieces[k].junction,
-            pieces[k].phase,
+        replace(
+            pieces[k],
+            after=tuple(number[a] for a in pieces[k].after if a in alive),
+            left=number.get(pieces[k].left, -1),
+            right=number.get(pieces[k].right, -1),
         )
         for k in sorted(alive)
     ]

@@ -8,51 +8,34 @@ from cns_drake.base.compiled import compiled
 
 
 @compiled
-def way_out(
+def boxes_overlap(
     a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
-) -> tuple[float, float]:
-    """Returns the shortest move of b out of a; (0, 0) if it is outside.
+) -> bool:
+    """Returns whether two rectangles overlap: along all their axes.
 
     Args:
         a, b: (3,) x, y of the middle [m] and heading [rad].
         half_a, half_b: (2,) half length and half width [m].
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
-    turn = b[2] - a[2]
-    c, s = abs(np.cos(turn)), abs(np.sin(turn))
-    least, x, y = np.inf, 0.0, 0.0
-    for k in range(4):
-        heading = a[2] if k < 2 else b[2]
-        first, second = (half_a, half_b) if k < 2 else (half_b, half_a)
-        if k % 2 == 0:
-            axis_x, axis_y = np.cos(heading), np.sin(heading)
-            reach = first[0] + second[0] * c + second[1] * s
-        else:
-            axis_x, axis_y = -np.sin(heading), np.cos(heading)
-            reach = first[1] + second[0] * s + second[1] * c
-        along = dx * axis_x + dy * axis_y
-        inside = reach - abs(along)
-        if inside <= 0.0:
-            return 0.0, 0.0
-        if inside < least:
-            least = inside
-            sign = 1.0 if along >= 0.0 else -1.0
-            x, y = sign * inside * axis_x, sign * inside * axis_y
-    return x, y
-
-
-@compiled
-def boxes_overlap(
-    a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
-) -> bool:
-    """Returns whether two rectangles overlap; see `way_out`."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2
     # The half diagonals together are at most sqrt(2) times as long.
     if dx**2 + dy**2 > 2.0 * square:
         return False
-    x, y = way_out(a, b, half_a, half_b)
-    return x != 0.0 or y != 0.0
+    turn = b[2] - a[2]
+    c, s = abs(np.cos(turn)), abs(np.sin(turn))
+    for heading, first, second in (
+        (a[2], half_a, half_b),
+        (b[2], half_b, half_a),
+    ):
+        x, y = np.cos(heading), np.sin(heading)
+        reach = first[0] + second[0] * c + second[1] * s
+        if reach - abs(dx * x + dy * y) <= 0.0:
+            return False
+        reach = first[1] + second[0] * s + second[1] * c
+        if reach - abs(dx * -y + dy * x) <= 0.0:
+            return False
+    return True
 
 
 @compiled

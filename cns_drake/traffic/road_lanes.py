@@ -1,18 +1,22 @@
-"""Makes a lane graph for traffic from a road network."""
+"""Makes lanes and walkways for traffic from a road network."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+import itertools
 
 import numpy as np
+import shapely
 
-from cns_drake.roads.network import Connection, RoadNetwork
+from cns_drake.roads.centreline import blend
+from cns_drake.roads.network import Connection, Junction, RoadNetwork
 from cns_drake.roads.road import ENDS, End, LaneRef, Road
 from cns_drake.traffic.lane_graph import (
     Crossing,
     LaneGraph,
     Piece,
+    Walkway,
     make_crossing,
     resampled,
     without_dead_ends,
@@ -22,8 +26,8 @@ from cns_drake.traffic.lane_graph import (
 # distance of a crossing's middle from the end, and its width [m].
 _STOP_LINE = 4.5
 _STOP_LINE_ALONE = 1.0
-CROSSING_PLACE = 1.7
-CROSSING_WIDTH = 2.4
+_CROSSING_PLACE = 1.7
+_CROSSING_WIDTH = 2.4
 # Between its stop lines a lane must have room for any vehicle; a shorter one
 # is part of the ways through the junctions at its ends [m].
 _SHORTEST_LANE = 14.0
@@ -31,6 +35,15 @@ _SHORTEST_LANE = 14.0
 _MOST_JUNCTIONS = 4
 # Wider roads have signals at their junctions, as in the city generator.
 _LANES_WITHOUT_SIGNAL = 2
+# Distance of walkers from kerbs and walls, and from the edges of a crossing
+# [m].
+_MARGIN = 0.45
+_CROSSING_HALF_WIDTH = 0.8
+_LEAST_HALF_WIDTH = 0.3
+# Distance of the walked strip from the kerb on any sidewalk; furniture is
+# beside the kerb or the houses [m].
+_WIDEST = 3.0
+_SHORTEST = 1.0
 
 
 def make_lane_graph(network: RoadNetwork) -> LaneGraph:
@@ -216,15 +229,153 @@ def _crossings(
     for road in network.roads.values():
         for end in ENDS:
             if trims[road.name, end] == _STOP_LINE:
-                yield make_crossing(crossing_line(road, end), CROSSING_WIDTH)
+                yield make_crossing(_crossing_line(road, end), _CROSSING_WIDTH)
 
 
-def crossing_line(road: Road, end: End) -> np.ndarray:
+def _crossing_line(road: Road, end: End) -> np.ndarray:
     """Returns where walkers cross at a road's end, (2, 3), left first [m]."""
     station = (
-        road.first_station + CROSSING_PLACE
+        road.first_station + _CROSSING_PLACE
         if end == "start"
-        else road.last_station - CROSSING_PLACE
+        else road.last_station - _CROSSING_PLACE
     )
     offsets = np.array([road.half_width, -road.half_width])
     return road.evaluate([station, station], offsets)[:, :3]
+
+
+def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
+    """Returns the walkways along the roads of a network.
+
+    Args:
+        network: the roads.
+        graph: of the same network; gives the crossings.
+    """
+    nodes: dict[tuple[str, End, int], int] = {}
+    for road in network.roads.values():
+        if _is_walked(road):
+            for end, side in itertools.product(ENDS, (1, -1)):
+                nodes[road.name, end, side] = len(nodes)
+    places = {
+        key: _place(network.roads[key[0]], key[1], key[2]) for key in nodes
+    }
+    found: list[Walkway] = []
+    for road in network.roads.values():
+        if not _is_walked(road):
+            continue
+        for side in (1, -1):
+            first = road.first_station + _CROSSING_PLACE
+            last = road.last_station - _CROSSING_PLACE
+            stations = np.linspace(first, last, max(2, int(last - first)))
+            line = road.evaluate(stations, side * _offset(road))[:, :3]
+            line[:, 2] += road.kerb_height
+            found.append(
+                Walkway(
+                    resampled(line),
+                    _half_width(_walked_width(road)),
+                    nodes[road.name, "start", side],
+                    nodes[road.name, "end", side],
+                )
+            )
+    for junction in network.junctions.values():
+        found += _corners(network, junction, nodes, places)
+    for k, crossing in enumerate(graph.crossings):
+        for road, end in itertools.product(network.roads.values(), ENDS):
+            if (road.name, end, 1) in nodes and np.allclose(
+                crossing.line, _crossing_line(road, end)
+            ):
+                left, right = (nodes[road.name, end, side] for side in (1, -1))
+                line = np.array(
+                    [
+                        places[road.name, end, 1][:3],
+                        *crossing.line,
+                        places[road.name, end, -1][:3],
+                    ]
+                )
+                found.append(
+                    Walkway(
+                        resampled(line), _CROSSING_HALF_WIDTH, left, right, k
+                    )
+                )
+    # At unusual junctions, not every corner has a sidewalk.
+    lanes = network.lane_area()
+    shapely.prepare(lanes)
+    return [
+        way
+        for way in found
+        if way.crossing >= 0
+        or not lanes.intersects(
+            shapely.LineString(way.points[:, :2]).buffer(way.half_width)
+        )
+    ]
+
+
+def _is_walked(road: Road) -> bool:
+    return (
+        _half_width(_walked_width(road)) >= _LEAST_HALF_WIDTH
+        and road.length > 2 * _CROSSING_PLACE + _SHORTEST
+    )
+
+
+def _half_width(width: float) -> float:
+    return min(width, _WIDEST) / 2 - _MARGIN
+
+
+def _walked_width(road: Road) -> float:
+    """Returns the width of a sidewalk beside its parking bays [m]."""
+    return road.sidewalk - road.parking
+
+
+def _offset(road: Road) -> float:
+    """Returns the distance of the sidewalk's strip from the centreline [m].
+
+    The strip is on the far side, away from objects along the kerb.
+    """
+    return (
+        road.half_width + road.sidewalk - min(_walked_width(road), _WIDEST) / 2
+    )
+
+
+def _place(road: Road, end: End, side: int) -> np.ndarray:
+    """Returns x, y, z and heading towards the junction of a sidewalk's end."""
+    station = (
+        road.first_station + _CROSSING_PLACE
+        if end == "start"
+        else road.last_station - _CROSSING_PLACE
+    )
+    place = road.evaluate([station], side * _offset(road))[0]
+    place[2] += road.kerb_height
+    if end == "start":
+        place[3] += np.pi
+    return place
+
+
+def _corners(
+    network: RoadNetwork,
+    junction: Junction,
+    nodes: dict[tuple[str, End, int], int],
+    places: dict[tuple[str, End, int], np.ndarray],
+) -> list[Walkway]:
+    """Returns the ways round the corners between neighbouring arms."""
+    found = []
+    arms = junction.arms
+    for k, arm in enumerate(arms):
+        after = arms[(k + 1) % len(arms)]
+        if arm is after:
+            continue
+        # Counter-clockwise: the left side of an arm, seen from the junction,
+        # then the right side of the next.
+        a = (arm.road, arm.end, 1 if arm.end == "start" else -1)
+        b = (after.road, after.end, -1 if after.end == "start" else 1)
+        if a not in nodes or b not in nodes:
+            continue
+        p, q = places[a], places[b]
+        line = blend(p[:2], p[3], q[:2], q[3] + np.pi, 0.5)
+        z = np.linspace(p[2], q[2], len(line))
+        width = min(_walked_width(network.roads[key[0]]) for key in (a, b))
+        points = np.column_stack([line, z])
+        if np.linalg.norm(np.diff(points, axis=0), axis=1).sum() < _SHORTEST:
+            continue
+        found.append(
+            Walkway(resampled(points), _half_width(width), nodes[a], nodes[b])
+        )
+    return found

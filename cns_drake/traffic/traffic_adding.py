@@ -11,6 +11,7 @@ from pydrake.geometry import (
     Capsule,
     Cylinder,
     FrameId,
+    GeometryFrame,
     GeometryInstance,
     IllustrationProperties,
     Mesh,
@@ -21,8 +22,6 @@ from pydrake.geometry import (
     SourceId,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.base.errors import InputError
@@ -40,8 +39,6 @@ from cns_drake.traffic.body_shapes import (
 )
 from cns_drake.traffic.traffic_motion import TrafficBody, TrafficMotion
 from cns_drake.traffic.traffic_plan import TrafficPlan
-
-_UNIT_MASS = SpatialInertia.SolidSphereWithMass(1.0, 1.0)
 
 
 def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
@@ -94,10 +91,7 @@ def make_traffic(
     if structures is None:
         structures = traffic_structures(plan)
     entries = [structures[entry.name] for entry in traffic_structures(plan)]
-    # Each limb is a free body, so that Drake computes the poses of frames.
-    plant = MultibodyPlant(time_step=0.0)
-    plant.set_name(name)
-    source = plant.RegisterAsSourceForSceneGraph(scene_graph)
+    source = scene_graph.RegisterSource(name)
     bodies = []
     for k, entry in enumerate(entries):
         rng = np.random.default_rng([seed, k])
@@ -105,14 +99,13 @@ def make_traffic(
             limbs = vehicle_limbs(plan.kinds[k], rng)
         else:
             limbs = walker_limbs(rng)
-        frames = _register(scene_graph, plant, source, entry.name, limbs)
+        frames = _register(scene_graph, source, entry.name, limbs)
         bodies.append(
             TrafficBody(
                 entry.instance, entry.name, entry.semantic_class, limbs, frames
             )
         )
-    plant.Finalize()
-    return TrafficMotion(plan, bodies, plant, turn)
+    return TrafficMotion(plan, bodies, source, turn)
 
 
 def add_traffic(
@@ -187,16 +180,15 @@ def connect_traffic(
 
 def _register(
     scene_graph: SceneGraph,
-    plant: MultibodyPlant,
     source: SourceId,
     name: str,
     limbs: Sequence[Limb],
 ) -> tuple[FrameId, ...]:
     frames = []
     for limb in limbs:
-        # The mass has no effect.
-        body = plant.AddRigidBody(f"{name}_{limb.name}", _UNIT_MASS)
-        frame = plant.GetBodyFrameIdOrThrow(body.index())
+        frame = scene_graph.RegisterFrame(
+            source, GeometryFrame(f"{name}_{limb.name}")
+        )
         frames.append(frame)
         for one in limb.shapes:
             geometry = scene_graph.RegisterGeometry(

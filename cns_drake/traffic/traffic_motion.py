@@ -7,21 +7,119 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import FrameId, FramePoseVector
+from pydrake.geometry import FrameId, FramePoseVector, SourceId
+from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from scipy.spatial.transform import Rotation
 
-from cns_drake.motion.tick_blocks import TickBlocks
 from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.body_states import BodyStates, LimbTable, bodies_at
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
 # Faster bodies are labelled as moving, slower ones as standing [m/s].
 MOVING_SPEED = 0.5
-# Times at which bodies are computed together.
-_BLOCK = 16
+# Speed of the full swing of limbs [m/s].
+_FULL_SWING = 1.2
+# Place of bodies that are absent now [m].
+_AWAY = np.array([0.0, 0.0, -10_000.0])
+
+
+class BodyStates(NamedTuple):
+    """N bodies at a time: vehicles, then walkers.
+
+    Attributes:
+        p_WB: (N, 3) middle of each box on the ground [m].
+        v_WB: (N, 3) velocity [m/s].
+        yaw, pitch: (N,) [rad].
+        yaw_rate: (N,) [rad/s].
+        present: (N,) whether it is there.
+        swing: (N,) from -1 to 1, position of a walker in its gait.
+    """
+
+    p_WB: np.ndarray
+    v_WB: np.ndarray
+    yaw: np.ndarray
+    pitch: np.ndarray
+    yaw_rate: np.ndarray
+    present: np.ndarray
+    swing: np.ndarray
+
+    @property
+    def up_W(self) -> np.ndarray:
+        """The (N, 3) upward axes."""
+        (cy, sy), (cp, sp) = (
+            (np.cos(a), np.sin(a)) for a in (self.yaw, self.pitch)
+        )
+        return np.stack([cy * sp, sy * sp, cp], axis=-1)
+
+    @property
+    def quat_xyzw(self) -> np.ndarray:
+        """The (N, 4) orientations as unit quaternions."""
+        (cy, sy), (cp, sp) = (
+            (np.cos(a / 2), np.sin(a / 2)) for a in (self.yaw, self.pitch)
+        )
+        return np.stack([-sy * sp, cy * sp, sy * cp, cy * cp], axis=-1)
+
+    @property
+    def is_moving(self) -> np.ndarray:
+        """Whether each of the (N,) bodies is labelled as moving."""
+        return np.linalg.norm(self.v_WB, axis=-1) > MOVING_SPEED
+
+
+def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
+    """Returns the bodies at a time [s]."""
+    vehicles, vehicle_rates = plan.vehicles.at(t)
+    walkers, walker_rates = plan.walkers.at(t)
+    both = np.concatenate([vehicles[:, :4], walkers[:, :4]])
+    rates = np.concatenate([vehicle_rates[:, :4], walker_rates[:, :4]])
+    speed = np.hypot(walker_rates[:, 0], walker_rates[:, 1])
+    swing = np.sin(walkers[:, 4]) * np.minimum(speed / _FULL_SWING, 1.0)
+    return BodyStates(
+        p_WB=both[:, :3],
+        v_WB=rates[:, :3],
+        yaw=both[:, 3],
+        pitch=np.append(vehicles[:, 4], np.zeros(len(walkers))),
+        yaw_rate=rates[:, 3],
+        present=np.append(
+            plan.vehicles.is_present(t), plan.walkers.is_present(t)
+        ),
+        swing=np.append(np.zeros(len(vehicles)), swing),
+    )
+
+
+class LimbTable:
+    """The M limbs of N bodies, one after the other.
+
+    Attributes:
+        body: (M,) number of each limb's body.
+    """
+
+    def __init__(self, bodies: Sequence[tuple[Limb, ...]]):
+        """Takes the limbs of each body."""
+        self.body = np.repeat(np.arange(len(bodies)), [len(b) for b in bodies])
+        limbs = [limb for limbs in bodies for limb in limbs]
+        self._joint = np.array([limb.joint for limb in limbs]).reshape(-1, 3)
+        self._swing = np.array([limb.swing for limb in limbs])
+
+    def poses(self, states: BodyStates) -> np.ndarray:
+        """Returns X_WL (M, 4, 4) of all limbs: they turn about y, then z."""
+        body, p = self.body, self._joint.T
+        # A forward swing turns about -y.
+        pitch = states.pitch[body] - self._swing * states.swing[body]
+        cy, sy = np.cos(states.yaw)[body], np.sin(states.yaw)[body]
+        X_WLs = np.zeros((len(body), 4, 4))
+        X_WLs[:, 3, 3] = 1.0
+        p_WB = np.where(states.present[:, None], states.p_WB, _AWAY)[body]
+        cp, sp = np.cos(states.pitch)[body], np.sin(states.pitch)[body]
+        X_WLs[:, 0, 3] = cy * cp * p[0] - sy * p[1] + cy * sp * p[2]
+        X_WLs[:, 1, 3] = sy * cp * p[0] + cy * p[1] + sy * sp * p[2]
+        X_WLs[:, 2, 3] = cp * p[2] - sp * p[0]
+        X_WLs[:, :3, 3] += p_WB
+        cp, sp = np.cos(pitch), np.sin(pitch)
+        X_WLs[:, 0, 0], X_WLs[:, 0, 1], X_WLs[:, 0, 2] = cy * cp, -sy, cy * sp
+        X_WLs[:, 1, 0], X_WLs[:, 1, 1], X_WLs[:, 1, 2] = sy * cp, cy, sy * sp
+        X_WLs[:, 2, 0], X_WLs[:, 2, 2] = -sp, cp
+        return X_WLs
 
 
 class TrafficObjects(NamedTuple):
@@ -29,8 +127,8 @@ class TrafficObjects(NamedTuple):
 
     Attributes:
         instance: (N,) uint16 ids in points and tables.
-        names: of their structures.
-        semantic_classes: keys of `CLASS_IDS`.
+        names: N names of their structures.
+        semantic_classes: N keys of `CLASS_IDS`.
         p_WO: (N, 3) middles of their boxes [m].
         quat_xyzw: (N, 4) orientations of their boxes.
         sizes: (N, 3) length, width, height of their boxes [m].
@@ -49,30 +147,16 @@ class TrafficObjects(NamedTuple):
     yaw_rate: np.ndarray
     is_moving: np.ndarray
 
-    def select(self, rows: np.ndarray) -> TrafficObjects:
-        """Returns those of some rows."""
-        return TrafficObjects(
-            self.instance[rows],
-            tuple(self.names[row] for row in rows),
-            tuple(self.semantic_classes[row] for row in rows),
-            self.p_WO[rows],
-            self.quat_xyzw[rows],
-            self.sizes[rows],
-            self.v_WO[rows],
-            self.yaw_rate[rows],
-            self.is_moving[rows],
-        )
-
 
 class TrafficBody(NamedTuple):
     """A vehicle or a walker.
 
     Attributes:
         instance: its id in points and tables.
-        name: of its structure.
+        name: that of its structure.
         semantic_class: a key of `CLASS_IDS`.
         limbs: its rigid parts.
-        frames: of the limbs.
+        frames: one for each limb.
     """
 
     instance: int
@@ -80,22 +164,6 @@ class TrafficBody(NamedTuple):
     semantic_class: str
     limbs: tuple[Limb, ...]
     frames: tuple[FrameId, ...]
-
-
-class _Moment(NamedTuple):
-    """The N bodies at a time; at T times, arrays have one more dimension.
-
-    Attributes:
-        states: of the bodies.
-        p_WO: (N, 3) middles of their boxes [m].
-        quat_xyzw: (N, 4) orientations of the boxes.
-        is_moving: (N,) whether each is labelled as moving.
-    """
-
-    states: BodyStates
-    p_WO: np.ndarray
-    quat_xyzw: np.ndarray
-    is_moving: np.ndarray
 
 
 class TrafficMotion(LeafSystem):
@@ -124,65 +192,51 @@ class TrafficMotion(LeafSystem):
         self,
         plan: TrafficPlan,
         bodies: Sequence[TrafficBody],
-        plant: MultibodyPlant,
+        source_id: SourceId,
         turn: float,
     ):
         """Prepares the motion.
 
         Args:
-            plan: of the traffic.
-            bodies: of the vehicles, then of the walkers of the plan.
-            plant: has a free body for each limb, in the same order, and is
-                the source of their geometry.
+            plan: the traffic.
+            bodies: the vehicles, then the walkers of the plan.
+            source_id: the source of their geometry.
             turn: duration of a LiDAR's turn [s].
         """
         super().__init__()
-        self.source_id = plant.get_source_id()
+        self.source_id = source_id
         self._plan = plan
         self._bodies = tuple(bodies)
         self._limbs = LimbTable([body.limbs for body in bodies])
-        self._frames = [frame for body in bodies for frame in body.frames]
-        # Drake's own kinematics fill a FramePoseVector ten times as fast as one
-        # call from Python for each frame.
-        self._plant = plant
-        self._plant_context = plant.CreateDefaultContext()
         self._turn = turn
         self._instances = np.array([b.instance for b in bodies], np.uint16)
-        self._names = tuple(b.name for b in bodies)
-        self._classes = tuple(b.semantic_class for b in bodies)
         self._sizes = np.array(
             [kind.size for kind in plan.kinds]
             + [WALKER_SIZE] * (len(bodies) - len(plan.kinds))
         ).reshape(-1, 3)
         now = {self.time_ticket()}
-        self._blocks = TickBlocks(self._moments, turn, _BLOCK)
-        self._moment = self.DeclareCacheEntry(
+        self._states = self.DeclareCacheEntry(
             description="where bodies are",
             value_producer=ValueProducer(
-                allocate=lambda: Value(object()), calc=self._calc_moment
+                allocate=lambda: Value(object()),
+                calc=lambda context, value: value.set_value(
+                    bodies_at(plan, context.get_time())
+                ),
             ),
             prerequisites_of_calc=now,
         )
-        self._poses = self.DeclareAbstractOutputPort(
-            "frame_poses",
-            lambda: Value(np.zeros((0, 4, 4))),
-            self._calc_frame_poses,
-            now,
-        )
         for name, model, calc in (
-            ("geometry_pose", FramePoseVector(), self._calc_pose),
-            ("moving_instances", np.zeros(0, np.uint16), self._calc_moving),
-            ("objects", (), self._calc_objects),
+            ("frame_poses", Value(np.zeros((0, 4, 4))), self._calc_frame_poses),
+            ("geometry_pose", Value(FramePoseVector()), self._calc_pose),
+            ("moving_instances", Value(np.zeros(0, int)), self._calc_moving),
+            ("objects", Value(()), self._calc_objects),
+            (
+                "body_spatial_velocities",
+                AbstractValue.Make([SpatialVelocity()]),
+                self._calc_velocities,
+            ),
         ):
-            self.DeclareAbstractOutputPort(
-                name, lambda model=model: Value(model), calc, now
-            )
-        self.DeclareAbstractOutputPort(
-            "body_spatial_velocities",
-            lambda: AbstractValue.Make([SpatialVelocity()]),
-            self._calc_velocities,
-            now,
-        )
+            self.DeclareAbstractOutputPort(name, model.Clone, calc, now)
 
     @property
     def bodies(self) -> tuple[TrafficBody, ...]:
@@ -192,39 +246,20 @@ class TrafficMotion(LeafSystem):
     @property
     def moving_frames(self) -> dict[FrameId, int]:
         """Limb's frame -> its row in the ports of all limbs."""
-        return {frame: k for k, frame in enumerate(self._frames)}
-
-    def _calc_moment(self, context: Context, value: AbstractValue) -> None:
-        rows = self._blocks.at(context.get_time())
-        num_states = len(BodyStates._fields)
-        states = BodyStates(*rows[:num_states])
-        value.set_value(_Moment(states, *rows[num_states:]))
-
-    def _moments(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Returns the states, and what is left of a `_Moment`, at (T,) times.
-
-        Poses of limbs are left out: those of many times do not fit a cache.
-        """
-        states = bodies_at(self._plan, times)
-        p_WO = states.p_WB + states.up_W * self._sizes[:, 2:] / 2
-        is_moving = states.speed > MOVING_SPEED
-        return (*states, p_WO, states.quat_xyzw, is_moving)
+        frames = (frame for body in self._bodies for frame in body.frames)
+        return {frame: k for k, frame in enumerate(frames)}
 
     def _calc_frame_poses(
         self, context: Context, output: AbstractValue
     ) -> None:
-        moment: _Moment = self._moment.Eval(context)
-        output.set_value(self._limbs.poses(moment.states))
+        output.set_value(self._limbs.poses(self._states.Eval(context)))
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        states = bodies_at(self._plan, context.get_time())
-        # Each free body has a quaternion (real part first) and a position.
-        q = np.empty((len(self._frames), 7))
-        q[:, :4] = self._limbs.quat_xyzw(states)[:, [3, 0, 1, 2]]
-        q[:, 4:] = self._limbs.poses(states)[:, :3, 3]
-        self._plant.SetPositions(self._plant_context, q.ravel())
-        port = self._plant.get_geometry_pose_output_port()
-        output.SetFrom(port.EvalAbstract(self._plant_context))
+        poses = FramePoseVector()
+        X_WLs = self._limbs.poses(self._states.Eval(context))
+        for frame, row in self.moving_frames.items():
+            poses.set_value(frame, RigidTransform(X_WLs[row]))
+        output.set_value(poses)
 
     def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
         t = context.get_time()
@@ -239,23 +274,24 @@ class TrafficMotion(LeafSystem):
         output.set_value(list(map(SpatialVelocity, w, v)))
 
     def _calc_moving(self, context: Context, output: AbstractValue) -> None:
-        is_moving = self._moment.Eval(context).is_moving
-        output.set_value(self._instances[is_moving])
+        states: BodyStates = self._states.Eval(context)
+        output.set_value(self._instances[states.is_moving])
 
     def _calc_objects(self, context: Context, output: AbstractValue) -> None:
-        moment: _Moment = self._moment.Eval(context)
-        states = moment.states
-        objects = TrafficObjects(
-            self._instances,
-            self._names,
-            self._classes,
-            moment.p_WO,
-            moment.quat_xyzw,
-            self._sizes,
-            states.v_WB,
-            states.yaw_rate,
-            moment.is_moving,
+        states: BodyStates = self._states.Eval(context)
+        here = np.flatnonzero(states.present)
+        bodies = [self._bodies[k] for k in here]
+        p_WO = states.p_WB + states.up_W * self._sizes[:, 2:] / 2
+        output.set_value(
+            TrafficObjects(
+                self._instances[here],
+                tuple(body.name for body in bodies),
+                tuple(body.semantic_class for body in bodies),
+                p_WO[here],
+                states.quat_xyzw[here],
+                self._sizes[here],
+                states.v_WB[here],
+                states.yaw_rate[here],
+                states.is_moving[here],
+            )
         )
-        if not states.present.all():
-            objects = objects.select(np.flatnonzero(states.present))
-        output.set_value(objects)

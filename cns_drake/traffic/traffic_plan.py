@@ -4,26 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.traffic.joint_steps import run_steps
-from cns_drake.traffic.lane_arrays import LaneArrays, make_lane_arrays
-from cns_drake.traffic.lane_graph import LaneGraph
-from cns_drake.traffic.planning_trial import PlanningTrial, WantedBodies
-from cns_drake.traffic.presence import EgoBox, Presence, find_presence
-from cns_drake.traffic.starting_places import (
-    make_permits,
-    make_walkway_arrays,
-    place_vehicles,
-    place_walkers,
-    room_for_vehicles,
-)
+from cns_drake.traffic.lane_graph import LaneGraph, Walkway
+from cns_drake.traffic.overlaps import find_overlaps, whom_to_leave_out
+from cns_drake.traffic.right_of_way import grant_ways, make_permits
+from cns_drake.traffic.streets import EgoBox, Streets, make_streets
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind, draw_kinds
-from cns_drake.traffic.vehicle_state import make_occupants
-from cns_drake.traffic.walker_steps import WALKER_LENGTH, WALKER_WIDTH
-from cns_drake.traffic.walkways import Walkway
+from cns_drake.traffic.vehicles import (
+    accelerations,
+    advance,
+    change_lanes,
+    find_occupants,
+    make_occupants,
+    place_vehicles,
+    room_for_vehicles,
+    vehicle_poses,
+)
+from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
 
 # The step of planning [s].
 STEP = 0.1
@@ -34,6 +35,8 @@ WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 _SPARE, _TRIES = 0.06, 4
 # Steps after which a trial is given up if it has to leave out too many.
 _PART = 200
+# Boxes keep this distance, since they are compared only now and then [m].
+_APART = 0.1
 
 # The ego car's motion: (K,) times -> (K, 2) places [m], (K,) headings [rad].
 EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -44,7 +47,7 @@ class TrafficPlan:
     """The planned motion of vehicles and walkers.
 
     Attributes:
-        kinds: of the N vehicles.
+        kinds: N of them, one for each vehicle.
         vehicles: x, y, z of the middle of each box on the ground [m], yaw and
             pitch [rad].
         walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
@@ -55,6 +58,28 @@ class TrafficPlan:
     vehicles: Tracks
     walkers: Tracks
     left_out: int = 0
+
+
+class _Task(NamedTuple):
+    """What all trials of a plan have in common.
+
+    Attributes:
+        graph: lanes of the vehicles.
+        walkways: strips for the walkers.
+        streets: the graph, and the ego car at K steps.
+        ego_track: (2 K - 1, 3) x, y [m], heading [rad] of the middle of the
+            ego car's box at half steps.
+        ego_box: its size.
+        vehicles, walkers: wanted numbers.
+    """
+
+    graph: LaneGraph
+    walkways: Sequence[Walkway]
+    streets: Streets
+    ego_track: np.ndarray
+    ego_box: EgoBox
+    vehicles: int
+    walkers: int
 
 
 def plan_traffic(
@@ -72,10 +97,10 @@ def plan_traffic(
 
     Args:
         graph: lanes of the vehicles.
-        walkways: of the walkers.
+        walkways: strips for the walkers.
         vehicles, walkers: wanted numbers.
         seed: of all draws.
-        duration: of the drive [s].
+        duration: length of the drive [s].
         ego: the ego car's motion.
         ego_box: its size.
 
@@ -83,25 +108,18 @@ def plan_traffic(
         The plan, without any collisions. It may have fewer bodies than wanted.
     """
     num_steps = int(np.ceil(duration / STEP)) + 2
-    xy, yaw = ego(STEP * np.arange(num_steps))
-    presence = find_presence(graph, ego_box, xy, yaw, STEP)
-    lanes = make_lane_arrays(graph)
-    ego_track = _box_track(ego, ego_box, num_steps)
-    wanted = WantedBodies(vehicles, walkers)
+    task = _Task(
+        graph,
+        walkways,
+        make_streets(graph, ego_box, *ego(STEP * np.arange(num_steps)), STEP),
+        ego_box.middles(*ego(STEP / 2 * np.arange(2 * num_steps - 1))),
+        ego_box,
+        vehicles,
+        walkers,
+    )
     best: TrafficPlan | None = None
     for attempt in range(_TRIES):
-        rng = np.random.default_rng([seed, attempt])
-        best = _try(
-            graph,
-            lanes,
-            walkways,
-            presence,
-            ego_track,
-            ego_box,
-            wanted,
-            rng,
-            best,
-        )
+        best = _try(task, np.random.default_rng([seed, attempt]), best)
         if best.left_out == 0:
             break
     assert best is not None
@@ -109,72 +127,130 @@ def plan_traffic(
 
 
 def _try(
-    graph: LaneGraph,
-    lanes: LaneArrays,
-    walkways: Sequence[Walkway],
-    presence: Presence,
-    ego_track: np.ndarray,
-    ego_box: EgoBox,
-    wanted: WantedBodies,
-    rng: np.random.Generator,
-    best: TrafficPlan | None,
+    task: _Task, rng: np.random.Generator, best: TrafficPlan | None
 ) -> TrafficPlan:
     """Returns a new plan, or the best so far as soon as that is no worse."""
-    number = min(
-        _with_spare(wanted.vehicles),
-        max(wanted.vehicles, room_for_vehicles(graph)),
-    )
-    kinds = [KINDS[k] for k in draw_kinds(number, rng)]
-    state, found = place_vehicles(kinds, graph, lanes, presence, rng)
-    on_foot = place_walkers(_with_spare(wanted.walkers), walkways, rng)
-    trial = PlanningTrial(
-        [kinds[k] for k in found],
-        len(on_foot.speed),
-        ego_track,
-        ego_box,
-        wanted,
-    )
-    occupants = make_occupants(len(graph.pieces), len(found))
-    permits, ways = make_permits(graph), make_walkway_arrays(walkways)
-    seed = int(rng.integers(2**31))
-    num_steps = len(presence.until)
+    trial = Trial(task, rng)
+    num_steps = len(task.streets.until)
     for first in range(0, num_steps, _PART):
-        steps = range(first, min(first + _PART, num_steps))
-        run_steps(
-            lanes,
-            state,
-            occupants,
-            presence,
-            permits,
-            ways,
-            on_foot,
-            STEP,
-            seed,
-            trial.vehicles,
-            trial.walkers,
-            steps,
-        )
-        trial.look_for_overlaps(steps)
+        trial.run(range(first, min(first + _PART, num_steps)))
         if best is not None and trial.left_out() >= best.left_out:
             return best
-    trial.vehicles[:, :, 3] = np.unwrap(trial.vehicles[:, :, 3], axis=0)
-    kept_vehicles, kept_walkers = trial.kept()
-    return TrafficPlan(
-        tuple(trial.kinds[k] for k in kept_vehicles),
-        Tracks(STEP, trial.vehicles).select(np.array(kept_vehicles, int)),
-        Tracks(STEP, trial.walkers).select(np.array(kept_walkers, int)),
-        trial.left_out(),
-    )
+    return trial.plan()
+
+
+class Trial:
+    """One trial of a plan, and the bodies it has to leave out so far."""
+
+    def __init__(self, task: _Task, rng: np.random.Generator):
+        """Puts vehicles and walkers to their first places."""
+        number = min(
+            _with_spare(task.vehicles),
+            max(task.vehicles, room_for_vehicles(task.graph)),
+        )
+        kinds = [KINDS[k] for k in draw_kinds(number, rng)]
+        self._task = task
+        self._cars, found = place_vehicles(kinds, task.streets, rng)
+        self._kinds = [kinds[k] for k in found]
+        self._permits = make_permits(task.graph)
+        self._crowd = Crowd(
+            _with_spare(task.walkers), task.walkways, self._permits, rng
+        )
+        self._seed = int(rng.integers(2**31))
+        self._occupants = make_occupants(len(task.graph.pieces), len(found))
+        num_steps = len(task.streets.until)
+        num_walkers = len(self._crowd.walkers)
+        # See `TrafficPlan` for their columns.
+        self._vehicles = np.zeros((num_steps, len(found), 5))
+        self._walkers = np.zeros((num_steps, num_walkers, 5))
+        # The ego car, the vehicles, the walkers.
+        self._half_sizes = _APART / 2 + np.array(
+            [
+                task.ego_box.half_size,
+                *((k.size[0] / 2, k.size[1] / 2) for k in self._kinds),
+                *([(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * num_walkers),
+            ]
+        )
+        self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
+
+    def run(self, steps: range) -> None:
+        """Moves all bodies, and notes which of them overlap.
+
+        Args:
+            steps: numbers of the steps, which follow those made so far.
+        """
+        streets, occupants = self._task.streets, self._occupants
+        cars, permits, crowd = self._cars, self._permits, self._crowd
+        past_cars, past_walkers = [], []
+        for k in steps:
+            past_cars.append(cars.copy())
+            past_walkers.append(crowd.walkers.copy())
+            find_occupants(occupants, streets, cars, k)
+            grant_ways(streets, cars, occupants, permits, k, STEP, self._seed)
+            wanted, gaps = accelerations(streets, cars, occupants)
+            change_lanes(streets, cars, occupants, k)
+            advance(
+                streets, cars, permits.users, wanted, gaps, STEP, self._seed
+            )
+            crowd.step(k * STEP, STEP, self._seed + 1)
+        rows = slice(steps.start, steps.stop)
+        self._vehicles[rows] = vehicle_poses(streets, np.array(past_cars))
+        self._walkers[rows] = crowd.poses(np.array(past_walkers))
+        # The step before, for the half step between.
+        first = max(steps.start - 1, 0)
+        rows = slice(first, steps.stop)
+        poses = np.concatenate(
+            [
+                self._task.ego_track[2 * first : 2 * steps.stop - 1, None],
+                _at_half_steps(self._vehicles[rows]),
+                _at_half_steps(self._walkers[rows]),
+            ],
+            axis=1,
+        )
+        find_overlaps(poses, self._half_sizes, self._overlaps)
+
+    def _kept(self) -> tuple[list[int], list[int]]:
+        """Returns the vehicles and the walkers that meet no other body."""
+        out = set(whom_to_leave_out(self._overlaps, 1))
+        first_walker = 1 + len(self._kinds)
+        kept = (
+            [k - first for k in range(first, end) if k not in out]
+            for first, end in (
+                (1, first_walker),
+                (first_walker, len(self._half_sizes)),
+            )
+        )
+        vehicles, walkers = kept
+        return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
+
+    def left_out(self) -> int:
+        """Returns how many of the wanted bodies the plan has to leave out."""
+        vehicles, walkers = self._kept()
+        wanted = self._task.vehicles + self._task.walkers
+        return wanted - len(vehicles) - len(walkers)
+
+    def plan(self) -> TrafficPlan:
+        """Returns the plan, after the last step."""
+        yaw = self._vehicles[:, :, 3]
+        yaw[:] = np.unwrap(yaw, axis=0)
+        vehicles, walkers = self._kept()
+        return TrafficPlan(
+            tuple(self._kinds[k] for k in vehicles),
+            Tracks(STEP, self._vehicles[:, np.array(vehicles, int)]),
+            Tracks(STEP, self._walkers[:, np.array(walkers, int)]),
+            self.left_out(),
+        )
 
 
 def _with_spare(number: int) -> int:
     return int(np.ceil(number * (1 + _SPARE)))
 
 
-def _box_track(ego: EgoPath, box: EgoBox, num_steps: int) -> np.ndarray:
-    """Returns the middle and heading of the ego car's box at half steps."""
-    times = STEP / 2 * np.arange(2 * num_steps - 1)
-    xy, yaw = ego(times)
-    middle = (box.rear + box.front) / 2
-    ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
-    return np.column_stack([xy + middle * ahead, yaw])
+def _at_half_steps(values: np.ndarray) -> np.ndarray:
+    """Returns x, y, yaw (2 K - 1, N, 3) of (K, N, 5) at and between K times."""
+    xy_yaw = values[:, :, [0, 1, 3]]
+    xy_yaw[:, :, 2] = np.unwrap(xy_yaw[:, :, 2], axis=0)
+    result = np.empty((2 * len(xy_yaw) - 1, *xy_yaw.shape[1:]))
+    result[::2] = xy_yaw
+    result[1::2] = (xy_yaw[1:] + xy_yaw[:-1]) / 2
+    return result

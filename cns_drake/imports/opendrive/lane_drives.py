@@ -19,9 +19,8 @@ from cns_drake.imports.drives.search import (
 )
 from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
 from cns_drake.traffic.lane_file import lane_text
-from cns_drake.traffic.lane_graph import resampled
+from cns_drake.traffic.lane_graph import Walkway, resampled
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
-from cns_drake.traffic.walkways import Walkway
 
 # A lane follows another if its start is this near to the other's end, and its
 # heading differs by less than this [m, rad].

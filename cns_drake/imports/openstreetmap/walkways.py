@@ -12,8 +12,12 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from cns_drake.imports.foreign_city import Street
-from cns_drake.traffic.lane_graph import Crossing, make_crossing, resampled
-from cns_drake.traffic.walkways import Walkway
+from cns_drake.traffic.lane_graph import (
+    Crossing,
+    Walkway,
+    make_crossing,
+    resampled,
+)
 
 # From the kerb to the middle of a walked strip, half its width, and its least
 # distance from the edges of a sidewalk [m].

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.traffic.fcd_trace import read_fcd
-from cns_drake.traffic.fcd_traffic import play_trace
+from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
-from cns_drake.traffic.presence import EgoBox
-from cns_drake.traffic.walker_steps import gait_rate
+from cns_drake.traffic.streets import EgoBox
+from cns_drake.traffic.walkers import gait_rate
 
 DT, RADIUS, RATE = 0.1, 30.0, 0.2
 TURN = np.linspace(0.0, 2 * np.pi, 400)

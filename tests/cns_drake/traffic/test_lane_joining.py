@@ -9,9 +9,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.traffic.lane_file import lane_text, read_lanes
-from cns_drake.traffic.lane_graph import LaneGraph, make_crossing
+from cns_drake.traffic.lane_graph import LaneGraph, Walkway, make_crossing
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
-from cns_drake.traffic.walkways import Walkway
 
 
 def straight(start, end, limit=10.0, connects=False):

@@ -2,12 +2,10 @@
 
 import numpy as np
 import shapely
-import shapely.affinity
 
 from cns_drake.traffic.overlaps import (
     boxes_overlap,
     find_overlaps,
-    way_out,
     whom_to_leave_out,
 )
 
@@ -26,13 +24,6 @@ def test_agrees_with_shapely():
         one, other = _polygon(a, half_a), _polygon(b, half_b)
         expected = one.intersection(other).area > 1e-9
         assert boxes_overlap(a, b, half_a, half_b) == expected
-        if expected:
-            # Moved by the way out, and a hair more, it is outside.
-            x, y = way_out(a, b, half_a, half_b)
-            moved = shapely.affinity.translate(other, 1.001 * x, 1.001 * y)
-            assert one.intersection(moved).area < 1e-6
-            near = shapely.affinity.translate(other, 0.9 * x, 0.9 * y)
-            assert one.intersection(near).area > 0
 
 
 def test_the_most_involved_goes_first():

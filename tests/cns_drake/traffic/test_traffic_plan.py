@@ -11,12 +11,10 @@ from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.traffic import traffic_plan
-from cns_drake.traffic.lane_arrays import make_lane_arrays
-from cns_drake.traffic.presence import EgoBox
-from cns_drake.traffic.road_lanes import make_lane_graph
-from cns_drake.traffic.starting_places import room_for_vehicles
+from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
+from cns_drake.traffic.streets import EgoBox, find_conflicts
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
-from cns_drake.traffic.walkways import make_walkways
+from cns_drake.traffic.vehicles import room_for_vehicles
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
 
@@ -144,9 +142,9 @@ def test_a_trial_given_up_early_changes_no_plan(monkeypatch):
         return xy, np.full(len(t), np.arctan2(*(high - low)[::-1]))
 
     found, calls = [], []
-    run_steps = traffic_plan.run_steps
+    run = traffic_plan.Trial.run
     monkeypatch.setattr(
-        traffic_plan, "run_steps", lambda *a: calls.append(a) or run_steps(*a)
+        traffic_plan.Trial, "run", lambda *a: calls.append(a) or run(*a)
     )
     for part in (20, 10**6):
         monkeypatch.setattr(traffic_plan, "_PART", part)
@@ -221,13 +219,13 @@ def test_graphs_have_no_dead_end(name):
 
 def test_ways_that_cross_exclude_each_other():
     _, graph, _ = roads("suburbia")
-    lanes = make_lane_arrays(graph)
+    small, large = find_conflicts(graph)
     num = len(graph.pieces)
     lines = [shapely.LineString(p.points[:, :2]) for p in graph.pieces]
     for a in range(num):
         for b in range(a):
             if graph.pieces[a].is_way and graph.pieces[b].is_way:
                 meets = lines[a].distance(lines[b]) < 1.5
-                assert not meets or lanes.small[a, b]
-    assert (lanes.small == lanes.small.T).all()
-    assert (lanes.small <= lanes.large).all()
+                assert not meets or small[a, b]
+    assert (small == small.T).all()
+    assert (small <= large).all()

@@ -1,0 +1,353 @@
+"""Lanes, and the ego car's way over them, as arrays for loops over time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.compiled import compiled
+from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
+
+# Greatest acceleration in bends, and braking before them [m/s^2].
+_LATERAL = 2.2
+_BEFORE_BENDS = 1.5
+# Least speed in a bend [m/s].
+_SLOWEST = 2.5
+# Number of points to both sides whose chords give the curvature.
+_CHORD = 4
+# Distance of the places at which a vehicle's outline is drawn, and free space
+# around it [m].
+_STEP = 1.0
+_CLEARANCE = 0.25
+# Half the width of a vehicle's strip of its lane, with its distance from the
+# ego car [m].
+_HALF_LANE = 1.45
+# A lane must be empty when the ego car enters it. Drivers assume this part of
+# the speed limit, and this wait at its end [s].
+_SLOW_PART, WAIT = 0.6, 20.0
+
+# A piece of the lane graph: see `Piece`.
+PIECE = np.dtype(
+    [
+        ("first", int),  # Row of its first point.
+        ("num_points", int),
+        ("step", float),  # Distance of its points [m].
+        ("length", float),  # [m]
+        ("is_way", bool),
+        ("after_first", int),  # Row of its first successor.
+        ("after_count", int),
+        ("left", int),
+        ("right", int),
+        ("junction", int),
+        ("phase", int),
+    ],
+    align=True,
+)
+
+
+class Streets(NamedTuple):
+    """P pieces and C crossings of a lane graph, and the ego car at K times.
+
+    Attributes:
+        pieces: (P,) records `PIECE`.
+        points: (M, 3) points of all pieces [m].
+        speed: (M,) allowed speed there, with regard to bends [m/s].
+        after: numbers of the pieces that follow each piece.
+        phases: (J,) number of phases of a junction's signals.
+        small, large: (P + C, P + C) exclusions, see `find_conflicts`.
+        until: (K, P + C) float32 time until the ego car is there, 0 while it
+            is, inf if it never will be [s].
+        ego_rear, ego_front: (K, P) float32 distance of its ends along a piece
+            while it is there [m].
+        ego_speed: (K, P) float32 along the piece, negative against it [m/s].
+    """
+
+    pieces: np.ndarray
+    points: np.ndarray
+    speed: np.ndarray
+    after: np.ndarray
+    phases: np.ndarray
+    small: np.ndarray
+    large: np.ndarray
+    until: np.ndarray
+    ego_rear: np.ndarray
+    ego_front: np.ndarray
+    ego_speed: np.ndarray
+
+
+class EgoBox(NamedTuple):
+    """The ego car's box on the ground.
+
+    Attributes:
+        rear, front: x of its ends in the vehicle frame [m].
+        half_width: half its width [m].
+    """
+
+    rear: float
+    front: float
+    half_width: float
+
+    @property
+    def half_size(self) -> tuple[float, float]:
+        """Half its length and half its width [m]."""
+        return (self.front - self.rear) / 2, self.half_width
+
+    def middles(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """Returns (N, 3) x, y [m], yaw of its middle at (N, 2), (N,) poses."""
+        ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
+        middle = (self.rear + self.front) / 2
+        return np.column_stack([xy + middle * ahead, yaw])
+
+    def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """Returns (N, 4, 2) corners at (N, 2) places and (N,) headings."""
+        c, s = np.cos(yaw), np.sin(yaw)
+        outline = (
+            (self.rear, -self.half_width),
+            (self.front, -self.half_width),
+            (self.front, self.half_width),
+            (self.rear, self.half_width),
+        )
+        corners = [
+            (xy[:, 0] + x * c - y * s, xy[:, 1] + x * s + y * c)
+            for x, y in outline
+        ]
+        return np.array(corners).transpose(2, 0, 1)
+
+
+def make_streets(
+    graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray, dt: float
+) -> Streets:
+    """Returns the arrays of a graph and of the ego car.
+
+    Args:
+        graph: lanes, ways and crossings.
+        box: the car's size.
+        xy: (K, 2) places of its frame [m].
+        yaw: (K,) headings [rad].
+        dt: distance of the K times [s].
+    """
+    pieces = graph.pieces
+    rows = np.zeros(len(pieces), PIECE)
+    count = np.array([len(piece.points) for piece in pieces])
+    after_count = np.array([len(piece.after) for piece in pieces])
+    rows["num_points"] = count
+    rows["first"] = np.cumsum(count) - count
+    rows["after_count"] = after_count
+    rows["after_first"] = np.cumsum(after_count) - after_count
+    for name in ("length", "is_way", "left", "right", "junction", "phase"):
+        rows[name] = [getattr(piece, name) for piece in pieces]
+    rows["step"] = rows["length"] / (count - 1)
+    return Streets(
+        rows,
+        np.concatenate([piece.points for piece in pieces]),
+        np.concatenate([_speeds(piece) for piece in pieces]),
+        np.array([a for piece in pieces for a in piece.after]),
+        np.array(graph.phases or (1,)),
+        *find_conflicts(graph),
+        *_find_ego(graph, box, xy, yaw, dt),
+    )
+
+
+def _speeds(piece: Piece) -> np.ndarray:
+    """Returns the allowed speed at each point of a piece [m/s]."""
+    xy = piece.points[:, :2]
+    speed = np.full(len(xy), piece.limit)
+    step = piece.length / (len(xy) - 1)
+    reach = min(_CHORD, (len(xy) - 1) // 2)
+    if reach > 0:
+        a, b, c = xy[: -2 * reach], xy[reach:-reach], xy[2 * reach :]
+        u, w = b - a, c - b
+        turn = np.abs(
+            np.arctan2(
+                u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0], np.sum(u * w, axis=1)
+            )
+        )
+        curvature = np.pad(turn / (reach * step), reach, mode="edge")
+        bend = np.sqrt(_LATERAL / np.maximum(curvature, 1e-6))
+        speed = np.minimum(speed, np.maximum(bend, _SLOWEST))
+    for k in range(len(speed) - 2, -1, -1):
+        ahead = np.sqrt(speed[k + 1] ** 2 + 2.0 * _BEFORE_BENDS * step)
+        speed[k] = min(speed[k], ahead)
+    return speed
+
+
+def find_conflicts(graph: LaneGraph) -> tuple[np.ndarray, np.ndarray]:
+    """Returns which pieces and crossings exclude each other.
+
+    Two different ways exclude each other if their swept areas meet; lanes
+    exclude nothing.
+
+    Returns:
+        Two symmetric boolean (P + C, P + C) matrices over pieces and then
+        crossings: while all vehicles are small, and while one is large.
+    """
+    small_axles = (-1.6, 1.75)
+    results = []
+    for size, axles in (
+        (SMALL_SIZE, small_axles),
+        (LARGEST.size[:2], LARGEST.axles),
+    ):
+        areas = [
+            swept_area(piece, size, axles)
+            if piece.is_way
+            else shapely.Polygon()
+            for piece in graph.pieces
+        ]
+        areas += [crossing.area for crossing in graph.crossings]
+        tree = shapely.STRtree(areas)
+        rows, columns = tree.query(areas, predicate="intersects")
+        matrix = np.zeros((len(areas), len(areas)), bool)
+        matrix[rows, columns] = True
+        matrix[len(graph.pieces) :, len(graph.pieces) :] = False
+        np.fill_diagonal(matrix, False)
+        results.append(matrix)
+    return results[0], results[1]
+
+
+def swept_area(
+    piece: Piece, size: tuple[float, float], axles: tuple[float, float]
+) -> BaseGeometry:
+    """Returns the area that a vehicle sweeps on a way.
+
+    Args:
+        piece: the way.
+        size: length and width of the vehicle [m].
+        axles: x of its rear and front axle from its middle [m].
+    """
+    line = piece.points[:, :2]
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    length = along[-1]
+
+    def at(s: np.ndarray) -> np.ndarray:
+        """Returns places on the way, continued straight beyond its ends."""
+        inside = np.clip(s, 0.0, length)
+        xy = np.column_stack([np.interp(inside, along, x) for x in line.T])
+        first = (line[1] - line[0]) / steps[0]
+        last = (line[-1] - line[-2]) / steps[-1]
+        xy += np.minimum(s, 0.0)[:, None] * first
+        return xy + np.maximum(s - length, 0.0)[:, None] * last
+
+    count = int(np.ceil((length + size[0]) / _STEP)) + 1
+    front = np.linspace(0.0, length + size[0], count)
+    middle = front - size[0] / 2
+    rear_axle, front_axle = at(middle + axles[0]), at(middle + axles[1])
+    ahead = front_axle - rear_axle
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    left = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    centre = rear_axle - axles[0] * ahead
+    reach, half = size[0] / 2, size[1] / 2 + _CLEARANCE
+    corners = np.stack(
+        [
+            centre + x * ahead + y * left
+            for x, y in (
+                (reach, half),
+                (reach, -half),
+                (-reach, -half),
+                (-reach, half),
+            )
+        ],
+        axis=1,
+    )
+    hulls = shapely.convex_hull(
+        shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=1))
+    )
+    return shapely.union_all(hulls)
+
+
+def _find_ego(
+    graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray, dt: float
+) -> tuple[np.ndarray, ...]:
+    """Returns the fields of `Streets` from `until` on; see `make_streets`."""
+    corners = box.corners(xy, yaw)
+    boxes = shapely.polygons(corners)
+    lines = np.array(
+        [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
+    )
+    areas = [
+        line.buffer(_HALF_LANE, cap_style="flat", join_style="mitre")
+        for line in lines
+    ] + [crossing.area for crossing in graph.crossings]
+    until = np.full((len(xy), len(areas)), np.inf, np.float32)
+    rear, front, speed = np.zeros((3, len(xy), len(lines)), np.float32)
+    times, places = shapely.STRtree(areas).query(boxes, predicate="intersects")
+    until[times, places] = 0.0
+    on_piece = places < len(lines)
+    times, places = times[on_piece], places[on_piece]
+    along = shapely.line_locate_point(
+        lines[places][:, None], shapely.points(corners[times])
+    )
+    behind, ahead = along.min(axis=1), along.max(axis=1)
+    rear[times, places], front[times, places] = behind, ahead
+    velocity = np.gradient(xy, dt, axis=0)
+    tangent = np.subtract(
+        *(
+            shapely.get_coordinates(
+                shapely.line_interpolate_point(lines[places], end)
+            )
+            for end in (ahead, behind)
+        )
+    )
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-6)[:, None]
+    speed[times, places] = np.sum(velocity[times] * tangent, axis=1)
+    for k in range(len(xy) - 2, -1, -1):
+        np.minimum(until[k], until[k + 1] + dt, out=until[k])
+    return until, rear, front, speed
+
+
+def places_on(
+    streets: Streets, pieces: np.ndarray, s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns x, y and z at distances along pieces [m].
+
+    Before its beginning and after its end a piece goes straight on.
+
+    Args:
+        streets: the pieces.
+        pieces: (...) their numbers.
+        s: (...) distances [m].
+    """
+    rows = streets.pieces[pieces]
+    at = s / rows["step"]
+    k = np.minimum(np.maximum(np.floor(at), 0.0), rows["num_points"] - 2.0)
+    row = rows["first"] + k.astype(int)
+    share = at - k
+    here, there = streets.points[row], streets.points[row + 1]
+    place = here + share[..., None] * (there - here)
+    return place[..., 0], place[..., 1], place[..., 2]
+
+
+@compiled
+def speed_on(streets: Streets, piece: int, s: float) -> float:
+    """Returns the allowed speed at a distance along a piece [m/s]."""
+    row = streets.pieces[piece]
+    k = min(max(int(s / row.step), 0), row.num_points - 1)
+    return streets.speed[row.first + k]
+
+
+@compiled
+def is_ego_far(
+    streets: Streets, k: int, lane: int, s: float, wait: float = WAIT
+) -> bool:
+    """Returns whether a vehicle can leave a lane before the ego car is there.
+
+    Args:
+        streets: the lanes, and the ego car.
+        k: number of the time.
+        lane: the lane.
+        s: distance of the vehicle along it [m].
+        wait: its possible wait at the lane's end [s].
+    """
+    until = streets.until[k, lane]
+    if until == 0.0:
+        # A vehicle may follow behind the ego car.
+        return streets.ego_speed[k, lane] >= 0.0 and (
+            streets.ego_rear[k, lane] > s + 2.0
+        )
+    row = streets.pieces[lane]
+    speed = _SLOW_PART * streets.speed[row.first]
+    return until > (row.length - s) / speed + wait

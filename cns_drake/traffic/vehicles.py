@@ -1,0 +1,577 @@
+"""Vehicles in lanes: how they follow each other, change lanes and move on.
+
+They follow the Intelligent Driver Model of Treiber, Hennecke, Helbing (see
+`VehicleKind`), and change lanes by MOBIL of Kesting, Treiber, Helbing (2007): a
+driver changes lane if that gains more acceleration than it costs others, and no
+other vehicle has to brake hard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.streets import Streets, is_ego_far, places_on, speed_on
+from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP, VehicleKind
+
+# Columns of a vehicle's path: the piece of the front bumper, with as many
+# pieces before it, for the rear, and after it.
+CURRENT = 5
+NUM_PIECES = 8
+# Stands for the ego car among occupants.
+EGO = -1
+# Greatest number of pieces under a vehicle.
+_MOST_ENTRIES = 8
+
+# Greatest braking [m/s^2].
+HARDEST_BRAKING = 8.0
+# Smaller gaps count as this one [m].
+_NO_GAP = 0.05
+# Distance kept from the stop line [m].
+_BEFORE_LINE = 0.5
+# Greatest distance that drivers look ahead [m].
+_SIGHT = 120.0
+# The least gap that a step leaves, independent of the model [m].
+_LEAST_GAP = 0.5
+
+# A driver considers a change of lane only at every such step.
+_THINKS = 10
+# Politeness, least gain, and the most that others brake [m/s^2].
+_POLITENESS, _GAIN, _OTHERS_BRAKE = 0.2, 0.25, 2.5
+# Duration of a change [s], its least length, and least rest of the lane behind
+# it [m].
+_DURATION, _LEAST_LENGTH, _BEYOND = 4.0, 20.0, 30.0
+# Least speed of a change [m/s], and least gap [m].
+_SLOWEST, _GAP = 3.0, 4.0
+
+# At the start a vehicle needs this length of lane besides its own [m], and has
+# this part of the allowed speed.
+_SPACE = 9.0
+_PART_OF_SPEED = 0.5
+# Number of places that are drawn before a vehicle is given up.
+_TRIES = 200
+
+# A vehicle: its constants, and its present state.
+VEHICLE = np.dtype(
+    [
+        ("length", float),  # [m]
+        ("rear_axle", float),  # x from the middle [m].
+        ("front_axle", float),
+        ("factor", float),  # Wanted part of the allowed speed.
+        ("top", float),  # Greatest speed [m/s].
+        ("a", float),  # Of the car-following model, like b and headway.
+        ("b", float),
+        ("headway", float),
+        ("large", bool),  # Whether it sweeps more than its lane in turns.
+        ("path", int, NUM_PIECES),  # Pieces, -1 for none.
+        ("s", float),  # The front bumper's place on the current piece [m].
+        ("v", float),  # Speed [m/s].
+        ("granted", bool),  # Whether it may leave its lane.
+        ("held", int),  # The way that is kept free for it, -1 for none.
+        ("since", float),  # Start of its wait for its way, inf for none [s].
+        ("refused", float),  # Time without room beyond its way [s].
+        ("left_lane", int),  # The lane that it is changing from, or -1.
+        ("change_start", float),  # Of the lane change, along the lane [m].
+        ("change_length", float),
+        ("draws", int),  # Number of random numbers that it has drawn.
+    ],
+    align=True,
+)
+# An entry in the list of the vehicles on a piece, with their parts.
+_ENTRY = np.dtype(
+    [
+        ("after", int),  # The next entry on the same piece, -1 for none.
+        ("who", int),  # Number of a vehicle, or `EGO`.
+        ("rear", float),  # Along the piece [m].
+        ("front", float),
+        ("speed", float),  # [m/s]
+    ]
+)
+
+
+class Occupants(NamedTuple):
+    """The vehicles on each piece, as a linked list.
+
+    Attributes:
+        head: (P,) the first entry of each piece, -1 for none.
+        entries: records `_ENTRY`.
+    """
+
+    head: np.ndarray
+    entries: np.ndarray
+
+
+def make_occupants(num_pieces: int, num_vehicles: int) -> Occupants:
+    """Returns room for the entries of all vehicles and the ego car."""
+    size = _MOST_ENTRIES * num_vehicles + num_pieces
+    return Occupants(np.full(num_pieces, -1), np.zeros(size, _ENTRY))
+
+
+def room_for_vehicles(graph: LaneGraph) -> int:
+    """Returns the number of vehicles for which lanes have room to move."""
+    mean = sum(kind.share * kind.size[0] for kind in KINDS)
+    mean /= sum(kind.share for kind in KINDS)
+    return int(
+        sum(graph.pieces[k].length // (mean + 2 * _SPACE) for k in graph.lanes)
+    )
+
+
+def place_vehicles(
+    kinds: Sequence[VehicleKind], streets: Streets, rng: np.random.Generator
+) -> tuple[np.ndarray, list[int]]:
+    """Puts vehicles into lanes, away from the ego car's first places.
+
+    Args:
+        kinds: N of them, one for each vehicle.
+        streets: the lanes, and the ego car.
+        rng: draws the places.
+
+    Returns:
+        Records `VEHICLE`, and the numbers of the kinds for whose vehicles a
+        place was found.
+    """
+    free = np.flatnonzero(~streets.pieces["is_way"])
+    lengths = streets.pieces["length"]
+    share = lengths[free] / lengths[free].sum()
+    taken: dict[int, list[tuple[float, float]]] = {}
+    found, paths, places = [], [], []
+    for number, kind in enumerate(kinds):
+        for _ in range(_TRIES):
+            lane = int(rng.choice(free, p=share))
+            length = lengths[lane]
+            low = kind.size[0] + 1.0
+            if length < low + 1.0:
+                continue
+            s = float(rng.uniform(low, length - 1.0))
+            span = (s - kind.size[0] - _SPACE / 2, s + _SPACE / 2)
+            if any(span[0] < b and a < span[1] for a, b in taken.get(lane, [])):
+                continue
+            if streets.until[0, lane] == 0.0 or not is_ego_far(
+                streets, 0, lane, s
+            ):
+                continue
+            taken.setdefault(lane, []).append(span)
+            found.append(number)
+            paths.append(lane)
+            places.append(s)
+            break
+    chosen = [kinds[k] for k in found]
+    cars = np.zeros(len(found), VEHICLE)
+    for name in ("held", "left_lane", "path"):
+        cars[name] = -1
+    cars["since"], cars["change_length"] = np.inf, 1.0
+    cars["path"][:, CURRENT], cars["s"] = paths, places
+    cars["length"] = [kind.size[0] for kind in chosen]
+    cars["rear_axle"] = [kind.axles[0] for kind in chosen]
+    cars["front_axle"] = [kind.axles[1] for kind in chosen]
+    cars["top"] = [kind.top_speed for kind in chosen]
+    cars["a"] = [kind.acceleration for kind in chosen]
+    cars["b"] = [kind.deceleration for kind in chosen]
+    cars["headway"] = [kind.headway for kind in chosen]
+    cars["large"] = [kind.is_large for kind in chosen]
+    cars["factor"] = [kind.speed_factor for kind in chosen]
+    cars["factor"] *= rng.uniform(0.9, 1.1, len(cars))
+    lanes = streets.pieces[cars["path"][:, CURRENT]]
+    allowed = streets.speed[
+        lanes["first"] + (cars["s"] / lanes["step"]).astype(int)
+    ]
+    v = _PART_OF_SPEED * np.minimum(cars["top"], cars["factor"] * allowed)
+    # Vehicles can stop before the stop line, or behind the one ahead.
+    left = np.minimum(lanes["length"] - cars["s"], _SPACE / 2)
+    cars["v"] = np.minimum(v, np.sqrt(1.5 * left))
+    return cars, found
+
+
+def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
+    """Returns the poses of records `VEHICLE`.
+
+    Args:
+        streets: the lanes.
+        cars: (...) records.
+
+    Returns:
+        (..., 5): x, y, z of the middle of each box on the ground [m], yaw and
+        pitch [rad].
+    """
+    half = 0.5 * cars["length"]
+    front = _places(streets, cars, half - cars["front_axle"])
+    rear = _places(streets, cars, half - cars["rear_axle"])
+    x, y, z = (a - b for a, b in zip(front, rear, strict=True))
+    length = np.sqrt(x * x + y * y + z * z)
+    x, y, z = x / length, y / length, z / length
+    middle = [
+        place - cars["rear_axle"] * ahead
+        for place, ahead in zip(rear, (x, y, z), strict=True)
+    ]
+    # NumPy's own functions of angles round by the kind of processor.
+    yaw = np.vectorize(math.atan2, otypes=[float])(y, x)
+    pitch = -np.vectorize(math.asin, otypes=[float])(z)
+    return np.stack([*middle, yaw, pitch], axis=-1)
+
+
+def _places(
+    streets: Streets, cars: np.ndarray, back: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Returns x, y, z at a distance behind each front bumper [m]."""
+    s = cars["s"] - back
+    path, column = cars["path"], np.full(cars.shape, CURRENT)
+
+    def piece_in(column: np.ndarray) -> np.ndarray:
+        return np.take_along_axis(path, column[..., None], -1)[..., 0]
+
+    for _ in range(CURRENT):
+        before = piece_in(np.maximum(column - 1, 0))
+        is_before = (s < 0.0) & (column > 0) & (before >= 0)
+        s = np.where(is_before, s + streets.pieces["length"][before], s)
+        column -= is_before
+    piece = piece_in(column)
+    places = places_on(streets, piece, s)
+    changing = (column == CURRENT) & (cars["left_lane"] >= 0)
+    car, piece = cars[changing], piece[changing]
+    u = (s[changing] - car["change_start"]) / car["change_length"]
+    u = np.minimum(np.maximum(u, 0.0), 1.0)
+    share = u * u * u * (10.0 - 15.0 * u + 6.0 * (u * u))
+    lengths = streets.pieces["length"]
+    scale = lengths[car["left_lane"]] / lengths[piece]
+    there = car["s"] * scale - back[changing]
+    for place, before in zip(
+        places, places_on(streets, car["left_lane"], there), strict=True
+    ):
+        place[changing] = before + share * (place[changing] - before)
+    return places
+
+
+@compiled
+def find_occupants(
+    occupants: Occupants, streets: Streets, cars: np.ndarray, k: int
+) -> None:
+    """Notes the places of all vehicles at the k-th time."""
+    occupants.head[:] = -1
+    free, pieces = 0, streets.pieces
+    for i in range(len(cars)):
+        car = cars[i]
+        rear, front = car.s - car.length, car.s
+        column = CURRENT
+        while column >= 0:
+            piece = car.path[column]
+            if piece < 0:
+                break
+            free = _enter(occupants, free, piece, i, rear, front, car.v)
+            other = car.left_lane
+            if column == CURRENT and other >= 0:
+                there = front * (pieces[other].length / pieces[piece].length)
+                free = _enter(
+                    occupants, free, other, i, there - car.length, there, car.v
+                )
+            if rear >= 0.0:
+                break
+            column -= 1
+            before = car.path[column] if column >= 0 else -1
+            if before >= 0:
+                rear += pieces[before].length
+                front = pieces[before].length
+    for piece in range(len(pieces)):
+        if streets.until[k, piece] == 0.0:
+            free = _enter(
+                occupants,
+                free,
+                piece,
+                EGO,
+                streets.ego_rear[k, piece],
+                streets.ego_front[k, piece],
+                streets.ego_speed[k, piece],
+            )
+
+
+@compiled
+def _enter(
+    occupants: Occupants,
+    number: int,
+    piece: int,
+    who: int,
+    rear: float,
+    front: float,
+    speed: float,
+) -> int:
+    """Fills in an entry of a number; returns the next number."""
+    entry = occupants.entries[number]
+    entry.after = occupants.head[piece]
+    entry.who, entry.rear, entry.front, entry.speed = who, rear, front, speed
+    occupants.head[piece] = number
+    return number + 1
+
+
+@compiled
+def find_ahead(
+    occupants: Occupants, piece: int, s: float, who: int
+) -> tuple[float, float]:
+    """Returns the gap to the next one ahead on a piece [m], and its speed.
+
+    Args:
+        occupants: the vehicles on all pieces.
+        piece: to search.
+        s: place of the front bumper [m].
+        who: the vehicle.
+    """
+    gap, speed = np.inf, 0.0
+    at = occupants.head[piece]
+    while at >= 0:
+        other = occupants.entries[at]
+        ahead = other.front > s or (other.front == s and other.who < who)
+        if other.who != who and ahead and other.rear - s < gap:
+            gap, speed = other.rear - s, other.speed
+        at = other.after
+    return gap, speed
+
+
+@compiled
+def free_acceleration(car: Any, v0: float) -> float:
+    """Returns a vehicle's acceleration on a free road [m/s^2].
+
+    Above the wanted speed v0 [m/s] it is at most the comfortable braking.
+    """
+    if v0 < 0.01:
+        return -car.b
+    return max(car.a * (1.0 - (car.v / v0) ** 4), -car.b)
+
+
+@compiled
+def interaction(car: Any, gap: float, approach: float) -> float:
+    """Returns the loss of acceleration behind a vehicle [m/s^2].
+
+    That is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
+
+    Args:
+        car: a record `VEHICLE`.
+        gap: from bumper to bumper [m].
+        approach: dv, its speed minus that of the vehicle ahead [m/s].
+    """
+    wanted = STANDSTILL_GAP + max(
+        0.0,
+        car.v * car.headway + car.v * approach / (2.0 * (car.a * car.b) ** 0.5),
+    )
+    return car.a * (wanted / max(gap, _NO_GAP)) ** 2
+
+
+@compiled
+def accelerations(
+    streets: Streets, cars: np.ndarray, occupants: Occupants
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the (N,) accelerations [m/s^2], and gaps ahead [m]."""
+    result, gaps = np.zeros(len(cars)), np.zeros(len(cars))
+    pieces = streets.pieces
+    for i in range(len(cars)):
+        car = cars[i]
+        lane, s, v = car.path[CURRENT], car.s, car.v
+        left = pieces[lane].length - s
+        v0 = min(car.top, car.factor * speed_on(streets, lane, s))
+        wanted = free_acceleration(car, v0)
+        goes_on = pieces[lane].is_way or car.granted
+        if not goes_on:
+            # The driver brakes as for a vehicle behind the stop line.
+            wanted -= interaction(car, left + STANDSTILL_GAP - _BEFORE_LINE, v)
+        gap, speed = find_ahead(occupants, lane, s, i)
+        if car.left_lane >= 0:
+            scale = pieces[car.left_lane].length / pieces[lane].length
+            gap_2, speed_2 = find_ahead(occupants, car.left_lane, s * scale, i)
+            if gap_2 < gap:
+                gap, speed = gap_2, speed_2
+        column, begin = CURRENT + 1, left
+        while goes_on and gap == np.inf and begin < _SIGHT:
+            piece = car.path[column]
+            if piece < 0:
+                break
+            v1 = min(car.top, car.factor * speed_on(streets, piece, 0.0))
+            if v1 < v:
+                braking = (v**2 - v1**2) / (2.0 * max(begin, 0.5))
+                if braking > 0.6 * car.b:
+                    wanted = min(wanted, -braking)
+            gap, speed = find_ahead(occupants, piece, -begin, i)
+            begin += pieces[piece].length
+            column += 1
+            if column == NUM_PIECES:
+                break
+        gaps[i] = gap
+        if gap < _SIGHT:
+            wanted -= interaction(car, gap, v - speed)
+        result[i] = max(wanted, -HARDEST_BRAKING)
+    return result, gaps
+
+
+@compiled
+def change_lanes(
+    streets: Streets, cars: np.ndarray, occupants: Occupants, k: int
+) -> None:
+    """Begins the change of lane of one vehicle at most, at the k-th time."""
+    pieces = streets.pieces
+    for i in range(len(cars)):
+        car = cars[i]
+        lane = car.path[CURRENT]
+        if (
+            (k + i) % _THINKS != 0
+            or pieces[lane].is_way
+            or car.granted
+            or car.left_lane >= 0
+            or car.v < _SLOWEST
+            or car.s < car.length + 2.0
+        ):
+            continue
+        length = max(_LEAST_LENGTH, _DURATION * car.v)
+        left = pieces[lane].length - car.s
+        if left < length + car.length + _BEYOND:
+            continue
+        for target in (pieces[lane].left, pieces[lane].right):
+            if target >= 0 and _is_better(
+                streets, cars, occupants, k, i, target
+            ):
+                car.s *= pieces[target].length / pieces[lane].length
+                car.path[CURRENT] = target
+                car.path[CURRENT + 1] = car.path[CURRENT + 2] = -1
+                car.since = np.inf
+                car.left_lane = lane
+                # The change begins with the front axle.
+                car.change_start, car.change_length = car.s, length
+                return
+
+
+@compiled
+def _is_better(
+    streets: Streets,
+    cars: np.ndarray,
+    occupants: Occupants,
+    k: int,
+    i: int,
+    target: int,
+) -> bool:
+    """Returns whether the i-th vehicle gains by a change to a lane."""
+    car = cars[i]
+    lane, v = car.path[CURRENT], car.v
+    scale = streets.pieces[target].length / streets.pieces[lane].length
+    there = car.s * scale
+    if streets.until[k, target] == 0.0 or not is_ego_far(
+        streets, k, target, there
+    ):
+        return False
+    rear = there - car.length
+    # The next one behind; no vehicle may be beside it, ahead or behind.
+    behind, who, is_beside = np.inf, -2, False
+    at = occupants.head[target]
+    while at >= 0:
+        other = occupants.entries[at]
+        gap = rear - other.front
+        if other.who != i and other.rear <= rear and gap < behind:
+            behind, who = gap, other.who
+        is_beside |= other.rear < there + _GAP and other.front > rear - _GAP
+        at = other.after
+    gap, speed = find_ahead(occupants, target, there, i)
+    if gap < _GAP or behind < _GAP or who == EGO or is_beside:
+        return False
+    free = free_acceleration(
+        car, min(car.top, car.factor * speed_on(streets, lane, car.s))
+    )
+    new = max(free - interaction(car, gap, v - speed), -HARDEST_BRAKING)
+    gap, speed = find_ahead(occupants, lane, car.s, i)
+    old = max(free - interaction(car, gap, v - speed), -HARDEST_BRAKING)
+    cost = 0.0
+    if who >= 0:
+        it = cars[who]
+        free = free_acceleration(
+            it, min(it.top, it.factor * speed_on(streets, target, it.s))
+        )
+        gap, speed = find_ahead(
+            occupants, target, there - car.length - behind, who
+        )
+        now = max(free - interaction(it, gap, it.v - speed), -HARDEST_BRAKING)
+        then = max(free - interaction(it, behind, it.v - v), -HARDEST_BRAKING)
+        if then < -_OTHERS_BRAKE:
+            return False
+        cost = now - then
+    return new - old > _GAIN + _POLITENESS * cost
+
+
+@compiled
+def advance(
+    streets: Streets,
+    cars: np.ndarray,
+    users: np.ndarray,
+    accelerations: np.ndarray,
+    gaps: np.ndarray,
+    dt: float,
+    seed: int,
+) -> None:
+    """Moves all vehicles on.
+
+    Args:
+        streets: the lanes.
+        cars: (N,) records `VEHICLE`.
+        users: (P + C, 2) small and large users of ways, see `Permits`.
+        accelerations: (N,) [m/s^2].
+        gaps: (N,) distance to the next ahead [m].
+        dt: the step [s].
+        seed: of the drawn ways.
+    """
+    pieces = streets.pieces
+    for i in range(len(cars)):
+        car = cars[i]
+        v = max(0.0, car.v + accelerations[i] * dt)
+        step = 0.5 * (car.v + v) * dt
+        room = max(0.0, gaps[i] - _LEAST_GAP)
+        if step > room:
+            step, v = room, min(v, room / dt)
+        s = car.s + step
+        while True:
+            piece = pieces[car.path[CURRENT]]
+            left = piece.length - s
+            if left > 0.0:
+                break
+            if not piece.is_way and not car.granted:
+                s, v = piece.length, 0.0
+                break
+            s = -left
+            for column in range(NUM_PIECES - 1):
+                car.path[column] = car.path[column + 1]
+            car.path[NUM_PIECES - 1] = -1
+            if not pieces[car.path[CURRENT]].is_way:
+                car.granted = False
+                choose_way(streets, cars, i, seed)
+        car.s, car.v = s, v
+        rear = s - car.length
+        # A vehicle still before its way keeps the permit it has just got.
+        is_before = car.held == car.path[CURRENT + 1] and car.granted
+        if car.held >= 0 and not (piece.is_way or rear < 0.0 or is_before):
+            users[car.held, int(car.large)] -= 1
+            car.held = -1
+        if car.left_lane >= 0 and rear - car.change_start >= car.change_length:
+            car.left_lane = -1
+
+
+@compiled
+def choose_way(streets: Streets, cars: np.ndarray, i: int, seed: int) -> None:
+    """Draws the next way of the i-th vehicle, which is in a lane."""
+    car = cars[i]
+    lane = streets.pieces[car.path[CURRENT]]
+    car.draws += 1
+    pick = int(uniform(seed, i, car.draws) * lane.after_count)
+    way = streets.after[lane.after_first + min(pick, lane.after_count - 1)]
+    car.path[CURRENT + 1] = way
+    car.path[CURRENT + 2] = streets.after[streets.pieces[way].after_first]
+
+
+@compiled
+def uniform(seed: int, who: int, draw: int) -> float:
+    """Returns the draw-th random number of a road user, from 0 to 1.
+
+    SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the three.
+    """
+    z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15)
+    z += np.uint64(who) * np.uint64(0xD1B54A32D192ED03)
+    z += np.uint64(draw) * np.uint64(0x8CB92BA72F3D8DD7)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    return float(z >> np.uint64(11)) / 9007199254740992.0

@@ -1,0 +1,502 @@
+"""Walkers on walkways: the social force model.
+
+Helbing, Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51
+(1995): walkers relax to their wanted speed, and keep away from each other and
+from the edges of their walkway.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+from cns_drake.traffic.lane_graph import SPACING, Walkway
+from cns_drake.traffic.overlaps import boxes_overlap
+from cns_drake.traffic.right_of_way import WALK_GROUP, Permits
+from cns_drake.traffic.vehicles import uniform
+
+# The model's wanted speed, and its spread [m/s]; relaxation [s]; strength
+# [m/s^2] and reach [m] of the repulsion by walkers, and by edges.
+_SPEED, _SPREAD = 1.34, 0.26
+_RELAXATION = 0.5
+_STRENGTH, _REACH = 7.0, 0.3
+_EDGE_STRENGTH, _EDGE_REACH = 10.0, 0.2
+# Greatest speed, as a multiple of the wanted speed.
+_HURRY = 1.3
+# The least distance of two walkers' middles, and the radius of neighbours [m].
+_APART = 0.95
+_NEAR = 4.0
+# Boxes of walkers with swinging limbs [m], and least space between them [m].
+WALKER_LENGTH, WALKER_WIDTH, _GAP = 0.84, 0.6, 0.15
+# A walker steps aside for one ahead with this acceleration [m/s^2], unless the
+# other is at least this far to the side [m].
+_ASIDE, _PASSING = 4.0, 0.85
+_TO_THE_RIGHT = 0.3
+# Distance ahead of a walker's aim, in points of a walkway.
+_AHEAD = int(2.0 / SPACING)
+# A walker turns to its direction of motion at this rate [rad/s], if it is at
+# least this fast [m/s].
+_TURN_RATE, _GOING = 2.5, 0.2
+# Distance of a waiting walker from the crossing [m].
+_AT_NODE = 1.0
+# Greatest speed of the return to a walkway [m/s].
+_BACK = 0.6
+# A walker turns back after being blocked for this time [s].
+_PATIENCE = 4.0
+# Walkers that cross, for each one that goes straight on, if both are possible.
+_CROSSES = 0.25
+# Length of sidewalk for one walker [m].
+_WALKER_SPACE = 3.0
+# Number of places that are drawn before a walker is given up.
+_TRIES = 200
+
+_WALKER = np.dtype(
+    [
+        ("xy", float, 2),  # [m]
+        ("velocity", float, 2),  # [m/s]
+        ("yaw", float),  # Heading [rad].
+        ("phase", float),  # Place in the gait [rad].
+        ("path", int),  # Number of the walkway, in walking direction.
+        ("at", int),  # Row of its points that the walker has reached.
+        ("speed", float),  # Wanted [m/s].
+        ("aside", float),  # Offset to the right, part of the half width.
+        ("next_path", int),  # -1 if not drawn yet.
+        ("stuck", float),  # Time for which the walker has been blocked [s].
+        ("draws", int),  # Number of random numbers drawn.
+    ]
+)
+# A walkway in one of its directions; that back is its number ^ 1.
+_PATH = np.dtype(
+    [
+        ("first", int),  # Row of its first point.
+        ("num_points", int),
+        ("half_width", float),  # [m]
+        ("crossing", int),  # Number of the crossing, -1 for none.
+        ("node", int),  # The place where it ends.
+    ]
+)
+
+
+class Paths(NamedTuple):
+    """W walkways in both of their directions.
+
+    Attributes:
+        paths: (2 W,) records `_PATH`.
+        points: (M, 3) in walking direction [m].
+        tangents: (M, 2) unit vectors from each point to the next; that of the
+            last point of a path is the one before.
+    """
+
+    paths: np.ndarray
+    points: np.ndarray
+    tangents: np.ndarray
+
+
+def room_for_walkers(walkways: Sequence[Walkway]) -> int:
+    """Returns the number of walkers for whom sidewalks have room."""
+    length = sum(
+        np.linalg.norm(np.diff(way.points, axis=0), axis=1).sum()
+        for way in walkways
+        if way.crossing < 0
+    )
+    return int(length // _WALKER_SPACE)
+
+
+def gait_rate(speed: np.ndarray) -> np.ndarray:
+    """Returns the rates of a gait's phase at some speeds [rad/s].
+
+    A stride, of two steps, is as long as 0.7 s of a walk at that speed and
+    0.4 m more.
+    """
+    return 2.0 * np.pi * speed / (0.7 * speed + 0.4)
+
+
+class Crowd:
+    """All walkers while they are planned.
+
+    Attributes:
+        walkers: (N,) records; fewer than wanted if there is no room for all.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        walkways: Sequence[Walkway],
+        permits: Permits,
+        rng: np.random.Generator,
+    ):
+        """Puts walkers onto walkways, except crossings.
+
+        Args:
+            count: wanted number.
+            walkways: where they may go.
+            permits: of the crossings.
+            rng: draws the places.
+        """
+        self._permits = permits
+        num_pieces = len(permits.users) - len(permits.crossings)
+        self._users = permits.users[num_pieces:, 0]
+        self._paths = _make_paths(walkways)
+        # Place -> the paths that begin there.
+        self._after: dict[int, list[int]] = {}
+        for k, way in enumerate(walkways):
+            self._after.setdefault(way.start, []).append(2 * k)
+            if way.end != way.start:
+                self._after.setdefault(way.end, []).append(2 * k + 1)
+        self.walkers = _place_walkers(count, walkways, rng)
+
+    def step(self, t: float, dt: float, seed: int) -> None:
+        """Moves all walkers on.
+
+        Args:
+            t, dt: time and step [s].
+            seed: of the ways that are drawn.
+        """
+        crossings, walkers = self._permits.crossings, self.walkers
+        opened = crossings["opened"]
+        begun = (opened >= 0.0) & (opened + WALK_GROUP <= t)
+        # The placeholder's permit ends when the group begins to walk.
+        self._users[begun] -= 1
+        opened[begun] = -np.inf
+        crossings["closed"][begun] = t
+        is_waiting = np.zeros(len(walkers), bool)
+        waited = np.zeros(len(crossings), bool)
+        for i in np.flatnonzero(self._follow_paths()).tolist():
+            is_waiting[i] = not self._go_on(i, t, seed, waited)
+        crossings["waits"][~waited] = np.inf
+        force = _forces(self._paths, walkers, is_waiting)
+        _move(self._paths, walkers, force, dt)
+        x, y = walkers["velocity"].T
+        speed = np.sqrt(x * x + y * y)
+        walkers["phase"] += gait_rate(speed) * dt
+        is_stuck = (speed < _GOING) & ~is_waiting
+        walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + dt, 0.0)
+        paths = self._paths.paths[walkers["path"]]
+        back = (walkers["stuck"] > _PATIENCE) & (paths["crossing"] < 0)
+        walkers["stuck"][back] = 0.0
+        walkers["path"][back] ^= 1
+        at = paths["num_points"] - 2 - walkers["at"]
+        walkers["at"][back] = np.maximum(at, 0)[back]
+        walkers["next_path"][back] = -1
+
+    def _follow_paths(self) -> np.ndarray:
+        """Notes the points that walkers pass; returns who is near the end."""
+        walkers, (_, points, tangents) = self.walkers, self._paths
+        paths = self._paths.paths[walkers["path"]]
+
+        def ahead(rows: np.ndarray) -> np.ndarray:
+            x, y = (points[rows, :2] - walkers["xy"]).T
+            along = tangents[paths["first"] + walkers["at"]]
+            return x * along[:, 0] + y * along[:, 1]
+
+        while True:
+            passed = -ahead(paths["first"] + walkers["at"]) >= SPACING
+            passed &= walkers["at"] < paths["num_points"] - 2
+            if not passed.any():
+                break
+            walkers["at"] += passed
+        last = paths["first"] + paths["num_points"] - 1
+        return (walkers["at"] >= paths["num_points"] - 3) & (
+            ahead(last) < _AT_NODE
+        )
+
+    def _go_on(self, i: int, t: float, seed: int, waited: np.ndarray) -> bool:
+        """Lets a walker begin its next path, unless it has to wait.
+
+        Args:
+            i: number of the walker.
+            t: time [s].
+            seed: of the draw.
+            waited: (C,) bool; notes a crossing that somebody asks for.
+
+        Returns:
+            Whether it has begun.
+        """
+        walkers, paths = self.walkers, self._paths.paths
+        if walkers["next_path"][i] < 0:
+            walkers["next_path"][i] = self._draw_next(i, seed)
+        after = int(walkers["next_path"][i])
+        crossings = self._permits.crossings
+        c = paths["crossing"][after]
+        if c >= 0 and self._users[c] == 0:
+            crossings["waits"][c] = min(crossings["waits"][c], t)
+            waited[c] = True
+            return False
+        if c >= 0 and t >= crossings["opened"][c] + WALK_GROUP:
+            return False
+        for path, change in ((walkers["path"][i], -1), (after, 1)):
+            c = paths["crossing"][path]
+            if c >= 0:
+                self._users[c] += change
+                crossings["closed"][c] = t
+        walkers["path"][i], walkers["at"][i] = after, 0
+        walkers["next_path"][i] = -1
+        return True
+
+    def _draw_next(self, i: int, seed: int) -> int:
+        """Draws the next path; that back only if there is no other."""
+        path = int(self.walkers["path"][i])
+        choices = self._after[int(self._paths.paths["node"][path])]
+        if len(choices) == 1:
+            return path ^ 1
+        self.walkers["draws"][i] += 1
+        # Few walkers cross, none goes back.
+        likings = [
+            0.0
+            if other // 2 == path // 2
+            else (1.0 if self._paths.paths["crossing"][other] < 0 else _CROSSES)
+            for other in choices
+        ]
+        pick = uniform(seed, i, self.walkers["draws"][i]) * sum(likings)
+        below = np.flatnonzero(pick < np.cumsum(likings))
+        other = choices[below[0] if len(below) else -1]
+        return path ^ 1 if other // 2 == path // 2 else other
+
+    def poses(self, walkers: np.ndarray) -> np.ndarray:
+        """Returns the poses of walkers.
+
+        Args:
+            walkers: (...) records, such as those of several times.
+
+        Returns:
+            (..., 5): x, y, z on the ground [m], yaw, phase of the gait [rad].
+        """
+        paths, points, _ = self._paths
+        path = paths[walkers["path"]]
+        row = path["first"] + np.minimum(walkers["at"], path["num_points"] - 2)
+        here = points[row]
+        x, y, rise = np.moveaxis(points[row + 1] - here, -1, 0)
+        xy = walkers["xy"]
+        back = here[..., :2] - xy
+        share = -(back[..., 0] * x + back[..., 1] * y) / (x * x + y * y)
+        z = here[..., 2] + np.minimum(np.maximum(share, 0.0), 1.0) * rise
+        return np.stack(
+            [xy[..., 0], xy[..., 1], z, walkers["yaw"], walkers["phase"]],
+            axis=-1,
+        )
+
+
+def _make_paths(walkways: Sequence[Walkway]) -> Paths:
+    """Returns the paths along walkways."""
+    paths = np.zeros(2 * len(walkways), _PATH)
+    count = np.repeat([len(way.points) for way in walkways], 2)
+    paths["num_points"] = count
+    paths["first"] = np.cumsum(count) - count
+    paths["half_width"] = np.repeat([way.half_width for way in walkways], 2)
+    paths["crossing"] = np.repeat([way.crossing for way in walkways], 2)
+    paths["node"] = [node for way in walkways for node in (way.end, way.start)]
+    points, tangents = [np.zeros((0, 3))], [np.zeros((0, 2))]
+    for way in walkways:
+        for line in (way.points, way.points[::-1]):
+            x, y = np.diff(line[:, :2], axis=0).T
+            length = np.sqrt(x * x + y * y)
+            along = np.column_stack([x / length, y / length])
+            points.append(line)
+            tangents += [along, along[-1:]]
+    return Paths(paths, np.concatenate(points), np.concatenate(tangents))
+
+
+def _place_walkers(
+    count: int, walkways: Sequence[Walkway], rng: np.random.Generator
+) -> np.ndarray:
+    """Returns the records of walkers at their first places; see `Crowd`."""
+    free = [k for k, way in enumerate(walkways) if way.crossing < 0]
+    sizes = np.array([len(walkways[k].points) for k in free], float)
+    rows: list[tuple[int, int, np.ndarray, float]] = []
+    for _ in range(count if free else 0):
+        for _ in range(_TRIES):
+            way = free[int(rng.choice(len(free), p=sizes / sizes.sum()))]
+            points = walkways[way].points
+            forward = bool(rng.integers(2))
+            at = int(rng.integers(len(points) - 1))
+            line = points if forward else points[::-1]
+            tangent = (line[at + 1] - line[at])[:2]
+            xy = line[at, :2]
+            if all(np.hypot(*(xy - row[2])) > 1.5 * _APART for row in rows):
+                yaw = float(np.arctan2(tangent[1], tangent[0]))
+                rows.append((2 * way + 1 - forward, at, xy, yaw))
+                break
+    walkers = np.zeros(len(rows), _WALKER)
+    for name, values in zip(
+        ("path", "at", "xy", "yaw"), zip(*rows, strict=True), strict=False
+    ):
+        walkers[name] = values
+    number = len(rows)
+    walkers["speed"] = np.clip(rng.normal(_SPEED, _SPREAD, number), 0.6, 2.2)
+    walkers["phase"] = rng.uniform(0.0, 2 * np.pi, number)
+    walkers["aside"] = rng.uniform(0.1, 0.7, number)
+    walkers["next_path"] = -1
+    return walkers
+
+
+@compiled
+def _forces(
+    paths: Paths, walkers: np.ndarray, is_waiting: np.ndarray
+) -> np.ndarray:
+    """Returns the forces on all walkers, as accelerations [m/s^2].
+
+    Args:
+        paths: where they go.
+        walkers: (N,) records.
+        is_waiting: (N,) who waits for a crossing.
+
+    Returns:
+        (N, 2) in the world.
+    """
+    force = np.zeros((len(walkers), 2))
+    for i in range(len(walkers)):
+        one, path = walkers[i], paths.paths[walkers[i].path]
+        here, half = path.first + one.at, path.half_width
+        right = (paths.tangents[here, 1], -paths.tangents[here, 0])
+        wanted_x = wanted_y = 0.0
+        if not is_waiting[i]:
+            target = path.first + min(one.at + _AHEAD, path.num_points - 1)
+            aside = one.aside * half
+            x = paths.points[target, 0] + aside * right[0] - one.xy[0]
+            y = paths.points[target, 1] + aside * right[1] - one.xy[1]
+            distance = max(np.sqrt(x * x + y * y), 1e-6)
+            wanted_x = one.speed * x / distance
+            wanted_y = one.speed * y / distance
+        force[i, 0] += (wanted_x - one.velocity[0]) / _RELAXATION
+        force[i, 1] += (wanted_y - one.velocity[1]) / _RELAXATION
+        across = -(
+            (paths.points[here, 0] - one.xy[0]) * right[0]
+            + (paths.points[here, 1] - one.xy[1]) * right[1]
+        )
+        for side in (-1.0, 1.0):
+            room = half - side * across
+            push = side * _EDGE_STRENGTH * np.exp(-max(room, 0.0) / _EDGE_REACH)
+            force[i, 0] -= push * right[0]
+            force[i, 1] -= push * right[1]
+    for i in range(len(walkers)):
+        for j in range(i):
+            x = walkers[i].xy[0] - walkers[j].xy[0]
+            y = walkers[i].xy[1] - walkers[j].xy[1]
+            square = x * x + y * y
+            if square >= _NEAR**2:
+                continue
+            distance = max(np.sqrt(square), 1e-3)
+            push = _STRENGTH * np.exp(-max(distance - _APART, 0.0) / _REACH)
+            # A little to the right, or two walkers who meet head on would stop.
+            push_x = push * (x - _TO_THE_RIGHT * y) / distance
+            push_y = push * (y + _TO_THE_RIGHT * x) / distance
+            force[i, 0] += push_x
+            force[i, 1] += push_y
+            force[j, 0] -= push_x
+            force[j, 1] -= push_y
+            for k, sign in ((i, -1.0), (j, 1.0)):
+                # The other one's place, in the walker's own frame.
+                c, s = np.cos(walkers[k].yaw), np.sin(walkers[k].yaw)
+                ahead = sign * x * c + sign * y * s
+                aside = sign * y * c - sign * x * s
+                if ahead <= 0.0 or abs(aside) >= _PASSING:
+                    continue
+                push = _ASIDE * (1.0 - distance / _NEAR)
+                push *= 1.0 - abs(aside) / _PASSING
+                # Away from the other one; to the right if it is straight ahead.
+                side = -1.0 if aside >= -0.05 else 1.0
+                force[k, 0] -= side * push * s
+                force[k, 1] += side * push * c
+    return force
+
+
+@compiled
+def _move(
+    paths: Paths, walkers: np.ndarray, force: np.ndarray, dt: float
+) -> None:
+    """Moves each walker as far as its way is free.
+
+    All begin apart, and no step makes two overlap.
+
+    Args:
+        paths: where they go.
+        walkers: (N,) records.
+        force: (N, 2) accelerations [m/s^2].
+        dt: the step [s].
+    """
+    for i in range(len(walkers)):
+        one = walkers[i]
+        vx = one.velocity[0] + force[i, 0] * dt
+        vy = one.velocity[1] + force[i, 1] * dt
+        speed, fastest = np.sqrt(vx * vx + vy * vy), _HURRY * one.speed
+        if speed > fastest:
+            vx *= fastest / speed
+            vy *= fastest / speed
+        x, y, yaw = one.xy[0], one.xy[1], one.yaw
+        if np.sqrt(vx * vx + vy * vy) > _GOING:
+            turn = (np.arctan2(vy, vx) - yaw + np.pi) % (2 * np.pi) - np.pi
+            yaw += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
+        new_x, new_y = _kept_on_path(
+            paths, one, x + vx * dt, y + vy * dt, _BACK * dt
+        )
+        if _is_free(walkers, i, new_x, new_y, yaw):
+            one.yaw = yaw
+        elif not _is_free(walkers, i, new_x, new_y, one.yaw):
+            # Try the lateral part of the step only, or stay.
+            c, s = np.cos(one.yaw), np.sin(one.yaw)
+            aside = (new_y - y) * c - (new_x - x) * s
+            new_x, new_y = x - aside * s, y + aside * c
+            if not _is_free(walkers, i, new_x, new_y, one.yaw):
+                new_x, new_y = x, y
+        one.xy[0], one.xy[1] = new_x, new_y
+        one.velocity[0], one.velocity[1] = (new_x - x) / dt, (new_y - y) / dt
+
+
+@compiled
+def _kept_on_path(
+    paths: Paths, walker: Any, x: float, y: float, most: float
+) -> tuple[float, float]:
+    """Returns a walker's place moved back to its path, by at most some metres.
+
+    Args:
+        paths: all of them.
+        walker: its record.
+        x, y: the place [m].
+        most: the greatest move [m].
+    """
+    path, points = paths.paths[walker.path], paths.points
+    best, nearest = np.inf, 0
+    for at in range(max(walker.at - 3, 0), min(walker.at + 4, path.num_points)):
+        dx, dy = x - points[path.first + at, 0], y - points[path.first + at, 1]
+        distance = dx * dx + dy * dy
+        if distance < best:
+            best, nearest = distance, at
+    row, half = path.first + nearest, path.half_width
+    tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
+    dx, dy = points[row, 0] - x, points[row, 1] - y
+    along = -(dx * tx + dy * ty)
+    across = -(dx * ty + dy * -tx)
+    if nearest == path.num_points - 1:
+        along = min(along, half)
+    if nearest == 0:
+        along = max(along, -_AT_NODE - half)
+    across = min(max(across, -half), half)
+    dx = points[row, 0] + along * tx + across * ty - x
+    dy = points[row, 1] + along * ty + across * -tx - y
+    distance = np.sqrt(dx * dx + dy * dy)
+    if distance > most:
+        dx *= most / distance
+        dy *= most / distance
+    return x + dx, y + dy
+
+
+@compiled
+def _is_free(
+    walkers: np.ndarray, i: int, x: float, y: float, yaw: float
+) -> bool:
+    """Returns whether the i-th walker's box would be free at a place."""
+    half = np.array([WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2])
+    reach = 4.0 * (half[0] ** 2 + half[1] ** 2)
+    a, b = np.array([x, y, yaw]), np.zeros(3)
+    for j in range(len(walkers)):
+        other = walkers[j]
+        dx, dy = other.xy[0] - x, other.xy[1] - y
+        if j == i or dx * dx + dy * dy > reach:
+            continue
+        b[0], b[1], b[2] = other.xy[0], other.xy[1], other.yaw
+        if boxes_overlap(a, b, half, half):
+            return False
+    return True
