@@ -1,17 +1,19 @@
 """Places along a drive, and the clouds seen there.
 
 - Places d metres apart: frame i is a place when the length of the path so far
-first reaches a multiple of d. The first frame is a place. - Points are limited
-to a range, 100 m in the paper: each of x, y, z in the frame of the sensor.
+  first reaches a multiple of d. The first frame is a place.
+- Points are limited to a range, 100 m in the paper: each of x, y, z in the
+  frame of the sensor.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from cns_drake.base import points as clouds
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
-from evaluation.drives.cropped_cloud import CroppedCloud
+from cns_drake.base.errors import InputError
 
 
 def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
@@ -75,10 +77,72 @@ def gather(
     end = min(frame - num_before + num_scans, len(drive))
     X_WS = drive.X_WS
     X_S0W = poses.inverse(X_WS[frame])
-    cloud = CroppedCloud(max_range, fields, drive.name)
-    for index in range(first, end):
-        scan = drive.scan(index)
-        # Products with an identity would be rounded.
-        X_S0S = None if index == frame else X_S0W @ X_WS[index]
-        cloud.add(scan, X_S0S, num_more=end - 1 - index)
-    return cloud.finish()
+    return np.concatenate(
+        [
+            cropped(
+                drive.scan(index),
+                max_range,
+                # Products with an identity would be rounded.
+                None if index == frame else X_S0W @ X_WS[index],
+                fields,
+                drive.name,
+            )
+            for index in range(first, end)
+        ]
+    )
+
+
+def cropped(
+    scan: np.ndarray,
+    max_range: float,
+    X_FS: np.ndarray | None = None,
+    fields: tuple[str, ...] = (),
+    source: str = "",
+) -> np.ndarray:
+    """Returns the points of a scan that are finite and within range.
+
+    Each product and each sum is rounded, as on every processor: a matrix
+    product would be rounded as the processor likes.
+
+    Args:
+        scan: structured array (N,) in the frame S of a sensor.
+        max_range: see `within_range`, in the frame F of the cloud.
+        X_FS: (4, 4); identity if left out.
+        fields: of the points, beside their coordinates.
+        source: name of the drive, for messages.
+
+    Returns:
+        (K, 3) float64 in F; with fields, a structured array (K,) of float64
+        x, y, z and the fields.
+
+    Raises:
+        InputError: if the scan lacks a field.
+    """
+    known = scan.dtype.names or ()
+    for name in fields:
+        if name not in known:
+            raise InputError(
+                f"{source}: its points have no field {name!r} (they have"
+                f" {', '.join(known)})"
+            )
+    p_F = clouds.xyz(scan)
+    if X_FS is not None:
+        x, y, z = p_F.T
+        with np.errstate(invalid="ignore"):
+            p_F = np.stack(
+                [a * x + b * y + c * z + d for a, b, c, d in X_FS[:3]], axis=1
+            )
+    kept = within_range(p_F, max_range)
+    p_F = p_F.compress(kept, axis=0)
+    if not fields:
+        return p_F
+    cloud = np.empty(
+        len(p_F),
+        [(axis, np.float64) for axis in "xyz"]
+        + [(name, scan.dtype[name]) for name in fields],
+    )
+    for axis, coordinates in zip("xyz", p_F.T, strict=True):
+        cloud[axis] = coordinates
+    for name in fields:
+        cloud[name] = scan[name].compress(kept, axis=0)
+    return cloud

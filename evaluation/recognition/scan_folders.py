@@ -12,7 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import is_cloud, read_cloud
-from evaluation.drives.cropped_cloud import CroppedCloud
+from evaluation.drives.sampling import cropped
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
@@ -94,14 +94,15 @@ def _read(path: Path, method: Method) -> tuple[np.ndarray, int]:
     scan = read_cloud(path)
     points = point_arrays.xyz(scan)
     num_finite = int(np.isfinite(points).all(axis=1).sum())
-    cloud = CroppedCloud(
-        RetrievalProtocol.max_range, method.point_fields, str(path)
+    cloud = cropped(
+        scan,
+        RetrievalProtocol.max_range,
+        fields=method.point_fields,
+        source=str(path),
     )
-    cloud.add(scan)
-    cropped = cloud.finish()
-    if len(cropped) == 0:
+    if len(cloud) == 0:
         raise InputError(f"{path}: no finite point within range")
-    return cropped, len(points) - num_finite
+    return cloud, len(points) - num_finite
 
 
 def _scan_files(folder: Path) -> list[Path]:

@@ -1,18 +1,9 @@
-from fractions import Fraction
-
 from helpers.drive_files import make_scan, yaw_pose
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.drives.cropped_cloud import CroppedCloud
-
-
-def cropped(scans, X_FSs, max_range=50.0, fields=()):
-    cloud = CroppedCloud(max_range, fields, "drive")
-    for scan, X_FS in zip(scans, X_FSs, strict=True):
-        cloud.add(scan, X_FS, num_more=1)
-    return cloud.finish()
+from evaluation.drives.sampling import cropped
 
 
 def random_scan(number, seed=3):
@@ -28,23 +19,16 @@ def tilted_pose():
     return X
 
 
-def rounded_once(a, b, c):
-    return float(Fraction(a) * Fraction(b) + Fraction(c))
-
-
-def test_points_are_moved_with_fused_multiply_adds():
+def test_each_product_and_each_sum_is_rounded():
+    """Python's floats are rounded so, on every processor."""
     scan, X = random_scan(200), tilted_pose()
     expected = []
-    for point in zip(*(scan[axis].tolist() for axis in "xyz"), strict=True):
-        moved = []
-        for row in X[:3].tolist():
-            total = point[0] * row[0]
-            total = rounded_once(point[1], row[1], total)
-            moved.append(rounded_once(point[2], row[2], total) + row[3])
+    for x, y, z in zip(*(scan[axis].tolist() for axis in "xyz"), strict=True):
+        moved = [a * x + b * y + c * z + d for a, b, c, d in X[:3].tolist()]
         if max(map(abs, moved)) <= 50.0:
             expected.append(moved)
     assert 50 < len(expected) < 150
-    np.testing.assert_array_equal(cropped([scan], [X]), expected)
+    np.testing.assert_array_equal(cropped(scan, 50.0, X), expected)
 
 
 def test_unmoved_points_keep_their_bits():
@@ -59,8 +43,8 @@ def test_unmoved_points_keep_their_bits():
     )
     scan = make_scan(coordinates)
     expected = coordinates.astype(np.float32).astype(float)[[0, 4]]
-    assert cropped([scan], [None]).tobytes() == expected.tobytes()
-    assert len(cropped([scan], [None], max_range=49.0)) == 0
+    assert cropped(scan, 50.0).tobytes() == expected.tobytes()
+    assert len(cropped(scan, 49.0)) == 0
 
 
 def stored_otherwise(scan):
@@ -93,42 +77,33 @@ def stored_otherwise(scan):
 def test_all_ways_of_storing_a_scan_give_the_same_cloud(number, X):
     scan = random_scan(number)
     scan["y"][::7] = np.nan
-    expected = cropped([scan], [X])
+    expected = cropped(scan, 50.0, X)
     assert expected.shape == (len(expected), 3)
     assert len(expected) < max(number, 1)
     for other in stored_otherwise(scan):
-        assert cropped([other], [X]).tobytes() == expected.tobytes()
+        assert cropped(other, 50.0, X).tobytes() == expected.tobytes()
 
 
-def test_longer_and_longer_scans_follow_each_other():
-    scans = [random_scan(n, seed=n) for n in (0, 3, 100, 1000, 20)]
-    poses = [None, tilted_pose(), None, yaw_pose(4.0, 0.0, 0.0, 2.0), None]
-    parts = [cropped([s], [X]) for s, X in zip(scans, poses, strict=True)]
-    np.testing.assert_array_equal(cropped(scans, poses), np.concatenate(parts))
-
-
-def test_fields_stay_with_their_points():
-    scans = [random_scan(300), random_scan(500, seed=4)]
-    poses = [None, tilted_pose()]
-    for scan in scans:
-        # The field shows where in its scan a point was.
-        scan["t"] = np.arange(len(scan))
-    plain = cropped(scans, poses)
-    found = cropped(scans, poses, fields=("t", "ring"))
+@pytest.mark.parametrize("X", [None, tilted_pose()])
+def test_fields_stay_with_their_points(X):
+    scan = random_scan(300)
+    # The field shows where in the scan a point was.
+    scan["t"] = np.arange(len(scan))
+    plain = cropped(scan, 50.0, X)
+    found = cropped(scan, 50.0, X, fields=("t", "ring"))
+    assert 0 < len(found) < len(scan)
     assert found.dtype.names == ("x", "y", "z", "t", "ring")
     np.testing.assert_array_equal(
         np.stack([found[axis] for axis in "xyz"], axis=1), plain
     )
-    second = int(np.flatnonzero(np.diff(found["t"].astype(int)) < 0)[0]) + 1
-    for scan, part in ((scans[0], found[:second]), (scans[1], found[second:])):
-        assert (np.diff(part["t"].astype(int)) > 0).all()
-        np.testing.assert_array_equal(part["ring"], scan["ring"][part["t"]])
-    kept = scans[0][found["t"][:second]]
-    np.testing.assert_array_equal(found["x"][:second], kept["x"])
-    is_near = [np.abs(scans[0][axis]) <= 50.0 for axis in "xyz"]
-    assert second == np.logical_and.reduce(is_near).sum()
+    assert (np.diff(found["t"].astype(int)) > 0).all()
+    np.testing.assert_array_equal(found["ring"], scan["ring"][found["t"]])
+    for t, point in zip(found["t"], plain, strict=True):
+        np.testing.assert_array_equal(
+            cropped(scan[t : t + 1], 50.0, X)[0], point
+        )
 
 
 def test_a_field_that_a_scan_lacks():
     with pytest.raises(InputError, match=r"^drive: .* no field 'echo' .*x, y"):
-        cropped([random_scan(3)], [None], fields=("echo",))
+        cropped(random_scan(3), 50.0, None, ("echo",), "drive")
