@@ -40,8 +40,10 @@ def overlap(
         from cns_drake.scenarios.scenario_loading import load_scenario
         from cns_drake.simulation.simulated_drive import DriveSimulation
         from cns_drake.studies.exact_overlap import exact_overlaps
-        from evaluation.recognition.overlap_table import write_overlaps
-        from evaluation.recognition.overlap_truth import compared_frames
+        from evaluation.recognition.overlap_truth import (
+            compared_frames,
+            write_overlaps,
+        )
 
     protocol = RetrievalProtocol(
         query_spacing=query_spacing,

@@ -2,10 +2,10 @@
 
 from evaluation.alignment.align import (
     Alignment,
+    AlignmentReport,
     When,
     align,
     in_one_world,
 )
-from evaluation.alignment.alignment_report import AlignmentReport
 
 __all__ = ["Alignment", "AlignmentReport", "When", "align", "in_one_world"]

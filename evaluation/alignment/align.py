@@ -15,7 +15,7 @@ loops agree on one, else a pose
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 import numpy as np
@@ -24,29 +24,26 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive, check_same_map
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from evaluation.alignment.alignment_report import AlignmentReport
 from evaluation.alignment.anchor_search import (
+    agreeing,
     find_candidates,
     find_guesses,
-    upright,
-)
-from evaluation.alignment.anchoring import (
-    agreeing,
     fit_anchor,
     fit_bent,
+    upright,
 )
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
     evenly,
+    loop_errors,
 )
-from evaluation.alignment.loops import loop_errors
 from evaluation.alignment.straightening import (
     Straightened,
     make_consistent,
 )
 from evaluation.alignment.submaps import Submaps
-from evaluation.drives.moved import MovedDrive
+from evaluation.drives.drive_views import MovedDrive
 
 When = Literal["auto", "always", "never"]
 
@@ -63,6 +60,67 @@ _ROUNDS = 3
 _DRIFT = 0.3
 # The ground of a world that is off zero by less is left there [m].
 _GROUND_TOLERANCE = 0.25
+
+
+@dataclass(frozen=True)
+class AlignmentReport:
+    """The alignment of two drives.
+
+    Attributes:
+        held: name of the drive that gives the world.
+        moved: name of the other.
+        frames: names of the original worlds of both.
+        guess: source of the first guess.
+        candidates: pairs of places that look alike; None if not needed.
+        attempts: registrations tried.
+        loops: registrations that fit.
+        inliers: loops that agree with the result.
+        distance_median: between inliers and result [m].
+        distance_95: 95 % of the inliers are nearer [m].
+        angle_median_deg: between inliers and result.
+        model: "anchor" for one rigid pose, "pose graph" for a bent drive.
+        move: of the source's middle frame, along x, y, z [m].
+        turn_deg: of that frame about the vertical.
+        bend: greatest difference of another frame's move from the middle one's
+            [m].
+        straightened: disagreement of the drives with themselves before they
+            were straightened: upper quartile over their loops [m]; 0 if not
+            needed.
+        ground: height that was subtracted from both [m].
+    """
+
+    held: str
+    moved: str
+    frames: tuple[str, str]
+    guess: str
+    candidates: int | None
+    attempts: int
+    loops: int
+    inliers: int
+    distance_median: float
+    distance_95: float
+    angle_median_deg: float
+    model: str
+    move: tuple[float, float, float]
+    turn_deg: float
+    bend: float
+    straightened: tuple[float, float]
+    ground: float
+
+    def to_json(self) -> dict:
+        """Returns all numbers."""
+        return asdict(self)
+
+    def to_text(self) -> str:
+        """Returns one line for the user."""
+        return (
+            f"{self.moved} (poses in {self.frames[1]!r}) aligned to"
+            f" {self.held} (in {self.frames[0]!r}): {self.inliers} of"
+            f" {self.loops} loops agree ({self.attempts} tried), median"
+            f" {self.distance_median:.2f} m and"
+            f" {self.angle_median_deg:.2f} deg off; {self.model}, first guess"
+            f" from {self.guess}"
+        )
 
 
 @dataclass(frozen=True)

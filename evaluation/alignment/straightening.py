@@ -12,11 +12,10 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track
-from evaluation.alignment.anchoring import straighten
-from evaluation.alignment.loop_search import find_self_loops
-from evaluation.alignment.loops import loop_errors
+from evaluation.alignment.anchor_search import straighten
+from evaluation.alignment.loop_search import find_self_loops, loop_errors
 from evaluation.alignment.submaps import Submaps
-from evaluation.drives.moved import MovedDrive
+from evaluation.drives.drive_views import MovedDrive
 
 # Number of tried pairs; number that must fit, so that a chance fit bends no
 # drive; and number of rounds, if the drive has drifted.

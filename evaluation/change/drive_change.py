@@ -7,6 +7,7 @@ coverage-masked one).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -40,6 +41,7 @@ from evaluation.maps.voxel_maps import (
 
 if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport, When
+
 
 # Greatest distance of two drives on one route [m]; lanes are 3.5 m wide.
 _SAME_ROUTE = 1.0
@@ -309,3 +311,24 @@ def _both(source: int, target: int) -> dict:
 
 def _number(value: float) -> float | None:
     return None if math.isnan(value) else value
+
+
+@dataclass(frozen=True)
+class ChangeResult:
+    """The change between two stages of a map."""
+
+    map_name: str
+    stages: tuple[str, str]
+    report: ChangeReport
+
+
+def symmetric_changes(
+    changes: Iterable[ChangeResult],
+) -> dict[tuple[str, str, str], float]:
+    """Returns (map, stage, stage) -> TCR_sym, in both orders."""
+    values = {}
+    for result in changes:
+        value = result.report.change.symmetric
+        for first, second in (result.stages, result.stages[::-1]):
+            values[result.map_name, first, second] = value
+    return values

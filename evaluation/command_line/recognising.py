@@ -94,11 +94,11 @@ def pr(
     from evaluation.alignment import in_one_world
     from evaluation.drives import open_drive
     from evaluation.recognition import place_recognition
-    from evaluation.recognition.overlap_table import (
+    from evaluation.recognition.overlap_truth import (
+        compared_frames,
         read_overlaps,
         write_overlaps,
     )
-    from evaluation.recognition.overlap_truth import compared_frames
 
     protocol = replace(protocol, overlap=overlap_of(truth))
     for option, file in (

@@ -15,7 +15,6 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import utm
-from evaluation.drives.pose_table import read_quaternions
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -23,6 +22,7 @@ from evaluation.drives.scan_files import (
     list_stamped,
     read_packed,
 )
+from evaluation.drives.text_tables import read_quaternions
 
 _SCANS = "LiDAR"
 _POSES = "LiDAR_GT"

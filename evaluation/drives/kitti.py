@@ -36,7 +36,6 @@ from cns_drake.base.drives.drive import index_instances, read_scenario
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
-from evaluation.drives.pose_table import pose_matrices
 from evaluation.drives.scan_files import (
     FileDrive,
     read_packed,
@@ -44,6 +43,7 @@ from evaluation.drives.scan_files import (
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,
+    pose_matrices,
     read_numbers,
 )
 

@@ -17,13 +17,13 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from evaluation.drives import utm
-from evaluation.drives.pose_table import read_matrices
 from evaluation.drives.scan_files import (
     FileDrive,
     keep_spanned,
     list_stamped,
     read_packed,
 )
+from evaluation.drives.text_tables import read_matrices
 
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")

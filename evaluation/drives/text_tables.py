@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 import io
 from pathlib import Path
@@ -9,12 +10,16 @@ import warnings
 
 import numpy as np
 
+from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 
 _NS_PER_S = 1_000_000_000
 # Enough for hours of an IMU [bytes].
 _TABLE_LIMIT_BYTES = 1 << 26
+# Greatest error of a rotation matrix or quaternion: that of texts with four
+# digits.
+_ROTATION_TOLERANCE = 1e-3
 
 
 def read_stamped_rows(
@@ -175,3 +180,170 @@ def _to_ns(text: str, unit_ns: int) -> int:
     if not -(2**63) <= stamp_ns < 2**63:
         raise ValueError(f"{text!r} is no time")
     return stamp_ns
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Poses at increasing times.
+
+    Attributes:
+        path: the file it comes from, for messages.
+        stamps_ns: (N,) int64 [ns], strictly increasing.
+        X_WB: (N, 4, 4) float64.
+    """
+
+    path: Path
+    stamps_ns: np.ndarray
+    X_WB: np.ndarray
+
+    def interpolate(
+        self, stamps_ns: np.ndarray, longest_gap_ns: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns poses between those of the table (SLERP and linear).
+
+        Args:
+            stamps_ns: (M,) int64 times of the wanted poses [ns].
+            longest_gap_ns: greatest time between two poses that are
+                interpolated [ns].
+
+        Returns:
+            (K, 4, 4) poses at those times that the table spans; (M,) bool,
+            which these are.
+
+        Raises:
+            InputError: if it spans none, or a time lies in a longer gap.
+        """
+        own = self.stamps_ns
+        spanned = (stamps_ns >= own[0]) & (stamps_ns <= own[-1])
+        if not spanned.any():
+            raise InputError(
+                f"{self.path}: time: no pose for any scan: the poses span"
+                f" {own[0]} to {own[-1]} ns, the scans {stamps_ns[0]} to"
+                f" {stamps_ns[-1]} ns"
+            )
+        wanted = stamps_ns[spanned]
+        after = np.searchsorted(own, wanted)
+        exact = own[after] == wanted
+        before = np.where(exact, after, after - 1)
+        gaps = own[after] - own[before]
+        if (gaps > longest_gap_ns).any():
+            worst = int(gaps.argmax())
+            raise InputError(
+                f"{self.path}: time: no pose for the scan at"
+                f" {wanted[worst]} ns: nothing for {gaps[worst] * 1e-9:.2f} s"
+            )
+        # Differences of int64 are exact, and small enough for a double.
+        fraction = (wanted - own[before]) / np.where(exact, 1, gaps)
+        return (
+            poses.interpolate(self.X_WB[before], self.X_WB[after], fraction),
+            spanned,
+        )
+
+    def at(self, stamps_ns: np.ndarray, tolerance_ns: int) -> np.ndarray:
+        """Returns the poses with these times, without interpolation.
+
+        Args:
+            stamps_ns: (M,) int64 [ns].
+            tolerance_ns: greatest difference of two equal times [ns].
+
+        Returns:
+            (M, 4, 4).
+
+        Raises:
+            InputError: if there is none for one of the times.
+        """
+        own = self.stamps_ns
+        after = np.clip(np.searchsorted(own, stamps_ns), 0, len(own) - 1)
+        before = np.maximum(after - 1, 0)
+        off_after = np.abs(own[after] - stamps_ns)
+        off_before = np.abs(own[before] - stamps_ns)
+        nearest = np.where(off_before < off_after, before, after)
+        missing = np.minimum(off_before, off_after) > tolerance_ns
+        if missing.any():
+            first = int(np.flatnonzero(missing)[0])
+            raise InputError(
+                f"{self.path}: time: no pose for the scan at"
+                f" {stamps_ns[first]} ns ({missing.sum()} of {len(missing)}"
+                " scans have none)"
+            )
+        return self.X_WB[nearest]
+
+
+def read_matrices(path: Path, separator: str | None) -> Trajectory:
+    """Reads rows of a time and the upper 3 x 4 of a pose, row by row.
+
+    Raises:
+        InputError: if the table does not have that form, a matrix is no
+            rotation, or the poses are out of order.
+    """
+    stamps_ns, values = read_stamped_rows(path, 12, separator)
+    return _in_order(path, stamps_ns, pose_matrices(path, values))
+
+
+def read_quaternions(path: Path, separator: str | None) -> Trajectory:
+    """Reads rows of a time, a position and a quat_xyzw.
+
+    Raises:
+        InputError: like `read_matrices`.
+    """
+    stamps_ns, values = read_stamped_rows(path, 7, separator)
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(values[:, 3:], axis=1)
+    bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)
+    if len(bad):
+        raise InputError(
+            f"{path}: row {bad[0] + 1}: quaternion: of length"
+            f" {lengths[bad[0]]:.4g} instead of 1"
+        )
+    R = poses.rotation_from_quaternion(values[:, 3:])
+    _check_near(path, values[:, :3])
+    return _in_order(path, stamps_ns, poses.make_pose(R, values[:, :3]))
+
+
+def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
+    """Returns poses from rows of twelve numbers: the upper 3 x 4, row by row.
+
+    Args:
+        path: file of the numbers, for messages.
+        values: (N, 12).
+
+    Returns:
+        (N, 4, 4) with the rotations as they are in the text, rounded.
+
+    Raises:
+        InputError: if a number is not finite or a matrix is no rotation.
+    """
+    check_finite(path, values)
+    upper = values.reshape(-1, 3, 4)
+    R = upper[:, :, :3]
+    # Numbers that overflow, and the NaN that they give, are no rotation either.
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        bad = ~((error <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0.0))
+    if bad.any():
+        raise InputError(
+            f"{path}: row {np.flatnonzero(bad)[0] + 1}: no rotation matrix"
+        )
+    _check_near(path, upper[:, :, 3])
+    return poses.make_pose(R, upper[:, :, 3])
+
+
+def _check_near(path: Path, positions: np.ndarray) -> None:
+    far = (np.abs(positions) >= poses.FARTHEST).any(axis=1)
+    if far.any():
+        row = int(far.argmax())
+        raise InputError(
+            f"{path}: row {row + 1}: {np.abs(positions[row]).max():g} m from"
+            " the origin"
+        )
+
+
+def _in_order(
+    path: Path, stamps_ns: np.ndarray, X_WB: np.ndarray
+) -> Trajectory:
+    # Loggers repeat lines; a repeated row does no harm.
+    news = np.ones(len(stamps_ns), dtype=bool)
+    news[1:] = np.diff(stamps_ns) != 0
+    news[1:] |= (np.diff(X_WB, axis=0) != 0.0).any(axis=(1, 2))
+    check_increasing(path, stamps_ns[news], "pose")
+    return Trajectory(path, stamps_ns[news], X_WB[news])

@@ -8,7 +8,7 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track, silent
-from evaluation.drives.drive_view import DriveView
+from evaluation.drives.drive_views import DriveView
 from evaluation.maps.voxel_maps import (
     VOXEL_SIZE,
     VoxelAccumulator,

@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 
 from cns_drake.base.errors import InputError
-from evaluation.maps.thinning import thin
+from evaluation.maps.voxel_maps import thin
 from evaluation.methods.method import Method, MethodConfig, register
 
 # Larger than any number of local maps, and the number of the first query. The

@@ -36,7 +36,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
-from evaluation.maps.thinning import thin
+from evaluation.maps.voxel_maps import thin
 from evaluation.methods.method import Method, MethodConfig, register
 
 # Bounds the memory of an exhaustive comparison.

@@ -16,8 +16,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from cns_drake.base.poses import make_pose
-from evaluation.maps.thinning import thin
-from evaluation.maps.voxel_maps import Z_ORIGIN
+from evaluation.maps.voxel_maps import Z_ORIGIN, thin
 from evaluation.methods.method import Method, MethodConfig, register
 
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from evaluation.change.change_result import ChangeResult, symmetric_changes
+from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.paper import printed_values as printed
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.method_titles import title
 from evaluation.report.reference import Finding
 

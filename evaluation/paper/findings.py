@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.change.change_result import (
+from evaluation.change.drive_change import (
     ChangeResult,
     symmetric_changes,
 )
 from evaluation.paper import printed_values as printed
 from evaluation.recognition.metrics import MODES
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.reference import Finding
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from evaluation.change.change_result import ChangeResult
+from evaluation.change.drive_change import ChangeResult
 from evaluation.paper import printed_values as printed
 from evaluation.paper.aims import aims
 from evaluation.paper.findings import findings
 from evaluation.recognition.metrics import Mode
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.reference import (
     NO_REFERENCE,
     Judgement,

@@ -15,8 +15,8 @@ from functools import cache
 from importlib import resources
 
 from evaluation.recognition.metrics import Mode
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.reference import Published
 
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from evaluation.methods.method import Method
 from evaluation.recognition.description import DescribedDrive
-from evaluation.recognition.ranking import ranking
-from evaluation.recognition.scoring import score_places
+from evaluation.recognition.scoring import ranking, score_places
 
 
 @dataclass(frozen=True)

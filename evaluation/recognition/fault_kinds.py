@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 
 # The kinds in order of precedence: a wrong answer gets the first one that fits.
 FAULT_KINDS = (

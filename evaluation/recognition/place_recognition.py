@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 import math
 
@@ -12,6 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
+    MODES,
     Mode,
     PlaceRecognitionMetrics,
     evaluate,
@@ -216,3 +218,41 @@ def _interval(interval: Interval) -> list[float | None]:
 
 def _number(value: float) -> float | None:
     return None if math.isnan(value) else value
+
+
+@dataclass(frozen=True)
+class RecognitionResult:
+    """The result of a method on two stages of a map.
+
+    Attributes:
+        map_name: of the city.
+        stages: of the database, and of the query.
+        outcome: of the method.
+        metrics: in each mode.
+    """
+
+    map_name: str
+    stages: tuple[str, str]
+    outcome: PlaceRecognition
+    metrics: Mapping[Mode, PlaceRecognitionMetrics]
+
+    @classmethod
+    def of(
+        cls, map_name: str, stages: tuple[str, str], outcome: PlaceRecognition
+    ) -> RecognitionResult:
+        """Returns the result of an outcome, counted in both modes."""
+        return cls(
+            map_name,
+            stages,
+            outcome,
+            {mode: outcome.counting(mode).metrics for mode in MODES},
+        )
+
+    @property
+    def method(self) -> str:
+        return self.outcome.method
+
+    @property
+    def pair(self) -> tuple[str, str, str]:
+        """Map, database, query."""
+        return (self.map_name, *self.stages)

@@ -18,7 +18,6 @@ from evaluation.recognition.description import (
     DescribedDrive,
     describe_drive,
 )
-from evaluation.recognition.gate import gated
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.pose_errors import (
     PoseErrors,
@@ -29,8 +28,7 @@ from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.recognition.ranking import ranking
-from evaluation.recognition.scoring import score_places
+from evaluation.recognition.scoring import gated, ranking, score_places
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.resampling import (
     Interval,
     percentile_interval,

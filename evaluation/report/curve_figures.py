@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.drawing import (
     method_entry,
     method_style,

@@ -10,8 +10,8 @@ from evaluation.recognition.fault_kinds import (
     PairEvidence,
     fault_kinds,
 )
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS, protocol_values
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.method_titles import title
 from evaluation.report.result_tables import by_pair_and_method
 from evaluation.report.tables import Table

@@ -12,13 +12,13 @@ from typing import get_args
 from markupsafe import Markup
 
 from cns_drake.base.files import completing
-from evaluation.change.change_result import (
+from evaluation.change.drive_change import (
     ChangeResult,
     symmetric_changes,
 )
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.survival import Survival
 from evaluation.report.page_data import (
     Illustration,

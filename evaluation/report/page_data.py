@@ -16,7 +16,7 @@ import numpy as np
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.drawing import Legend
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.point_rendering import Picture

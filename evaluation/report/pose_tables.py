@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import (
     PROTOCOL_COLUMNS,
     protocol_values,
 )
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.method_titles import title
 from evaluation.report.result_tables import by_pair_and_method
 from evaluation.report.tables import Table

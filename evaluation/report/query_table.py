@@ -10,11 +10,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import (
     PROTOCOL_COLUMNS,
     protocol_values,
 )
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.tables import Table
 
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from evaluation.change.change_result import ChangeResult
+from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.metrics import Mode
-from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.place_recognition import RecognitionResult
 
 
 @dataclass(frozen=True)

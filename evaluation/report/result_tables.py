@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from evaluation.change.change_result import ChangeResult, symmetric_changes
+from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.metrics import MODES, Mode
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import (
     PROTOCOL_COLUMNS,
     protocol_values,
 )
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.tables import Table, ranked

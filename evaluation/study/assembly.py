@@ -8,17 +8,17 @@ from pathlib import Path
 from urllib.parse import quote
 
 from cns_drake.base.files import completing, make_folder
-from evaluation.change.change_result import (
+from evaluation.change.drive_change import (
     ChangeResult,
     symmetric_changes,
 )
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import PairEvidence
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.survival import Survival
 from evaluation.report import page
 from evaluation.report.cost_table import cost_numbers, cost_table

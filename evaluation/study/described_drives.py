@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter, Step
-from evaluation.drives.recent_scans import RecentScans
+from evaluation.drives.drive_views import RecentScans
 from evaluation.recognition.description import (
     DescribedDrive,
     Role,

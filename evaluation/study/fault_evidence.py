@@ -18,13 +18,13 @@ from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import within_range
 from evaluation.geometry.coinciding import CoincidingPoints
-from evaluation.maps.thinning import thin
+from evaluation.maps.voxel_maps import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
 from evaluation.recognition.fault_kinds import NEARLY, PairEvidence
 from evaluation.recognition.overlap_truth import sampled
+from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base.jobs.step import Reporter
-from evaluation.change.change_result import ChangeResult
-from evaluation.change.drive_change import Surveyed
+from evaluation.change.drive_change import ChangeResult, Surveyed
 from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
-from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.place_recognition import (
+    RecognitionResult,
+    judge_retrieval,
+)
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import PartStep, part_digest, read_part

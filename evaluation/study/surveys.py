@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.jobs.step import Reporter, Step
-from evaluation.drives.moved import MovedDrive
+from evaluation.drives.drive_views import MovedDrive
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice

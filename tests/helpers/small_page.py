@@ -6,10 +6,12 @@ from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import PairEvidence
-from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.place_recognition import (
+    RecognitionResult,
+    judge_retrieval,
+)
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.survival import Survival
 from evaluation.report.cost_table import cost_table

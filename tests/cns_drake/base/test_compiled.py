@@ -13,7 +13,7 @@ _SCRIPT = """
 import numba
 import numpy as np
 before = numba.config.CACHE_DIR
-from evaluation.maps.thinning import thin
+from evaluation.maps.voxel_maps import thin
 assert numba.config.CACHE_DIR == before
 print(len(thin(np.zeros((3, 3)), 1.0)))
 """

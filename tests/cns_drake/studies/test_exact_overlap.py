@@ -15,8 +15,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.exact_overlap import exact_overlaps
-from evaluation.recognition.overlap_table import read_overlaps
-from evaluation.recognition.overlap_truth import overlap_matrix
+from evaluation.recognition.overlap_truth import overlap_matrix, read_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
 
 PROTOCOL = RetrievalProtocol(query_spacing=5.0, place_spacing=5.0)

@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from evaluation.alignment.registration import make_surface, register
-from evaluation.maps.thinning import thin
+from evaluation.maps.voxel_maps import thin
 
 
 def surface(points, reach=40.0):

@@ -10,8 +10,8 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.points import from_xyz
-from evaluation.alignment.anchoring import fit_anchor
-from evaluation.alignment.loops import Loop
+from evaluation.alignment.anchor_search import fit_anchor
+from evaluation.alignment.loop_search import Loop
 from evaluation.alignment.submaps import Submaps
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.points import from_xyz
-from evaluation.maps.thinning import thin
-from evaluation.maps.voxel_maps import voxelise
+from evaluation.maps.voxel_maps import thin, voxelise
 
 
 def test_thin():

@@ -11,14 +11,14 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig, make_method
-from evaluation.recognition.gate import (
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.scoring import (
     NUM_GATED,
     SOFTNESS,
     gate_weight,
     gated,
 )
-from evaluation.recognition.place_recognition import run
-from evaluation.recognition.protocol import RetrievalProtocol
 
 RADIUS = 8.0
 FULL, NONE = (1.0 - SOFTNESS) * RADIUS, (1.0 + SOFTNESS) * RADIUS

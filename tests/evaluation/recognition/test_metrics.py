@@ -6,7 +6,7 @@ import pytest
 
 from evaluation.recognition.metrics import evaluate
 from evaluation.recognition.query_outcomes import judge
-from evaluation.recognition.ranking import ranking
+from evaluation.recognition.scoring import ranking
 
 NAN = np.nan
 

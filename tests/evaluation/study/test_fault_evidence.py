@@ -13,10 +13,12 @@ from evaluation.recognition.fault_kinds import (
     PairEvidence,
     fault_kinds,
 )
-from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.place_recognition import (
+    RecognitionResult,
+    judge_retrieval,
+)
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.report.fault_tables import fault_numbers, fault_table
 from evaluation.study.fault_evidence import find_evidence

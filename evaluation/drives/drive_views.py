@@ -1,0 +1,108 @@
+"""Drives that show another drive otherwise: moved, or with scans kept."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+
+import numpy as np
+
+from cns_drake.base.drives.drive import Drive
+
+
+class DriveView(Drive):
+    """Has the length, times, poses and scenario of another drive."""
+
+    def __init__(self, drive: Drive):
+        """Begins with the other drive.
+
+        Args:
+            drive: the drive.
+        """
+        self.name = drive.name
+        self._drive = drive
+
+    def __len__(self) -> int:
+        return len(self._drive)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._drive.stamps_ns
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._drive.X_WS
+
+    @property
+    def scenario(self) -> Mapping | None:
+        return self._drive.scenario
+
+
+class MovedDrive(DriveView):
+    """The scans of another drive at corrected poses."""
+
+    def __init__(
+        self,
+        drive: Drive,
+        X_WS: np.ndarray,
+        world_frame: str,
+        datum: str | None,
+    ):
+        """Gives a drive other poses.
+
+        Args:
+            drive: of N scans.
+            X_WS: (N, 4, 4).
+            world_frame: name of W.
+            datum: see `Drive.datum`.
+        """
+        super().__init__(drive)
+        self.world_frame = world_frame
+        self._X_WS = X_WS
+        self._datum = datum
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._X_WS
+
+    def scan(self, index: int) -> np.ndarray:
+        return self._drive.scan(index)
+
+    @property
+    def datum(self) -> str | None:
+        return self._datum
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self._drive.notes
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        return self._drive.instances
+
+
+class RecentScans(DriveView):
+    """A drive that reads each scan once.
+
+    This holds for a program that reads scans in increasing order, or goes back
+    by at most as many scans as are kept.
+    """
+
+    def __init__(self, drive: Drive, kept: int):
+        """Starts without a scan in memory.
+
+        Args:
+            drive: the drive.
+            kept: number of the last scans that stay in memory.
+        """
+        super().__init__(drive)
+        self.world_frame = drive.world_frame
+        self._kept = kept
+        self._recent: OrderedDict[int, np.ndarray] = OrderedDict()
+
+    def scan(self, index: int) -> np.ndarray:
+        if index not in self._recent:
+            self._recent[index] = self._drive.scan(index)
+            if len(self._recent) > self._kept:
+                self._recent.popitem(last=False)
+        return self._recent[index]
