@@ -1,6 +1,7 @@
-"""The building stock: parametric buildings, one archetype a module; landmarks.
+"""The building stock: parametric buildings, and landmarks.
 
-`sample` draws an archetype's parameters and builds it:
+`archetypes.yaml` describes the sizes and colours of each archetype. Its class,
+of the same name, draws the other parameters and builds it; `sample` does both:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -9,26 +10,61 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from importlib import import_module
-import pkgutil
+from pathlib import Path
+import re
 
 import numpy as np
 from shapely.geometry import Polygon
+import yaml
 
-from cns_drake.city.buildings import blocks, houses, public, shops, towers
-from cns_drake.city.buildings.archetypes import ARCHETYPES
-from cns_drake.city.buildings.landmarks import LANDMARKS, add_landmark
-from cns_drake.city.facades.assembly import Assembly, Dice, Site
+from cns_drake.city.buildings import (
+    family_houses,
+    flats,
+    halls,
+    markets,
+    office_towers,
+    open_roofs,
+    public_buildings,
+    row_houses,
+    slabs,
+    street_blocks,
+    towers,
+)
+from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
+from cns_drake.city.facades.assembly import Archetype, Building, Site
 from cns_drake.city.geometry.structures import Model
 
 __all__ = ["ARCHETYPES", "sample"]
 
-# Name -> module, which draws the `Parameters` of its archetype and builds it.
-_MODULES = {
-    module.name: import_module(f"{room.__name__}.{module.name}")
-    for room in (blocks, houses, public, shops, towers)
-    for module in pkgutil.iter_modules(room.__path__)
+# Name -> description.
+ARCHETYPES = {
+    name: Archetype(name=name, **values)
+    for name, values in yaml.safe_load(
+        Path(__file__).with_name("archetypes.yaml").read_text(encoding="utf-8")
+    ).items()
+    if name != "palettes"
 }
+# Name -> class, such as `brick_block` -> `BrickBlock`.
+BUILDERS: dict[str, type[Building]] = {
+    re.sub("(?<!^)(?=[A-Z])", "_", one.__name__).lower(): one
+    for module in (
+        family_houses,
+        flats,
+        halls,
+        markets,
+        office_towers,
+        open_roofs,
+        public_buildings,
+        row_houses,
+        slabs,
+        street_blocks,
+        towers,
+    )
+    for one in vars(module).values()
+    if isinstance(one, type)
+    and issubclass(one, Building)
+    and one is not Building
+} | dict.fromkeys(LANDMARKS, Landmark)
 
 
 def sample(
@@ -71,12 +107,6 @@ def sample(
     site = Site(footprint, name, frozenset(blind_edges))
     if not kind.party_walls:
         site = site.detached(kind.overhang)
-    if archetype in LANDMARKS:
-        assembly = Assembly(site, rng)
-        add_landmark(assembly, archetype, height)
-        return assembly.finish(footprint)
-    module = _MODULES[archetype]
-    parameters = module.Parameters(Dice(site, height, rng))
-    assembly = Assembly(site, rng, parameters.rgb)
-    module.build(parameters, assembly)
-    return assembly.finish(footprint)
+    building = BUILDERS[archetype](kind, site, height, rng)
+    building.build()
+    return building.finish(footprint)

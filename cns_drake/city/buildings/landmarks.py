@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import BaseModel
 import yaml
 
-from cns_drake.city.facades.assembly import Assembly, Rgb, pick
+from cns_drake.city.facades.assembly import Building, Dice, Rgb
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.object_meshes import read_mesh
 from cns_drake.city.geometry.object_parts import triple
@@ -60,40 +60,37 @@ def _folders() -> dict[str, list[Path]]:
 LANDMARKS = _folders()
 
 
-def add_landmark(out: Assembly, archetype: str, height: float) -> None:
-    """Adds one of the models of a landmark, drawn at random.
+class Landmark(Building):
+    """One of the models of a landmark, stretched to the lot and the height."""
 
-    A model is stretched to the given lot and height.
+    def draw(self, d: Dice) -> None:
+        self.folder = d.pick(LANDMARKS[self.kind.name])
 
-    Args:
-        out: the building, on a rectangle.
-        archetype: a key of `LANDMARKS`.
-        height: of the building [m].
-    """
-    x0, y0, x1, y1 = out.site.bounds
-    folder = pick(out.rng, LANDMARKS[archetype])
-    model = _read(folder)
-    lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
-    # Overhanging parts must not reach further out of a wider lot.
-    reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
-    stretch = np.array([*(lot + reach) / (size + reach), height / model.height])
-    middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2, 0.0))
-    for part in model.parts:
-        quarters = round(part.yaw / (np.pi / 2))
-        along = stretch[[1, 0, 2]] if quarters % 2 else stretch
-        path = folder / f"{part.mesh}.obj"
-        if path.exists():
-            name = f"{out.site.name}_{part.mesh}"
-            if name not in out.meshes:
-                out.define(part.mesh, _stretched(read_mesh(path), along))
-            shape = MeshShape(name)
-        else:
-            shape = out.shared(
-                part.mesh, triple(np.round(along * part.scale, 4))
-            )
-        out.place(
-            part.name, shape, middle + stretch * part.xyz, part.yaw, part.rgb
+    def build(self) -> None:
+        """Adds the parts of the model on a rectangle."""
+        x0, y0, x1, y1 = self.site.bounds
+        model = _read(self.folder)
+        lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
+        # Overhanging parts must not reach further out of a wider lot.
+        reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
+        stretch = np.array(
+            [*(lot + reach) / (size + reach), self.height / model.height]
         )
+        middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2, 0.0))
+        for part in model.parts:
+            quarters = round(part.yaw / (np.pi / 2))
+            along = stretch[[1, 0, 2]] if quarters % 2 else stretch
+            path = self.folder / f"{part.mesh}.obj"
+            if path.exists():
+                name = f"{self.site.name}_{part.mesh}"
+                if name not in self.meshes:
+                    self.define(part.mesh, _stretched(read_mesh(path), along))
+                shape = MeshShape(name)
+            else:
+                scale = triple(np.round(along * part.scale, 4))
+                shape = self.shared(part.mesh, scale)
+            xyz = middle + stretch * part.xyz
+            self.place(part.name, shape, xyz, part.yaw, part.rgb)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Inputs of every builder of buildings: ground, random draws, assembly."""
+"""What every building is made from: ground, random draws, collected parts."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import BaseModel
 from shapely.geometry import Polygon
 
 from cns_drake.city.facades import massing
@@ -117,17 +118,54 @@ class Site:
         return (*outline[0].tolist(), *outline[2].tolist())
 
 
+class Archetype(BaseModel, frozen=True, extra="forbid"):
+    """The description of a kind of building, see `archetypes.yaml`.
+
+    Attributes:
+        name: by which plans ask for it.
+        heights: least and greatest sensible height [m].
+        widths: least and greatest sensible side of the footprint [m].
+        overhang: how far eaves, balconies, canopies and pilasters reach
+            outside the footprint [m]; near the ground at most
+            `GROUND_OVERHANG_M`.
+        any_outline: whether it follows any polygon; else rectangles only.
+        party_walls: whether it can stand wall to wall with a neighbour;
+            else it keeps its overhang clear of blind edges.
+        colours: part -> colours to draw from, or a part of the same colour.
+        choices: colours that are drawn while it is built.
+        materials: the parts that its pieces are gathered in.
+    """
+
+    name: str
+    heights: tuple[float, float]
+    widths: tuple[float, float]
+    overhang: float = 1.5
+    any_outline: bool = False
+    party_walls: bool = False
+    colours: dict[str, tuple[Rgb, ...] | str] = {}
+    choices: dict[str, tuple[Rgb, ...]] = {}
+    materials: tuple[str, ...] = ()
+
+
+# Plinths and pilasters may stand this far outside the footprint; above
+# `HEAD_ROOM_M` the archetype's own overhang holds.
+GROUND_OVERHANG_M = 0.35
+HEAD_ROOM_M = 2.3
+
+
 @dataclass(frozen=True)
 class Dice:
     """Draws the parameters of a building.
 
     Attributes:
-        site: the ground of the building.
+        kind: the archetype of the building.
+        site: its ground.
         height: of its parapet, ridge or spire; only roof equipment and
             chimneys may rise above [m].
         rng: the source of all variation.
     """
 
+    kind: Archetype
     site: Site
     height: float
     rng: np.random.Generator
@@ -270,3 +308,48 @@ class Assembly:
         x, y, z = (round(float(v), 3) for v in xyz)
         rpy = (0.0, 0.0, round(float(yaw), 5))
         self.parts.append(Part(part, shape, (x, y, z), rpy, rgb or self.rgb))
+
+
+class Building(Assembly):
+    """A building of an archetype: it draws its parameters, then builds itself.
+
+    Functions that add something to a building take it as `p`: they find in it
+    its parameters, and gather in it what they make.
+
+    Attributes:
+        kind: its archetype.
+        height: of its parapet, ridge or spire; only roof equipment and
+            chimneys may rise above [m].
+        colours: part -> drawn colour.
+    """
+
+    def __init__(
+        self,
+        kind: Archetype,
+        site: Site,
+        height: float,
+        rng: np.random.Generator,
+    ) -> None:
+        """Draws the parameters, then the colours."""
+        super().__init__(site, rng)
+        self.kind, self.height = kind, height
+        self.draw(Dice(kind, site, height, rng))
+        self.colours: dict[str, Rgb] = {}
+        for part, rgbs in kind.colours.items():
+            if isinstance(rgbs, str):
+                self.colours[part] = self.colours[rgbs]
+            else:
+                drawn = pick(rng, rgbs) if len(rgbs) > 1 else rgbs[0]
+                self.colours[part] = drawn
+        if self.rgb is None and self.colours:
+            self.rgb = next(iter(self.colours.values()))
+        self.glass_rgb = self.colours.setdefault("glass", self.glass_rgb)
+        self.paint(**{part: self.colours[part] for part in kind.materials})
+
+    def draw(self, d: Dice) -> None:
+        """Draws the parameters but the colours."""
+        raise NotImplementedError
+
+    def build(self) -> None:
+        """Adds all parts."""
+        raise NotImplementedError

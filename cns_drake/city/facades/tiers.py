@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.city.facades import bays, details, massing
-from cns_drake.city.facades.assembly import Assembly, pick
+from cns_drake.city.facades.assembly import Assembly, Building, pick
 from cns_drake.city.facades.bays import Bay
 from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
@@ -18,20 +18,13 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 # A pane cuts this far into the reveals in front of it, so that no ray passes
 # between the two [m].
 _PANE_OVERLAP = 0.004
-AWNINGS = (
-    (0.55, 0.18, 0.16),
-    (0.20, 0.36, 0.28),
-    (0.85, 0.80, 0.68),
-    (0.22, 0.30, 0.45),
-    (0.72, 0.48, 0.18),
-)
 
 
-def add_awnings(out: Assembly, pieces: Sequence[Mesh]) -> None:
+def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
     """Adds the awnings of a building in a colour of their own."""
     if pieces:
-        rgb = pick(out.rng, AWNINGS)
-        out.add("awnings", *pieces, rgb=rgb)
+        rgb = pick(p.rng, p.kind.choices["awnings"])
+        p.add("awnings", *pieces, rgb=rgb)
 
 
 def divided(

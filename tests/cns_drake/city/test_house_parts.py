@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city.buildings.house_parts import family_house
+from cns_drake.city.buildings import family_houses
 from cns_drake.city.facades import bays, massing, wings
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.facades.house_walls import Openings, free_stretches
@@ -115,9 +115,9 @@ def test_no_dormer_on_a_flat_slope():
 @pytest.mark.parametrize(("height", "storeys"), [(5.0, 1), (9.0, 2), (12.5, 3)])
 def test_storeys_leave_the_roof_its_pitch(height, storeys):
     # A span of 8 m at 35 degrees rises by 2.8 m; a storey is 2.65 m high.
-    assert family_house.storeys_for(height, 0.3, 8.0, 35.0) == storeys
-    top = family_house.wall_top_for(height, 0.3, 8.0, storeys)
-    assert top <= height - family_house.ROOF_M - 0.08 * 8.0 + 1e-9
+    assert family_houses.storeys_for(height, 0.3, 8.0, 35.0) == storeys
+    top = family_houses.wall_top_for(height, 0.3, 8.0, storeys)
+    assert top <= height - family_houses.ROOF_M - 0.08 * 8.0 + 1e-9
 
 
 def test_each_material_becomes_one_part():

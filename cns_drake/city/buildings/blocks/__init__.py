@@ -1,1 +1,0 @@
-"""Blocks of flats and offices that stand wall to wall."""

@@ -1,0 +1,637 @@
+"""Houses for a family or two: wings under gables or hips, porches, garages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cns_drake.city.facades import bays, details, house_walls, massing, wings
+from cns_drake.city.facades.assembly import Assembly, Building, Dice, Site
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import add_chimney
+from cns_drake.city.facades.walls import Band
+from cns_drake.city.facades.wings import Roof, Wing
+
+STOREY_M = 2.65
+ROOF_M = 0.2
+# Windows of the sides are further apart than those of the front [m].
+_SIDE_PITCH_M = 3.8
+
+
+def storeys_for(
+    height: float, floor: float, span: float, pitch_deg: float
+) -> int:
+    """Returns the storeys that bring a roof over `span` closest to a pitch.
+
+    Args:
+        height: of the ridge [m].
+        floor: height of the ground floor [m].
+        span: of the roof [m].
+        pitch_deg: wanted.
+    """
+    wanted = wings.ridge_rise(span, pitch_deg)
+    room = height - ROOF_M - floor - 0.15
+    counts = [n for n in (1, 2, 3, 4) if room - n * STOREY_M > 0.1 * span]
+    return min(counts or [1], key=lambda n: abs(room - n * STOREY_M - wanted))
+
+
+def wall_top_for(
+    height: float, floor: float, span: float, storeys: int
+) -> float:
+    """Returns the height of the walls below a ridge [m]."""
+    wanted = floor + storeys * STOREY_M + 0.15
+    return min(wanted, height - ROOF_M - 0.08 * span)
+
+
+def window_rows(
+    wing: Wing,
+    boxes: Sequence[Wing],
+    floor: float,
+    storeys: int,
+    pitch: float,
+    width: float,
+) -> Openings:
+    """Returns a box's windows, the sides' further apart."""
+    openings = Openings(wing, boxes)
+    for edges, step in (((0, 2), pitch), ((1, 3), _SIDE_PITCH_M)):
+        house_walls.add_rows(
+            openings, edges, floor, STOREY_M, storeys, step, width
+        )
+    return openings
+
+
+def close_box(
+    out: Assembly,
+    wing: Wing,
+    openings: Openings,
+    plinth: float,
+    casing: str,
+    edges: Sequence[int] = (0,),
+) -> None:
+    """Adds the walls and the roof around a box's openings.
+
+    Args:
+        out: where to.
+        wing: the box.
+        openings: its windows and doors.
+        plinth: height of the foundation that shows [m].
+        casing: style of the windows' frames on `edges`.
+        edges: walls with framed windows.
+    """
+    house_walls.add_casings(out, wing, openings, edges, casing)
+    bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()
+    openings.add_walls(out, (house_walls.GLASS_M,), bands)
+    low = wing.wall_top + 0.4
+    attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M)
+    wings.add_roof(out, wing, attic)
+
+
+def garage_wing(
+    kind: str, x0: float, x1: float, y0: float, y1: float, most: float
+) -> Wing:
+    """Returns a garage no deeper than 6.5 m and no higher than `most`.
+
+    Its roof is `flat`, `gable`, `shed` or `hip`.
+    """
+    wall_top, span = 2.65, x1 - x0
+    rise = {"flat": 0.5, "gable": 0.3 * span, "shed": 0.2 * span,
+            "hip": 0.25 * span}[kind]  # fmt: skip
+    shape = Roof(kind, True, 0.3, 0.25, ROOF_M)
+    top = min(wall_top + ROOF_M + rise, most)
+    return Wing.at(x0, y0, x1, min(y1, y0 + 6.5), wall_top, top, shape)
+
+
+def add_garage(out: Assembly, garage: Wing, boxes: Sequence[Wing]) -> None:
+    """Adds a garage, its door in front."""
+    openings = Openings(garage, boxes)
+    length = garage.x1 - garage.x0
+    house_walls.add_garage_door(
+        out, garage, openings, 0, length / 2, min(length - 0.7, 4.9)
+    )
+    openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
+    openings.add_walls(out, (house_walls.GLASS_M,))
+    wings.add_roof(out, garage)
+
+
+# Kept free around the walls, for eaves and chimneys [m].
+_MARGIN = 0.5
+_WING_ENDS = {
+    "box": (),
+    "ell": ("front",),
+    "tee": ("back",),
+    "cross": ("front", "back"),
+}
+
+
+class DetachedHouse(Building):
+    """The detached house: wings under gables or hips, a porch, a garage.
+
+    Lengths are in metres.
+
+    `plan` is `box`, `ell` (a wing to the front), `tee` (a wing to the
+    back) or `cross` (both). The garage stands on the right, the front wing
+    on the left, unless `mirrored`.
+    """
+
+    def draw(self, d: Dice) -> None:
+        self.plan = d.pick(("box", "ell", "tee", "cross", "ell"))
+        self.mirrored = d.chance(0.5)
+        self.roof = d.pick(("gable", "gable", "hip", "gambrel"))
+        self.pitch_deg = d.uniform(28.0, 45.0)
+        self.wing_width = d.uniform(0.36, 0.46)
+        self.low_wing = d.chance(0.35)
+        self.deck = d.uniform(0.2, 0.6, 2)
+        self.window_pitch = d.uniform(2.6, 3.4)
+        self.window_width = d.uniform(0.95, 1.3, 2)
+        self.casing = d.pick(("frame", "sill", "sill", "shutters"))
+        self.porch = d.pick(("shed", "gable", "full", "flat"))
+        self.porch_reach = d.uniform(1.5, 2.2, 2)
+        self.garage = d.pick(("flat", "gable", "shed", "none"))
+        self.garage_width = d.uniform(3.2, 5.8, 1)
+        self.chimney = d.pick(("ridge", "breast", "ridge", "none"))
+        self.chimney_at = d.uniform(0.2, 0.8)
+        self.dormers = d.whole(0, 3)
+        self.dormer = d.pick(("gable", "shed"))
+        self.bay_window = d.chance(0.4)
+
+    def build(self) -> None:
+        """Builds the house on a rectangle, its porch in front."""
+        plan = _planned(self, self.site)
+        _add_main(self, plan)
+        for wing in plan.wings:
+            _add_wing(self, plan, wing)
+        if plan.garage is not None:
+            add_garage(self, plan.garage, plan.boxes)
+        _add_chimney(self, plan)
+
+
+def _planned(p: DetachedHouse, site: Site) -> _Plan:
+    """Lays the house out."""
+    x0, y0, x1, y1 = site.bounds
+    left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
+    ahead = min(p.porch_reach + 0.3 + 1.8 * p.deck, 0.3 * (back - y0))
+    front = y0 + ahead
+    main_back = front + min(back - front, 10.0)
+    deep = main_back - front
+    garage_width = min(p.garage_width, 0.36 * (right - left))
+    has_garage = p.garage != "none" and garage_width > 2.9
+    split = right - garage_width * has_garage
+    pitch_deg = 48.0 if p.roof == "gambrel" else p.pitch_deg
+    n = storeys_for(p.height, p.deck, deep, pitch_deg)
+    wall_top = wall_top_for(p.height, p.deck, deep, n)
+    slope = 2 * (p.height - wall_top - ROOF_M) / deep
+    roof = Roof(p.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+    main = Wing.at(left, front, split, main_back, wall_top, p.height, roof)
+    wide = max(3.2, p.wing_width * (split - left))
+    drop = STOREY_M * (n > 1 and p.low_wing)
+    top = min(wall_top + ROOF_M + slope * wide / 2, p.height - 0.25) - drop
+    kind = "hip" if p.roof == "hip" else "gable"
+    shape = Roof(kind, True, 0.35, 0.3, ROOF_M)
+    middle = (front + main_back) / 2
+    parts = []
+    for end in _WING_ENDS[p.plan]:
+        if end == "front":
+            span = (left - 0.02, front - max(0.6, ahead - 0.6))
+            area = (*span, left + wide, middle)
+        else:
+            a = left + 0.4 * (split - left - wide)
+            area = (a, middle, a + wide, min(back, main_back + 3.0))
+        if end == "front" or back - main_back > 1.0:
+            parts.append(Wing.at(*area, wall_top - drop, top, shape))
+    garage = None
+    if has_garage:
+        garage = garage_wing(
+            p.garage, split - 0.06, right, front + 0.6, main_back - 0.4,
+            p.height,
+        )  # fmt: skip
+    taken = left + wide if "front" in _WING_ENDS[p.plan] else left
+    plan = _Plan(main, tuple(parts), garage, n, (taken, split), ahead)
+    return plan.mirrored(x0 + x1) if p.mirrored else plan
+
+
+def _add_main(p: DetachedHouse, plan: _Plan) -> None:
+    main = plan.main
+    openings = window_rows(
+        main, plan.boxes, p.deck, plan.storeys, p.window_pitch, p.window_width
+    )
+    a, b = (x - main.x0 for x in plan.free)
+    door = a + 0.5 * (b - a)
+    house_walls.add_door(p, main, openings, 0, door, p.deck, lights=0.3)
+    _add_porch(p, plan, (a, b))
+    close_box(p, main, openings, p.deck, p.casing)
+    if p.roof in ("gable", "gambrel"):
+        wings.add_dormers(p, main, a, b, p.dormers, p.dormer, 3.0)
+
+
+def _add_porch(p: DetachedHouse, plan: _Plan, free: bays.Span) -> None:
+    """Roofs the door; a `full` porch runs along the free front."""
+    wall = plan.main.wall(0)
+    a, b = free
+    door = (a + b) / 2
+    reach = min(p.porch_reach, plan.ahead - 0.3)
+    eaves = p.deck + 2.3
+    top = eaves + (0.9 if p.porch == "gable" else 0.45)
+    if plan.storeys == 1:
+        top = min(top, plan.main.wall_top + 0.1)
+    full = p.porch == "full" and b - a > 3.5
+    x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
+    details.add_porch(
+        p, wall, x0, x1, reach, p.deck, eaves, top,
+        roof="shed" if p.porch == "full" else p.porch,
+        posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
+    )  # fmt: skip
+    room = plan.ahead - reach - 0.02
+    details.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.deck, room)
+    if full and p.deck > 0.3:
+        y = reach - 0.15
+        runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
+        for k, (start, end) in enumerate(runs):
+            details.add_railing(
+                p, f"railing_{k}", wall, (start, y), (end, y), p.deck,
+                p.colours["trim"],
+            )  # fmt: skip
+
+
+def _add_wing(p: DetachedHouse, plan: _Plan, wing: Wing) -> None:
+    count = max(1, round((wing.wall_top - p.deck) / STOREY_M))
+    openings = window_rows(
+        wing, plan.boxes, p.deck, count, p.window_pitch, p.window_width
+    )
+    close_box(p, wing, openings, p.deck, p.casing)
+    is_front = wing.y0 < plan.main.y0
+    if p.bay_window and is_front and wing.width > 3.0:
+        size = (wing.width / 2, 2.2, 0.4, 0.0, p.deck + 2.3)
+        details.add_bay_window(p, wing.wall(0), *size)
+
+
+def _add_chimney(p: DetachedHouse, plan: _Plan) -> None:
+    main = plan.main
+    if p.chimney == "breast":
+        wall = main.wall(1 if p.mirrored else 3)
+        x = wall.length / 2
+        breast = details.chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
+        p.add_to("base", breast)
+        spot = (*wall.point(x, 0.18), main.top - 0.9)
+        add_chimney(p, "chimney", spot, p.colours["base"], yaw=np.pi / 2)
+    elif p.chimney == "ridge":
+        x = main.x0 + p.chimney_at * main.width
+        spot = (x, main.center[1], main.top - 1.2)
+        add_chimney(p, "chimney", spot, p.kind.choices["bricks"][0])
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """The places of the parts of a house.
+
+    Attributes:
+        main, wings, garage: its boxes.
+        storeys: of the main box.
+        free: part of the main front that no wing hides, in x [m].
+        ahead: room in front of the main front [m].
+    """
+
+    main: Wing
+    wings: tuple[Wing, ...]
+    garage: Wing | None
+    storeys: int
+    free: tuple[float, float]
+    ahead: float
+
+    @property
+    def boxes(self) -> tuple[Wing, ...]:
+        garage = () if self.garage is None else (self.garage,)
+        return (self.main, *self.wings, *garage)
+
+    def mirrored(self, width: float) -> _Plan:
+        """Returns the plan with x replaced by `width` - x."""
+        parts = tuple(wing.mirrored(width) for wing in self.wings)
+        garage = self.garage and self.garage.mirrored(width)
+        a, b = self.free
+        return replace(
+            self,
+            main=self.main.mirrored(width),
+            wings=parts,
+            garage=garage,
+            free=(width - b, width - a),
+        )
+
+
+# Kept free around the walls, for wide eaves [m].
+_BUNGALOW_MARGIN = 0.75
+
+
+class Bungalow(Building):
+    """The bungalow: one long low storey, a carport or a garage under its roof.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the ridge.
+        plan: `long`, `ell` (a wing to the front) or `court` (two of them).
+        parking: `garage` in the front wing, `carport` beside the house or
+            `none`.
+        mirrored: whether the front wing stands on the right.
+        roof: `gable` or `hip`.
+        wing_width: of a front wing, as a part of the house.
+        reach: of the front wings.
+        floor: height of the floor.
+        picture: width of the large window beside the door.
+        veranda: whether a porch runs along the front.
+    """
+
+    def draw(self, d: Dice) -> None:
+        self.plan = d.pick(("long", "ell", "ell", "court"))
+        self.parking = d.pick(("garage", "carport", "none"))
+        self.mirrored = d.chance(0.5)
+        self.roof = d.pick(("gable", "hip", "hip"))
+        self.wing_width = d.uniform(0.3, 0.4)
+        self.reach = d.uniform(2.0, 4.0, 2)
+        self.floor = d.uniform(0.1, 0.35, 2)
+        self.window_pitch = d.uniform(2.6, 3.6)
+        self.window_width = d.uniform(1.2, 1.7, 2)
+        self.picture = d.uniform(2.2, 3.4, 2)
+        self.casing = d.pick(("frame", "sill", "shutters"))
+        self.veranda = d.chance(0.5)
+        self.chimney_at = d.uniform(0.25, 0.75)
+
+    def build(self) -> None:
+        """Builds the bungalow along the front of a rectangle."""
+        plan = _bungalow_planned(self, self.site)
+        boxes = (plan.main, *plan.fronts)
+        size = (self.floor, 1, self.window_pitch, self.window_width)
+        openings = window_rows(plan.main, boxes, *size)
+        _add_bungalow_main(self, plan, openings, self.site.bounds[1])
+        for k, wing in enumerate(plan.fronts):
+            openings = window_rows(wing, boxes, *size)
+            if self.parking == "garage" and k == 0:
+                width = min(wing.width - 0.8, 4.8)
+                house_walls.add_garage_door(
+                    self, wing, openings, 0, wing.width / 2, width
+                )
+            close_box(self, wing, openings, self.floor, self.casing)
+        if plan.carport is not None:
+            _add_carport(self, plan.carport)
+        main = plan.main
+        x = main.x0 + self.chimney_at * main.width
+        spot, scale = (x, main.center[1], main.top - 1.3), (1.5, 1.2, 0.95)
+        add_chimney(self, "chimney", spot, self.colours["base"], scale=scale)
+
+
+def _bungalow_planned(p: Bungalow, site: Site) -> _BungalowPlan:
+    x0, y0, x1, y1 = site.bounds
+    left, right, back = (
+        x0 + _BUNGALOW_MARGIN,
+        x1 - _BUNGALOW_MARGIN,
+        y1 - _BUNGALOW_MARGIN,
+    )
+    width = right - left
+    fronts_wanted = {"long": 0, "ell": 1, "court": 2}[p.plan]
+    fronts_wanted = min(fronts_wanted, int(width / 6.5))
+    depth = back - y0
+    ahead = min(1.9, 0.2 * depth)
+    reach = min(p.reach, 0.3 * depth) if fronts_wanted else 0.0
+    front = y0 + max(ahead, _BUNGALOW_MARGIN + reach)
+    deep = min(back - front, 8.5)
+    carport = None
+    if p.parking == "carport" and width > 13.0:
+        carport = (right - 3.4, front + 0.4, right, front + min(6.0, deep))
+        right -= 3.6
+    top = p.height
+    wall_top = min(
+        p.floor + 2.75, top - ROOF_M - 0.1 * deep, 0.8 * (top - ROOF_M)
+    )
+    shape = Roof(p.roof, eaves=0.6, verge=0.4, thickness=ROOF_M)
+    main = Wing.at(left, front, right, front + deep, wall_top, top, shape)
+    slope = 2 * (top - main.wall_top - ROOF_M) / deep
+    wide = max(3.4, p.wing_width * (right - left))
+    fronts = []
+    taken = [left, right]
+    for k in range(fronts_wanted):
+        a = left - 0.02 if k == 0 else right - wide
+        end = min(top - 0.2, main.wall_top + ROOF_M + slope * wide / 2)
+        cross = Roof(p.roof, True, 0.5, 0.4, ROOF_M)
+        fronts.append(
+            Wing.at(
+                a, front - reach, a + wide + 0.02, front + deep / 2,
+                main.wall_top, end, cross,
+            )
+        )  # fmt: skip
+        taken[k] = a + wide if k == 0 else a
+    plan = _BungalowPlan(main, tuple(fronts), carport, (taken[0], taken[1]))
+    return plan.mirrored(x0 + x1) if p.mirrored else plan
+
+
+def _add_bungalow_main(
+    p: Bungalow, plan: _BungalowPlan, openings: Openings, y0: float
+) -> None:
+    main = plan.main
+    wall = main.wall(0)
+    a, b = (x - main.x0 for x in plan.free)
+    door = a + 0.3 * (b - a)
+    if b - door > p.picture + 1.6:
+        x = (door + 0.6 + b) / 2
+        pane = house_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
+        openings.put(0, x, p.picture + 0.7, pane)
+    house_walls.add_door(p, main, openings, 0, door, p.floor, lights=0.3)
+    close_box(p, main, openings, p.floor, p.casing)
+    reach = min(1.6, main.y0 - y0 - 0.4)
+    if p.veranda and b - a > 4.0 and reach > 0.9:
+        eaves = min(p.floor + 2.25, main.wall_top - 0.35)
+        details.add_porch(
+            p, wall, a + 0.25, b - 0.25, reach, p.floor, eaves,
+            eaves + 0.4, posts=max(3, round((b - a) / 2.4)),
+        )  # fmt: skip
+    else:
+        slab = (door - 1.0, door + 1.0, -0.05, min(1.2, reach), p.floor)
+        p.add_to("base", wall.standing(*slab, bottom=True))
+
+
+def _add_carport(p: Bungalow, area: massing.Area) -> None:
+    """Adds a flat roof on six posts, with a shed at its end."""
+    x0, y0, x1, y1 = area
+    top = 2.65
+    p.add_to("roof", massing.box(x0, x1, y0, y1, top - 0.25, top))
+    for x in (x0 + 0.15, x1 - 0.15):
+        for y in np.linspace(y0 + 0.3, y1 - 2.0, 3).tolist():
+            p.add_to("trim", massing.post(x, y, 0.08, top - 0.2))
+    shed = (x0 + 0.1, x1 - 0.1, y1 - 1.6, y1 - 0.1, top - 0.2)
+    p.add_to("walls", massing.standing(*shed, bottom=True))
+
+
+@dataclass(frozen=True)
+class _BungalowPlan:
+    """The places of the parts; `carport` is x0, y0, x1, y1 or None."""
+
+    main: Wing
+    fronts: tuple[Wing, ...]
+    carport: tuple[float, float, float, float] | None
+    free: tuple[float, float]
+
+    def mirrored(self, width: float) -> _BungalowPlan:
+        a, b = self.free
+        carport = self.carport
+        if carport is not None:
+            x0, y0, x1, y1 = carport
+            carport = (width - x1, y0, width - x0, y1)
+        return _BungalowPlan(
+            self.main.mirrored(width),
+            tuple(wing.mirrored(width) for wing in self.fronts),
+            carport,
+            (width - b, width - a),
+        )
+
+
+# Kept free around the walls, for eaves [m].
+_SEMI_DETACHED_MARGIN = 0.5
+
+
+class SemiDetached(Building):
+    """The pair of semi-detached houses: mirrored halves under one roof.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the ridge.
+        roof: `gable` or `hip`.
+        pitch_deg: wanted, of the roof.
+        floor: height of the ground floor.
+        bay: `gabled` (through all storeys, under a gable of its own),
+            `canted` or `none`.
+        bay_width, bay_reach: of the bays.
+        doors_inside: whether the doors lie side by side in the middle.
+        porch_reach: of the roofs above the doors.
+        garages: `none`, `flat`, `shed` or `hip`, one on either side.
+        chimneys: `middle` or `ends`.
+    """
+
+    def draw(self, d: Dice) -> None:
+        self.roof = d.pick(("gable", "hip"))
+        self.pitch_deg = d.uniform(30.0, 45.0)
+        self.floor = d.uniform(0.15, 0.45, 2)
+        self.window_pitch = d.uniform(2.4, 3.2)
+        self.window_width = d.uniform(1.0, 1.4, 2)
+        self.casing = d.pick(("frame", "sill", "sill", "shutters"))
+        self.bay = d.pick(("gabled", "canted", "gabled", "none"))
+        self.bay_width = d.uniform(2.6, 3.2, 2)
+        self.bay_reach = d.uniform(0.6, 1.0, 2)
+        self.doors_inside = d.chance(0.5)
+        self.porch_reach = d.uniform(1.1, 1.5, 2)
+        self.garages = d.pick(("none", "flat", "shed", "hip"))
+        self.garage_width = d.uniform(2.9, 3.4, 2)
+        self.chimneys = d.pick(("middle", "ends"))
+
+    def build(self) -> None:
+        """Builds the pair on a rectangle."""
+        x0, y0, x1, y1 = self.site.bounds
+        left, right, back = (
+            x0 + _SEMI_DETACHED_MARGIN,
+            x1 - _SEMI_DETACHED_MARGIN,
+            y1 - _SEMI_DETACHED_MARGIN,
+        )
+        front = y0 + min(2.4, 0.25 * (y1 - y0))
+        deep = min(back - front, 10.0)
+        has_garages = self.garages != "none" and right - left > 17.0
+        side = self.garage_width * has_garages
+        n = storeys_for(self.height, self.floor, deep, self.pitch_deg)
+        wall_top = wall_top_for(self.height, self.floor, deep, n)
+        shape = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+        main = Wing.at(
+            left + side, front, right - side, front + deep, wall_top,
+            self.height, shape,
+        )  # fmt: skip
+        bays = _gabled_bays(self, main) if self.bay == "gabled" else ()
+        garages = []
+        if has_garages:
+            for a, b in ((left, main.x0 + 0.06), (main.x1 - 0.06, right)):
+                area = (a, b, front + 1.5, main.y1 - 0.3)
+                garages.append(garage_wing(self.garages, *area, self.height))
+        boxes = (main, *bays, *garages)
+        openings = window_rows(
+            main, boxes, self.floor, n, self.window_pitch, self.window_width
+        )
+        _add_entrances(self, main, openings, y0)
+        close_box(self, main, openings, self.floor, self.casing)
+        for wing in bays:
+            rows = Openings(wing, boxes)
+            house_walls.add_rows(
+                rows, (0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
+            )
+            close_box(self, wing, rows, self.floor, self.casing)
+        for garage in garages:
+            add_garage(self, garage, boxes)
+        _add_chimneys(self, main)
+
+
+def _middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
+    """Returns the x of the bays in the main wall's coordinates [m]."""
+    half = (main.x1 - main.x0) / 2
+    # Doors take the middle or the ends; bays take the rest of each half.
+    u = 0.6 * half if p.doors_inside else 0.36 * half
+    offset = half - u if not p.doors_inside else u
+    return half - offset, half + offset
+
+
+def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
+    width = min(p.bay_width, 0.45 * (main.x1 - main.x0) / 2)
+    if width < 1.8:
+        return ()
+    rise = min(0.5 * width, main.top - main.wall_top - ROOF_M - 0.2)
+    top = main.wall_top + ROOF_M + rise
+    shape = Roof("gable", True, 0.2, 0.25, ROOF_M)
+    middle = (main.y0 + main.y1) / 2
+    fronts = (
+        (main.x0 + x - width / 2, main.x0 + x + width / 2)
+        for x in _middles(p, main)
+    )
+    y0 = main.y0 - p.bay_reach
+    return tuple(
+        Wing.at(a, y0, b, middle, main.wall_top, top, shape) for a, b in fronts
+    )
+
+
+def _add_entrances(
+    p: SemiDetached, main: Wing, openings: Openings, y0: float
+) -> None:
+    """Adds the doors under one roof or two, and bays on the ground."""
+    wall = main.wall(0)
+    half = wall.length / 2
+    room = main.y0 - y0 - 0.1
+    reach = min(p.porch_reach, room - 0.3)
+    offset = 0.75 if p.doors_inside else half - 0.95
+    eaves = p.floor + 2.35
+    size = (reach, p.floor, eaves, eaves + 0.4)
+    for x in (half - offset, half + offset):
+        house_walls.add_door(p, main, openings, 0, x, p.floor)
+        if not p.doors_inside:
+            details.add_porch(p, wall, x - 0.85, x + 0.85, *size)
+    if p.doors_inside:
+        details.add_porch(
+            p, wall, half - 1.6, half + 1.6, *size, roof="flat", posts=3
+        )
+    for x in _middles(p, main) if p.bay == "canted" else ():
+        width = min(2.4, 0.5 * half)
+        ends = (x - width / 2 - 0.1, x + width / 2 + 0.1)
+        openings.clear(0, *ends, 0.0, p.floor + STOREY_M - 0.2)
+        details.add_bay_window(
+            p, wall, x, width, min(0.7, room - 0.1), 0.0,
+            round(p.floor + 2.3, 2),
+        )  # fmt: skip
+    if p.doors_inside:
+        step = (half - 1.4, half + 1.4, reach, reach + 0.28, 0.12)
+        p.add_to("base", wall.standing(*step, bottom=True))
+
+
+def _add_chimneys(p: SemiDetached, main: Wing) -> None:
+    x, y = main.center
+    spots = [x]
+    if p.chimneys != "middle":
+        side = 0.7 if p.roof == "gable" else 0.35 * main.width
+        spots = [main.x0 + side, main.x1 - side]
+    for k, x in enumerate(spots):
+        add_chimney(
+            p, f"chimney_{k}", (x, y, main.top - 1.1),
+            p.kind.choices["bricks"][0], item="chimney_row",
+            yaw=np.pi / 2, scale=(0.8, 1.0, 1.0),
+        )  # fmt: skip

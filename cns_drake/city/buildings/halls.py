@@ -1,0 +1,489 @@
+"""Halls under one wide roof: barns, sports halls, sheds at the water."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from cns_drake.city.facades import bays, details, massing, roofs, wings
+from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.house_walls import Openings, free_stretches
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import (
+    Band,
+    Facade,
+    Patch,
+    facade_mesh,
+    glass_mesh,
+)
+from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+_MARGIN = 0.5
+_RECESS = 0.15
+
+
+class Barn(Building):
+    """The barn or boat house: timber boards, wide doors, a lean-to.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the ridge, the ventilator on it included.
+        roof: `gambrel`, `gable` or `barrel`.
+        wall: height of the walls, as a part of the ridge's.
+        deck: room in front, a jetty of a boat house; 0 for a barn.
+        door_width, door_height: of the doors in the gable.
+        aisle: width of the lean-to on one side; 0 for none.
+        aisle_left: on which.
+        batten: distance between battens.
+        ventilators: on the ridge.
+    """
+
+    def draw(self, d: Dice) -> None:
+        width = min(d.width, d.depth)
+        aisle = d.uniform(0.2, 0.28) * width
+        self.roof = d.pick(("gambrel", "gable", "gable", "barrel"))
+        self.wall = d.uniform(0.42, 0.58)
+        self.deck = d.pick((0.0, 0.0, 2.0)) if d.depth > 10.0 else 0.0
+        self.door_width = d.uniform(2.6, 4.4, 2)
+        self.door_height = d.uniform(2.4, 3.4, 2)
+        self.aisle = round(aisle, 2) if d.chance(0.6) and width > 9 else 0.0
+        self.aisle_left = d.chance(0.5)
+        self.batten = d.uniform(1.0, 1.6)
+        self.ventilators = d.whole(0, 3)
+
+    def build(self) -> None:
+        """Builds the barn along the longer side of a rectangle."""
+        x0, y0, x1, y1 = self.site.bounds
+        along_y = y1 - y0 >= x1 - x0
+        left, right = x0 + _MARGIN, x1 - _MARGIN
+        front, back = y0 + _MARGIN + self.deck, y1 - _MARGIN
+        a, b, low, high = left, right, front, back
+        if along_y:
+            a, b = (
+                a + self.aisle * self.aisle_left,
+                b - self.aisle * (not self.aisle_left),
+            )
+        else:
+            high -= self.aisle
+        top = self.height - (0.7 if self.ventilators else 0.0)
+        half = ((b - a) if along_y else (high - low)) / 2
+        wall_top = max(2.3, self.wall * top)
+        eaves = 0.35
+        if self.roof == "barrel":
+            # A vault is at most half a circle.
+            eaves, wall_top = 0.0, max(wall_top, top - 0.8 * half)
+        roof = Roof(self.roof, along_y, eaves, 0.35, 0.18)
+        main = Wing.at(a, low, b, high, wall_top, top, roof)
+        boxes = [main]
+        if self.aisle > 1.5:
+            boxes.append(_aisle(self, main, (left, right, back)))
+        for wing in boxes:
+            _add_box(self, wing, boxes)
+        _add_ridge(self, main)
+        if self.deck > 0:
+            _add_jetty(self, (left, right), y0, front)
+
+
+def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
+    """Adds the barn itself, with its doors, or the lean-to."""
+    openings = Openings(wing, boxes)
+    head = round(min(2.0, wing.wall_top - 0.3), 2)
+    openings.row(
+        range(4), 1.0, 3.2, [bays.window(0.9, 1.1, head, _RECESS)], 0.8
+    )
+    if wing is boxes[0]:
+        for edge in (0,) if wing.roof.along_y else (3, 0):
+            _add_doors(p, wing, openings, edge)
+    low = wing.wall_top + 0.5
+    attic = wings.attic_window(1.0, low, low + 1.3, _RECESS)
+    openings.enclose(p, (_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
+    for edge in range(4):
+        _add_battens(p, wing, boxes, openings, edge)
+
+
+def _aisle(p: Barn, main: Wing, limits: tuple[float, float, float]) -> Wing:
+    """Returns the lean-to against the long side of the barn."""
+    left, right, back = limits
+    along_y = main.roof.along_y
+    high = main.wall_top + 0.1
+    low = max(1.9, high - 0.3 * p.aisle)
+    high = max(high, low + 0.25)
+    # Behind the barn, or beside it: its roof falls away from there.
+    area = (main.x0 + 1.0, main.y1 - 0.05, main.x1 - 1.0, back)
+    if along_y:
+        a, b = main.x1 - 0.05, right
+        if p.aisle_left:
+            a, b = left, main.x0 + 0.05
+        area = (a, main.y0 + 0.8, b, main.y1 - 0.8)
+    falling = not (along_y and p.aisle_left)
+    roof = Roof("shed", along_y, 0.3, 0.25, 0.15, falling=falling)
+    return Wing.at(*area, low, high, roof)
+
+
+def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
+    """Adds a pair of braced doors that slide along the wall."""
+    wall = wing.wall(edge)
+    width = min(p.door_width, 0.5 * wall.length)
+    height = min(p.door_height, wing.wall_top - 0.35)
+    x = wall.length / 2
+    openings.clear(edge, x - width - 0.2, x + width + 0.2, 0.0, height + 0.4)
+    if p.deck > 0 and edge == 0:
+        gap = Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
+        openings.put(edge, x, width + 0.4, lambda a, b: [gap])
+        spots = (x - width, x + width / 2 + 0.05)
+        half = width / 2 - 0.05
+    else:
+        spots, half = (x - width / 2, x + 0.03), width / 2 - 0.03
+    for a in spots:
+        b = a + half
+        brace = (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1)
+        frame = [
+            details.board(a, a + 0.18, 0.08, height, 0.15),
+            details.board(b - 0.18, b, 0.08, height, 0.15),
+            details.board(a, b, height - 0.18, height, 0.15),
+            details.board(a, b, 0.08, 0.26, 0.15),
+            details.beam(*brace, 0.1),
+        ]
+        leaf = details.board(a, b, 0.08, height, 0.1)
+        p.add_to("doors", wall.place(leaf))
+        p.add_to("trim", *(wall.place(m) for m in frame))
+    rail = (x - width - 0.1, x + width + 0.1, 0.0, 0.18)
+    p.add_to("trim", wall.box(*rail, height + 0.05, height + 0.18))
+
+
+def _add_battens(
+    p: Barn, wing: Wing, boxes: list[Wing], openings: Openings, edge: int
+) -> None:
+    """Adds upright battens on the free parts of a wall between openings."""
+    wall = wing.wall(edge)
+    reliefs = openings.layout(edge, wall.length)
+    for a, b in free_stretches(wing, edge, boxes, 0.5):
+        for x, _ in bays.stretches(b - a, p.batten, 0.12):
+            u = a + x
+            if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):
+                continue
+            strip = details.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
+            p.add_to("walls", wall.place(strip))
+
+
+def _add_ridge(p: Barn, main: Wing) -> None:
+    """Adds louvred ventilators on the ridge."""
+    z = main.top
+    for k in range(p.ventilators):
+        share = (k + 0.5) / p.ventilators - 0.5
+        x, y = main.center
+        if main.roof.along_y:
+            y += 0.8 * share * main.depth
+        else:
+            x += 0.8 * share * main.width
+        p.add_to("walls", massing.post(x, y, 0.45, z + 0.3, z - 0.6))
+        eaves = massing.square(x, y, 0.65)
+        p.add_to("roof", massing.tent(eaves, (x, y), z + 0.3, z + 0.7))
+
+
+def _add_jetty(p: Barn, xs: bays.Span, y0: float, front: float) -> None:
+    """Adds a plank deck on posts in front of a boat house."""
+    (a, b), y = xs, y0 + 0.1
+    p.add_to("doors", massing.box(a, b, y, front, 0.05, 0.3))
+    for x in np.linspace(a + 0.2, b - 0.2, 4).tolist():
+        spot = (x - 0.12, x + 0.12, y + 0.02, y + 0.26)
+        p.add_to("doors", massing.standing(*spot, 1.1))
+
+
+_SPORTS_HALL_RECESS = 0.2
+_SPORTS_HALL_MARGIN = 0.6
+
+
+class SportsHall(Building):
+    """The sports hall: a wide roof on outer frames, a low front, high windows.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the ridge, the ribs on it included.
+        roof: `barrel`, `gable`, `shed` or `butterfly` (two sheds that
+            fall to the middle).
+        wall: height of the walls as a part of the ridge's.
+        bay: distance between the frames.
+        frame_reach: how far the frames stand out of the walls.
+        annex: depth of the low front; 0 for none.
+        annex_height: [m].
+        glazed: whether the gables are glazed.
+    """
+
+    def draw(self, d: Dice) -> None:
+        depth = d.depth
+        self.roof = d.pick(("barrel", "gable", "shed", "butterfly"))
+        self.wall = d.uniform(0.58, 0.7)
+        self.bay = max(d.uniform(5.0, 7.5), (d.width + depth) / 18)
+        self.frame_reach = d.uniform(0.35, 0.6, 2)
+        self.annex = (
+            round(min(d.uniform(5.0, 8.0), 0.3 * depth), 2)
+            if d.chance(0.8)
+            else 0.0
+        )
+        self.annex_height = round(min(d.uniform(3.4, 4.2), 0.5 * d.height), 2)
+        self.glazed = d.chance(0.6)
+        self.roof_items = d.some_of("air_handler vents ac_unit", 1, 4)
+
+    def build(self) -> None:
+        """Builds the hall on a rectangle, its entrance in front."""
+        x0, y0, x1, y1 = self.site.bounds
+        front = y0 + (self.annex + 1.6 if self.annex else 1.8)
+        area = (
+            x0 + _SPORTS_HALL_MARGIN,
+            front,
+            x1 - _SPORTS_HALL_MARGIN,
+            y1 - _SPORTS_HALL_MARGIN,
+        )
+        along_y = area[3] - area[1] > area[2] - area[0]
+        halls = _halls(self, area, along_y)
+        for hall in halls:
+            _add_hall(self, hall, halls)
+        if self.annex:
+            _add_annex(self, halls, y0)
+        else:
+            _add_porch(self, halls)
+
+
+def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
+    """Returns one hall, or the two halves of a butterfly."""
+    x0, y0, x1, y1 = area
+    top = p.height - 0.15
+    span = (x1 - x0) if along_y else (y1 - y0)
+    rise = {"barrel": 0.22 * span, "gable": 0.2 * span}.get(p.roof, 0.1 * span)
+    wall = max(p.wall * top, top - 0.3 - rise)
+    if p.roof != "butterfly":
+        eaves = 0.0 if p.roof == "barrel" else 0.4
+        roof = Roof(p.roof, along_y, eaves, 0.4, 0.3)
+        return [Wing.at(x0, y0, x1, y1, wall, top, roof)]
+    low, high = area, area
+    if along_y:
+        middle = (x0 + x1) / 2
+        low, high = (x0, y0, middle + 0.02, y1), (middle - 0.02, y0, x1, y1)
+    else:
+        middle = (y0 + y1) / 2
+        low, high = (x0, y0, x1, middle + 0.02), (x0, middle - 0.02, x1, y1)
+    falling = Roof("shed", along_y, 0.0, 0.4, 0.3, falling=True)
+    rising = Roof("shed", along_y, 0.0, 0.4, 0.3)
+    return [
+        Wing.at(*low, wall, top, falling),
+        Wing.at(*high, wall, top, rising),
+    ]
+
+
+def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
+    openings = Openings(hall, halls)
+    high, width = hall.wall_top, p.bay - 0.9
+    band = bays.window(
+        width, high - 2.4, high - 0.6, _SPORTS_HALL_RECESS, mullions=1
+    )
+    low = max(0.5 if p.annex == 0.0 else p.annex_height + 0.4, 0.3 * high)
+    tall = bays.window(
+        width,
+        low,
+        high - 0.6,
+        _SPORTS_HALL_RECESS,
+        mullions=1,
+        transom=high - 1.6,
+    )
+    ends = hall.gables
+    sides = [k for k in range(4) if k not in ends]
+    openings.row(sides, high - 1.0, p.bay, [band], 0.5)
+    openings.row(ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9)
+    openings.put(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
+    openings.enclose(p, (_SPORTS_HALL_RECESS,), (Band(0.0, 0.5, -0.08),))
+    _add_frames(p, hall, halls)
+
+
+def _add_frames(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
+    """Adds posts along the walls, and ribs over the roof."""
+    reach = p.frame_reach - 0.02
+    for edge in (k for k in range(4) if k not in hall.gables):
+        wall = hall.wall(edge)
+        for a, b in free_stretches(hall, edge, halls, 0.5):
+            for u, _ in bays.stretches(b - a, p.bay, 0.5)[1:]:
+                left, right = a + u - 0.2, a + u + 0.2
+                foot = massing.rectangle(left, -0.02, right, reach)
+                head = massing.rectangle(left, -0.02, right, 0.3 * reach)
+                post = massing.frustum(foot, head, 0.0, hall.wall_top)
+                root = wall.standing(left, right, -0.02, reach, 0.0)
+                p.add_to("frames", root, wall.place(post))
+    line = [(u, z + 0.15) for u, z in hall.line]
+    start, end = hall.ridge
+    for u, _ in bays.stretches(end - start, p.bay, 0.5)[1:]:
+        ends = (start + u - 0.18, start + u + 0.18)
+        rib = roofs.shell(line, *ends, 0.25, along_y=hall.roof.along_y)
+        p.add_to("frames", rib)
+
+
+def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
+    """Adds the low front: an entrance between changing rooms."""
+    x0, x1 = min(w.x0 for w in halls), max(w.x1 for w in halls)
+    margin, h = 0.06 * (x1 - x0), p.annex_height
+    area = (x0 + margin, y0 + 1.6, x1 - margin, halls[0].y0 + 0.05)
+    annex = Wing.flat(*area, h, 0.4)
+    openings = Openings(annex, halls)
+    small = bays.window(1.6, 1.5, 2.5, _SPORTS_HALL_RECESS)
+    openings.row((0, 1, 3), 1.0, 3.6, [small], 0.8)
+    middle, wide = annex.width / 2, min(7.0, 0.35 * annex.width)
+    glazing = bays.window(
+        wide - 0.6, 0.05, h - 0.8, _SPORTS_HALL_RECESS, mullions=3
+    )
+    openings.put(0, middle, wide, glazing)
+    openings.enclose(p, (_SPORTS_HALL_RECESS,), (Band(0.0, 0.3, -0.05),))
+    z, half = h - 0.65, wide / 2 + 1.0
+    lid = (middle - half, middle + half, -0.02, 1.5, z, z + 0.25)
+    p.add_to("frames", annex.wall(0).box(*lid))
+    equip_roof(p, annex.outline, annex.floor, p.roof_items, clear=0.5)
+
+
+def _add_porch(p: SportsHall, halls: list[Wing]) -> None:
+    wall = halls[0].wall(0)
+    x = wall.length / 2
+    p.add_to("frames", wall.box(x - 2.2, x + 2.2, -0.02, 1.5, 2.7, 3.0))
+    for u in (x - 2.1, x + 2.1):
+        post = wall.standing(u - 0.12, u + 0.12, 1.2, 1.44, 2.75)
+        p.add_to("frames", post)
+    p.add_to("glass", wall.box(x - 1.6, x + 1.6, -0.02, 0.1, 0.0, 2.5))
+
+
+class WaterfrontHall(Building):
+    """The waterfront hall: a long shed with a loading dock and big doors.
+
+    Lengths are in metres.
+
+    `roof` is `gable`, `barrel` or `sawtooth`; the ridge is at `height`.
+    """
+
+    def draw(self, d: Dice) -> None:
+        roof = d.pick(("gable", "barrel", "sawtooth"))
+        dock = d.uniform(2.5, 4.0, 1)
+        depth = d.depth - dock
+        self.roof = roof
+        self.eaves = round(d.height * d.uniform(0.6, 0.7), 1)
+        self.spans = max(1, round(depth / d.uniform(16.0, 22.0)))
+        self.pitch = max(d.uniform(4.5, 6.0), (d.width + depth) / 15)
+        self.pier_width = d.uniform(0.6, 0.9, 2)
+        self.pier_reach = d.uniform(0.2, 0.34, 2)
+        self.window_depth = d.uniform(0.2, 0.35, 2)
+        self.door_every = d.whole(2, 4)
+        self.dock_depth = dock
+        self.dock_height = d.uniform(0.9, 1.2, 2)
+        self.ventilators = d.whole(3, 7)
+
+    def build(self) -> None:
+        """Builds the hall on a rectangle, its dock at the front."""
+        x0, y0, x1, y1 = self.site.bounds
+        front = y0 + self.dock_depth
+        plan = massing.rectangle(x0, front, x1, y1)
+        walls = _walls(self)
+        pieces = [
+            massing.foundation(plan),
+            facade_mesh(plan, walls),
+            details.piers(
+                plan, self.pitch, self.pier_width, self.pier_reach, 0.0,
+                self.eaves - 0.5, margin=0.5 + self.pier_width / 2,
+            ),
+            *_dock(self, x0, x1, y0, front),
+        ]  # fmt: skip
+        self.add("walls", *pieces)
+        self.add("glass", glass_mesh(plan, walls), rgb=self.glass_rgb)
+        self.add("roof", _roof(self, plan), rgb=self.colours["roof"])
+
+
+def _walls(p: WaterfrontHall) -> Facade:
+    """Tall windows between the piers, doors under every few of them."""
+    head = p.eaves - 1.0
+    window = bays.window(
+        p.pitch - 1.6, 2.2, head, p.window_depth, mullions=1,
+        transom=round((2.2 + head) / 2, 2),
+    )  # fmt: skip
+    door = bays.gate(p.pitch - 1.4, min(4.6, head - 0.3))
+    front = bays.gate(p.pitch - 1.4, min(4.2 + p.dock_height, head - 0.3))
+    choices = [front] + [window] * (p.door_every - 1)
+    rows = bays.rhythm(p.pitch, [window], margin=0.5)
+    layouts = {0: bays.rhythm(p.pitch, choices, margin=0.5), 2: rows}
+    layout = bays.by_edge(layouts, bays.with_middle(rows, door, p.pitch))
+    bands = (Band(0.0, 0.6, -0.1), Band(p.eaves - 0.5, p.eaves, -0.3))
+    return Facade(p.eaves, bands, layout, (p.window_depth,))
+
+
+def _dock(
+    p: WaterfrontHall, x0: float, x1: float, y0: float, front: float
+) -> list[Mesh]:
+    """A loading platform under a canopy on posts, steps at both ends."""
+    high = p.dock_height
+    a, b = x0 + 2.0, x1 - 2.0
+    platform = massing.standing(a, b, y0 + 0.4, front, high, bottom=True)
+    steps = details.steps(0.0, p.dock_depth - 0.6, 1.6, high, 5)
+    ends = massing.rectangle(a, y0 + 0.4, b, front)
+    pieces = [platform]
+    pieces += [details.WallFrame(ends, k).place(steps) for k in (1, 3)]
+    eaves = min(p.eaves - 0.8, high + 5.2)
+    (ya, za), (yb, zb) = (
+        (front - p.dock_depth + 0.1, eaves - 0.5),
+        (front, eaves),
+    )
+    section = [(ya, za), (yb, zb), (yb, zb + 0.2), (ya, za + 0.25)]
+    vertices = np.array([(x, y, z) for x in (a, b) for y, z in section])
+    faces = [(k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4) for k in range(4)]
+    faces += [(0, 1, 2, 3), (7, 6, 5, 4)]
+    pieces.append(Mesh(vertices, tuple(f[::-1] for f in faces)))
+    for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
+        post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
+        pieces.append(massing.box(*post, high - 0.1, eaves - 0.2))
+    return pieces
+
+
+def _roof(p: WaterfrontHall, plan: np.ndarray) -> Mesh:
+    (x0, y0), (x1, y1) = plan[0], plan[2]
+    rise = p.height - p.eaves
+    if p.roof == "sawtooth":
+        teeth = massing.extruded(_sawtooth(x0, x1, rise), y0, y1)
+        teeth = massing.swapped(teeth)
+        return teeth.moved((0.0, 0.0, p.eaves))
+    pieces = []
+    edges = np.linspace(y0, y1, p.spans + 1)
+    for a, b in itertools.pairwise(edges):
+        shed = massing.extruded(_profile(p.roof, a, b, rise), x0, x1)
+        pieces.append(shed.moved((0.0, 0.0, p.eaves)))
+        pieces += _ridge(p, x0, x1, (a + b) / 2)
+    return merge_meshes(*pieces)
+
+
+def _ridge(p: WaterfrontHall, x0: float, x1: float, y: float) -> list[Mesh]:
+    """A monitor along the ridge with ventilators at equal distances."""
+    top, low = p.height - 0.25, p.height - 1.1
+    length = x1 - x0
+    a, b = x0 + 0.15 * length, x1 - 0.15 * length
+    pieces = [massing.box(a, b, y - 0.7, y + 0.7, low, top, bottom=False)]
+    for k in range(p.ventilators):
+        x = a + (k + 0.5) * (b - a) / p.ventilators
+        hood = (x - 0.5, x + 0.5, y - 0.9, y + 0.9)
+        pieces.append(massing.box(*hood, low, p.height, bottom=False))
+    return pieces
+
+
+def _sawtooth(x0: float, x1: float, rise: float) -> list:
+    """Upright glazing and the slopes that fall away from it."""
+    teeth = max(2, round((x1 - x0) / 7.0))
+    step = (x1 - x0) / teeth
+    line = [(x0, 0.0)]
+    for k in range(teeth):
+        line += [(x0 + k * step, rise), (x0 + (k + 1) * step, 0.0)]
+    return line
+
+
+def _profile(roof: str, a: float, b: float, rise: float) -> list:
+    # The monitor on the ridge stands above the roof by what is kept here.
+    rise -= 0.6
+    half, middle = (b - a) / 2, (a + b) / 2
+    if roof == "gable":
+        return [(a, 0.0), (middle, rise), (b, 0.0)]
+    angles = np.linspace(np.pi, 0.0, 9)[1:-1]
+    arc = [(middle + half * np.cos(t), rise * np.sin(t)) for t in angles]
+    return [(a, 0.0), *arc, (b, 0.0)]

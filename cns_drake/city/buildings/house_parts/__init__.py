@@ -1,1 +1,0 @@
-"""Parts of houses: walls, porches, dormers, shop fronts."""

@@ -1,1 +1,0 @@
-"""Houses for one family or a few, and barns."""

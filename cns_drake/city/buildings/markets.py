@@ -1,0 +1,395 @@
+"""Shops of one storey: a strip, a row of kiosks, a supermarket."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.facades import bays, details, house_walls, massing, roofs
+from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Patch
+from cns_drake.city.facades.wings import Roof, Wing
+
+# Kept free in front for canopies and behind for gutters [m].
+_FRONT_M, _BACK_M = 0.4, 0.1
+
+
+class ShopStrip(Building):
+    """The strip of shops: low flat-roofed units side by side, each its own.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the highest parapet.
+        unit_width: wanted, of a shop.
+        ground: height of the shops without their parapets.
+        upper: part of the units with an upper floor, where height allows.
+        canopy: whether one canopy runs along all shops, else awnings.
+        canopy_reach: of the canopy.
+        steps: by how much parapets differ.
+        roof_items: on the roofs.
+    """
+
+    def draw(self, d: Dice) -> None:
+        ground = round(min(d.uniform(3.6, 4.2), d.height - 0.5), 2)
+        self.unit_width = d.uniform(5.5, 9.0)
+        self.ground = ground
+        self.upper = d.uniform(0.2, 0.7)
+        self.canopy = d.chance(0.45)
+        self.canopy_reach = d.uniform(0.9, 1.3, 2)
+        self.steps = d.uniform(0.3, 0.6, 2)
+        self.roof_items = d.some_of("ac_unit ac_unit vents skylight", 1, 5)
+
+    def build(self) -> None:
+        """Builds the strip along the front of a rectangle."""
+        site = self.site
+        x0, y0, x1, y1 = site.bounds
+        count = max(1, round((x1 - x0) / self.unit_width))
+        shares = self.rng.uniform(0.8, 1.2, count)
+        bounds = x0 + (x1 - x0) * np.cumsum([0.0, *shares]) / shares.sum()
+        highest = int(self.rng.integers(count))
+        for k in range(count):
+            blind = self.site.blind_in(k, count)
+            tall = self.height > self.ground + 3.4 and (
+                k == highest or self.rng.random() < self.upper
+            )
+            top = self.height if k == highest else _top(self, tall, self.rng)
+            back = y1 - _BACK_M - float(self.rng.uniform(0.0, 0.12)) * (y1 - y0)
+            area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
+            roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
+            wing = Wing.at(*area, top - 0.1, top, roof, blind)
+            _add_unit(self, wing, tall)
+            if k % 3 == 0:
+                part = f"unit_{k}_"
+                equip_roof(
+                    self, wing.outline, wing.floor, self.roof_items, prefix=part
+                )
+
+
+def _top(p: ShopStrip, tall: bool, rng: np.random.Generator) -> float:
+    """Returns the parapet of a unit that is not the highest [m]."""
+    drop = p.steps * int(rng.integers(0, 3))
+    if tall or p.height < p.ground + 3.4:
+        return round(max(p.height - drop, p.ground + 0.4), 2)
+    return round(p.ground + 0.5 + 0.5 * drop, 2)
+
+
+def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
+    openings, rng = Openings(wing), p.rng
+    wall = wing.wall(0)
+    cladding = "walls" if rng.random() < 0.5 else "facing"
+    upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
+    storey = (wing.top - 0.5 - p.ground) / max(upper_floors, 1)
+    width = round(float(rng.uniform(1.1, 2.2)), 2)
+    house_walls.add_rows(
+        openings, (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
+        head=min(2.3, storey - 0.4),
+    )  # fmt: skip
+    house_walls.add_shops(
+        p, wall, openings, 0, 0.2, wall.length - 0.2, p.ground,
+        width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
+    )  # fmt: skip
+    back = [bays.gate(2.0, 2.2, 0.2), house_walls.sash(1.0, 0.0, 1.6, 2.3)]
+    openings.row((2,), 0.5, 3.6, back, 0.7)
+    glass = (house_walls.GLASS_M, *house_walls.SHOP_GLASS_M)
+    openings.enclose(p, glass, (Band(0.0, 0.3, -0.05),), cladding)
+    if p.canopy:
+        z, reach = p.ground - 0.95, p.canopy_reach
+        lid = (0.05, wall.length - 0.05, -0.02, reach, z, z + 0.22)
+        p.add_to("awning", wall.box(*lid))
+    _add_parapet(p, wing, cladding)
+
+
+def _add_parapet(p: ShopStrip, wing: Wing, cladding: str) -> None:
+    """Frames the parapet's front: a coping, or piers at its ends."""
+    wall, top, rng = wing.wall(0), wing.top, p.rng
+    length = wall.length
+    if rng.random() < 0.5:
+        coping = (0.02, length - 0.02, -0.05, 0.12, top - 0.2, top - 0.02)
+        p.add_to("trim", wall.box(*coping))
+    else:
+        for x in (0.25, length - 0.25):
+            pier = (x - 0.22, x + 0.22, -0.05, 0.15, 0.0, top - 0.03)
+            p.add_to(cladding, wall.box(*pier))
+    visible = top - p.ground - 0.1 > 0.6 and top < p.height - 3.0
+    if rng.random() < 0.4 and visible:
+        sign = (0.25 * length, 0.75 * length, -0.15, 0.1, top - 0.3, top + 0.7)
+        p.add_to("sign", wall.box(*sign))
+
+
+_COUNTER = 1.05
+
+
+class KioskRow(Building):
+    """The row of kiosks: small stalls with counters behind a common arcade.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the highest roof.
+        stall: wanted width of a stall.
+        depth: of the stalls.
+        gap: between groups of stalls.
+        group: stalls built wall to wall.
+        roof: `hip`, `gable`, `barrel` or `shed`.
+        arcade: reach of a roof on posts in front; 0 for awnings.
+        tower: whether one stall carries a lantern.
+    """
+
+    def draw(self, d: Dice) -> None:
+        depth = d.depth
+        arcade = d.uniform(1.6, 2.4, 2)
+        self.stall = d.uniform(2.8, 4.2)
+        self.depth = round(min(d.uniform(2.8, 4.2), depth - 3.0), 2)
+        self.gap = d.uniform(0.8, 1.8, 2)
+        self.group = d.whole(1, 4)
+        self.roof = d.pick(("hip", "gable", "barrel", "shed"))
+        self.arcade = arcade if d.chance(0.5) else 0.0
+        self.tower = d.height > 4.6 and d.chance(0.6)
+
+    def build(self) -> None:
+        """Builds the row along the front of a rectangle."""
+        x0, y0, x1, y1 = self.site.bounds
+        left, right = x0 + 0.5, x1 - 0.5
+        front = y0 + 2.2 if self.arcade == 0.0 else y0 + self.arcade + 0.5
+        boxes = _stalls(self, left, right, front)
+        tallest = len(boxes) // 2
+        for k, wing in enumerate(boxes):
+            _add_stall(self, wing, boxes, k)
+            if k == tallest and self.tower:
+                _add_lantern(self, wing)
+        if self.arcade > 0:
+            _add_arcade(self, (boxes[0].x0, boxes[-1].x1), front)
+        slab = massing.box(left - 0.3, right + 0.3, y0 + 0.1, y1 - 0.1,
+                           -massing.FOUNDATION_M, 0.12)  # fmt: skip
+        self.add_to("timber", slab)
+
+
+def _stalls(p: KioskRow, left: float, right: float, front: float) -> list[Wing]:
+    """Returns the boxes of the stalls; the middle one is the tallest."""
+    unit = p.stall + p.gap / p.group
+    count = max(1, int((right - left + p.gap) / unit))
+    gaps = p.gap * ((count - 1) // p.group)
+    width = (right - left - gaps) / count
+    roof = Roof(p.roof, p.roof in ("gable", "barrel"), 0.0, 0.2, 0.15)
+    if p.roof == "hip":
+        roof = Roof("hip", False, 0.25, 0.0, 0.15)
+    if p.roof == "shed":
+        roof = Roof("shed", False, 0.25, 0.0, 0.15, falling=True)
+    top = p.height - (1.1 if p.tower else 0.0)
+    boxes, x = [], left
+    for k in range(count):
+        high = top - (0.25 * (k % 2) if k != count // 2 else 0.0)
+        wall = max(2.2, high - 0.32 * min(width, p.depth))
+        area = (x, front, x + width, front + p.depth)
+        boxes.append(Wing.at(*area, min(wall, high - 0.35), high, roof))
+        x += width + p.gap * ((k + 1) % p.group == 0)
+    return boxes
+
+
+def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
+    """Adds a stall: a counter under an awning, or closed shutters."""
+    openings = Openings(wing, boxes)
+    wall, material = wing.wall(0), ("stalls", "others")[k % 2]
+    a, b = 0.3, wall.length - 0.3
+    head = min(2.15, wing.wall_top - 0.25)
+    if p.rng.random() < 0.75:
+        openings.add(0, [Patch(a, b, _COUNTER, head, 0.7)])
+        shelf = wall.box(a, b, -0.3, 0.3, _COUNTER - 0.08, _COUNTER)
+        p.add_to("timber", shelf)
+        if p.arcade == 0.0:
+            shade = details.awning(a - 0.1, b + 0.1, 1.3, 1.95, head + 0.1)
+            p.add_to("awning", wall.place(shade))
+    else:
+        shutter = bays.gate(b - a, head, 0.12)
+        openings.add(0, shutter(a - 0.3, b + 0.3))
+    door = bays.window(0.9, 0.05, 2.0, 0.12)
+    openings.row((2,), 0.2, wall.length, [door], 0.3)
+    sign = details.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
+    p.add_to("awning", wall.place(sign))
+    bands = (Band(0.0, 0.25, -0.05),)
+    openings.enclose(p, (0.12,), bands, material)
+
+
+def _add_lantern(p: KioskRow, wing: Wing) -> None:
+    """Adds a small square lantern with its own roof."""
+    low, top = wing.wall_top, p.height
+    body = massing.square(*wing.center, 0.6)
+    eaves = massing.inset(body, -0.25)
+    p.add_to("others", massing.skirt(body, body, low, top - 0.7))
+    p.add_to("roof", massing.tent(eaves, wing.center, top - 0.72, top))
+
+
+def _add_arcade(p: KioskRow, xs: bays.Span, front: float) -> None:
+    """Adds a lean-to roof on posts along the whole row."""
+    a, b = xs
+    low, y = 2.35, front - p.arcade
+    top = min(2.9, p.height - 0.4)
+    line = [(y - 0.15, low + 0.15), (front + 0.05, top)]
+    p.add_to("roof", roofs.shell(line, a, b, 0.12))
+    for x in np.linspace(a + 0.15, b - 0.15, max(2, round((b - a) / 3.2))):
+        post = massing.standing(x - 0.08, x + 0.08, y, y + 0.16, low + 0.1)
+        p.add_to("timber", post)
+    beam = massing.box(a, b, y, y + 0.16, low - 0.15, low + 0.06)
+    p.add_to("timber", beam)
+
+
+_RECESS = 0.25
+
+
+class Supermarket(Building):
+    """The supermarket: a low hall, a glazed front under a canopy, a dock.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the entrance's gable or sign.
+        eaves: of the hall.
+        entrance: `tower` (a box), `gable` or `vault` above the doors.
+        entrance_at: its place along the front, a part of it.
+        entrance_width: [m].
+        canopy: reach of the canopy along the front.
+        pitch: of the pilasters.
+        dock_left: side of the loading dock.
+        dock_depth: of the dock beside the hall; 0 for none.
+        shelters: for trolleys, in front.
+    """
+
+    def draw(self, d: Dice) -> None:
+        width = d.width
+        entrance = min(d.uniform(7.0, 11.0), 0.4 * width)
+        self.eaves = round(min(d.uniform(5.0, 6.5), 0.75 * d.height), 2)
+        self.entrance = d.pick(("tower", "gable", "vault"))
+        self.entrance_at = d.uniform(0.25, 0.75)
+        self.entrance_width = round(entrance, 1)
+        self.canopy = d.uniform(2.2, 3.2, 2)
+        self.pitch = max(d.uniform(5.0, 7.0), width / 9)
+        self.dock_left = d.chance(0.5)
+        self.dock_depth = 4.5 if width > 32.0 and d.chance(0.8) else 0.0
+        self.shelters = d.whole(0, 3)
+        self.roof_items = d.some_of(
+            "air_handler air_handler cooling_tower skylight skylight skylight "
+            "ac_unit vents",
+            4,
+            9,
+        )
+
+    def build(self) -> None:
+        """Builds the hall on a rectangle, its entrance in front."""
+        x0, y0, x1, y1 = self.site.bounds
+        left = x0 + 0.3 + self.dock_depth * self.dock_left
+        right = x1 - 0.3 - self.dock_depth * (not self.dock_left)
+        area = (left, y0 + self.canopy + 1.2, right, y1 - 0.3)
+        hall = Wing.flat(*area, self.eaves, 0.9, rim=0.2)
+        openings = Openings(hall)
+        glazing = bays.window(
+            self.pitch - 0.9, 0.4, 3.3, _RECESS, mullions=2, transom=2.4
+        )
+        openings.row((0,), 0.5, self.pitch, [glazing], 0.6)
+        band = bays.window(
+            self.pitch - 1.4, self.eaves - 2.3, self.eaves - 1.3, _RECESS
+        )
+        openings.row((1, 3), 1.0, 1.6 * self.pitch, [band], 1.2)
+        service = [
+            bays.gate(2.6, 2.8, 0.25),
+            bays.window(1.1, 0.0, 2.2, _RECESS),
+        ]
+        openings.row((2,), 0.5, 8.0, service, 1.5)
+        bands = (
+            Band(0.0, 0.4, -0.06),
+            Band(self.eaves - 0.7, self.eaves - 0.2, -0.08),
+        )
+        openings.enclose(self, (_RECESS,), bands)
+        piers = details.pilasters(
+            hall.outline, self.pitch, 0.6, 1, 0.5, 0.2, 0.0, self.eaves - 0.5
+        )
+        self.add_to("walls", piers)
+        _add_canopy(self, hall.wall(0))
+        _add_entrance(self, hall)
+        if self.dock_depth:
+            _add_dock(self, hall)
+        _add_shelters(self, hall.wall(0))
+        equip_roof(self, hall.outline, hall.floor, self.roof_items, clear=2.0)
+
+
+def _add_canopy(p: Supermarket, wall: details.WallFrame) -> None:
+    """Adds a flat canopy on posts along the front."""
+    z, reach = 3.45, p.canopy
+    lid = wall.box(0.3, wall.length - 0.3, -0.05, reach, z, z + 0.4)
+    p.add_to("brand", lid)
+    for a, _ in bays.stretches(wall.length - 1.0, p.pitch, 0.5):
+        u = 0.5 + a
+        post = (u - 0.12, u + 0.12, reach - 0.5, reach - 0.26, z + 0.02)
+        p.add_to("steel", wall.standing(*post))
+
+
+def _add_entrance(p: Supermarket, hall: Wing) -> None:
+    """Adds a porch with sliding doors, higher than the hall."""
+    length, w = hall.width, p.entrance_width
+    x = float(
+        np.clip(p.entrance_at * length, w / 2 + 0.5, length - w / 2 - 0.5)
+    )
+    top, y0 = p.height, hall.y0 - p.canopy - 0.3
+    kind, rise = {
+        "tower": ("flat", 0.1),
+        "gable": ("gable", 0.22 * w),
+        "vault": ("barrel", 0.2 * w),
+    }[p.entrance]
+    wall_top = max(top - rise - 0.2, p.eaves - 0.5)
+    roof = Roof(kind, True, 0.0, 0.25, 0.2, parapet=0.6)
+    area = (hall.x0 + x - w / 2, y0, hall.x0 + x + w / 2, hall.y0 + 5.0)
+    porch = Wing.at(*area, wall_top, top, roof)
+    openings = Openings(porch, (hall,))
+    doors = bays.window(w - 2.4, 0.05, 2.6, _RECESS, mullions=3)
+    openings.put(0, w / 2, w - 1.6, doors)
+    if wall_top > 5.0:
+        light = bays.window(w - 2.4, 2.95, wall_top - 1.5, _RECESS, mullions=3)
+        openings.add(0, light(0.8, w - 0.8))
+    openings.enclose(p, (_RECESS,), material="brand")
+    sign = (0.2 * w, 0.8 * w, -0.02, 0.22, wall_top - 1.2, wall_top - 0.15)
+    p.add_to("steel", porch.wall(0).box(*sign))
+
+
+def _add_dock(p: Supermarket, hall: Wing) -> None:
+    """Adds a loading dock with its roof and a wall beside the hall."""
+    wall = hall.wall(3 if p.dock_left else 1)
+    reach = p.dock_depth - 0.4
+    # Near the back, whichever way the wall runs.
+    a, b = (1.0, 10.0) if p.dock_left else (wall.length - 10.0, wall.length - 1)
+    a, b = max(a, 0.5), min(b, wall.length - 0.5)
+    posts = (
+        wall.box(
+            u - 0.12, u + 0.12, reach - 0.27, reach - 0.03, 2.1, 4.05,
+            bottom=False,
+        )
+        for u in (a + 0.2, b - 0.2)
+    )  # fmt: skip
+    screen = (a - 0.1, b + 0.1, reach - 0.3, reach, 2.2)
+    p.add_to(
+        "walls",
+        wall.standing(a, b, -0.05, reach - 1.2, 1.1, bottom=True),
+        wall.box(a - 0.1, b + 0.1, -0.05, reach, 4.0, 4.3),
+        wall.standing(*screen, bottom=True),
+        *posts,
+    )
+    for u in np.linspace(a + 2.0, b - 2.0, 2).tolist():
+        p.add_to("steel", wall.box(u - 1.3, u + 1.3, -0.02, 0.12, 1.1, 3.7))
+
+
+def _add_shelters(p: Supermarket, wall: details.WallFrame) -> None:
+    """Adds bent roofs for trolleys in front of the canopy's ends."""
+    y = p.canopy + 0.1
+    for k in range(p.shelters):
+        x = 3.2 if k == 0 else wall.length - 3.2
+        a, b = x - 2.2, x + 2.2
+        posts = (
+            wall.standing(u - 0.06, u + 0.06, y + 0.1, y + 0.22, 2.15)
+            for u in (a + 0.1, b - 0.1)
+        )
+        p.add_to(
+            "steel",
+            wall.box(a, b, y, y + 0.9, 2.1, 2.2),
+            *posts,
+            wall.box(a, b, y + 0.85, y + 0.9, 0.5, 1.1),
+        )

@@ -1,0 +1,550 @@
+"""Towers of offices, one of them under construction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import itertools
+
+import numpy as np
+
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Assembly, Building, Dice, Site
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import (
+    Band,
+    Facade,
+    Relief,
+    facade_mesh,
+    glass_mesh,
+)
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import MeshShape
+
+
+class BandedTower(Building):
+    """The banded office tower: round corners, bands of glass, gardens between.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the parapet.
+        radius: of the rounded corners.
+        corners: which corners of the rectangle are round.
+        stacks: of storeys, with an open floor between two.
+        taper: by which every other stack is smaller.
+        lobby: height of the ground floor.
+        storey: wanted height of a storey.
+        spandrel: height of the bands between the glass.
+        ledge: how far a sunshade above the glass sticks out.
+        recess: of the glass.
+        fins: distance between upright fins; 0 for none.
+    """
+
+    def draw(self, d: Dice) -> None:
+        side = massing.shortest_side(d.site.outline)
+        self.radius = round(d.uniform(0.18, 0.42) * side, 2)
+        self.corners = d.pick(((0, 1, 2, 3), (0, 2), (0, 1), (1,)))
+        self.stacks = int(np.clip(round(d.height / d.uniform(24, 40)), 1, 3))
+        self.taper = d.uniform(0.03, 0.08) * side
+        self.lobby = d.uniform(5.0, 7.5, 2)
+        self.storey = d.uniform(3.5, 4.0)
+        self.spandrel = d.uniform(0.9, 1.3, 2)
+        self.ledge = d.pick((0.15, 0.5, 0.8))
+        self.recess = d.uniform(0.2, 0.4, 2)
+        self.fins = d.pick((0.0, 5.0, 7.0))
+        self.roof_items = d.some_of(
+            "lift_house cooling_tower air_handler ac_unit mast", 2, 6
+        )
+
+    def build(self) -> None:
+        """Builds the tower on a rectangle."""
+        x0, y0, x1, y1 = self.site.bounds
+        base = massing.rectangle(x0 + 0.8, y0 + 0.8, x1 - 0.8, y1 - 0.8)
+        step = max(2.8, 0.5 * self.radius)
+        outer = np.round(
+            massing.rounded(
+                base, dict.fromkeys(self.corners, self.radius), step
+            ),
+            3,
+        )
+        inner = massing.inset(
+            outer, min(self.taper, 0.5 * massing.inset_limit(outer))
+        )
+        z = _add_lobby(self, inner)
+        gap = 3.4
+        room = (self.height - 1.2 - z - gap * (self.stacks - 1)) / self.stacks
+        counts = tiers.divided(room, self.storey, 12 // self.stacks)
+        shapes = [
+            _Stack(self, self, plan, counts, name)
+            for plan, name in ((outer, "wide"), (inner, "slim"))[: self.stacks]
+        ]
+        for k in range(self.stacks):
+            z = shapes[k % 2].place(z, k)
+            if k + 1 < self.stacks:
+                z = _add_garden(self, shapes[k % 2].plan, inner, z, gap, k)
+        plan = shapes[(self.stacks - 1) % 2].plan
+        rim = round(self.height - z, 3)
+        crown = Facade(rim, (Band(rim - 0.4, rim, -min(0.3, self.ledge)),))
+        roof = tiers.add_crown(
+            self, plan, crown, z, min(0.9, rim - 0.1), thickness=0.3
+        )
+        equip_roof(self, plan, roof, self.roof_items)
+
+
+def _add_lobby(p: BandedTower, plan: np.ndarray) -> float:
+    h = p.lobby
+    pane = bays.ribbon(0.2, h - 0.9, 0.3, 0.16)
+    # Long walls may meet at right angles, where recesses must not touch.
+    short, long = (bays.rhythm(3.2, [pane], m) for m in (0.1, 0.45))
+
+    def glazing(edge: int, length: float) -> Sequence[Relief]:
+        return (short if length < 4.5 else long)(edge, length)
+
+    door = bays.entrance(3.4, 3.0, 1.2, surround=0.1)
+    layout = bays.with_door(glazing, door, 5.2)
+    facade = Facade(h, (Band(h - 0.6, h, -0.15),), layout, (0.3,))
+    half = min(3.5, max(1.2, details.WallFrame(plan, 0).length / 2 - 0.5))
+    lid = details.front_canopy(plan, half, 2.0, 3.5)
+    return tiers.add_ground(p, plan, facade, [lid])
+
+
+def _add_garden(
+    p: BandedTower,
+    plan: np.ndarray,
+    inner: np.ndarray,
+    z0: float,
+    height: float,
+    number: int,
+) -> float:
+    """Adds an open floor: columns around a smaller glazed core.
+
+    Args:
+        out: the building.
+        plan: outline of the floor.
+        inner: the smallest outline of the storeys above.
+        z0, height: of the floor [m].
+        number: of the garden.
+    """
+    limit = massing.inset_limit(inner)
+    core = massing.inset(inner, min(2.8, 0.6 * limit))
+    walls = tiers.block(core, Facade(height, (Band(0.4, 2.9, 0.15),)), z0)
+    ring = massing.inset(inner, min(0.8, 0.2 * limit))
+    columns = []
+    for edge in range(len(ring)):
+        wall = details.WallFrame(ring, edge)
+        count = max(1, round(wall.length / 7.0))
+        for k in range(count):
+            spot = wall.point((k + 0.5) * wall.length / count, 0.0)
+            shaft = massing.regular_polygon(0.3, 8, spot)
+            columns.append(massing.skirt(shaft, shaft, z0, z0 + height))
+    floor = massing.roof_pan(plan, z0, z0 + 1.0, 0.2)
+    rim = massing.skirt(plan, plan, z0, z0 + 1.0)
+    p.add(f"garden_{number}", walls, floor, rim, *columns)
+    return round(z0 + height, 3)
+
+
+class _Stack:
+    """Storeys of one outline, to be placed several times."""
+
+    def __init__(
+        self,
+        out: Assembly,
+        p: BandedTower,
+        plan: np.ndarray,
+        counts: tuple[int, int, float],
+        name: str,
+    ):
+        self.plan = plan
+        self._out = out
+        self._groups, per_group, storey = counts
+        self._step = per_group * storey
+        bands = (
+            Band(0.0, p.spandrel, 0.0),
+            Band(p.spandrel, storey, p.recess),
+            Band(storey - 0.2, storey, -p.ledge),
+        )
+        facade = Facade(storey, bands, glass=(p.recess,)).stacked(per_group)
+        pieces = [facade_mesh(plan, facade)]
+        if p.fins > 0:
+            # They cross the sunshades and meet those above and below.
+            fins = details.piers(
+                plan, p.fins, 0.18, p.ledge + 0.1, 0.0, self._step,
+                depth=p.recess + 0.05, margin=0.8,
+            )  # fmt: skip
+            pieces.append(fins)
+        self._height = round(self._groups * self._step, 3)
+        pane = massing.inset(plan, p.recess - 0.004)
+        glass = massing.skirt(pane, pane, 0.0, self._height)
+        soffit = massing.flat(plan, 0.0, up=False)
+        self._walls, self._glass, self._soffit = (
+            MeshShape(out.define(f"{name}{part}", mesh))
+            for part, mesh in (
+                ("", merge_meshes(*pieces)),
+                ("_glass", glass),
+                ("_soffit", soffit),
+            )
+        )
+
+    def place(self, z0: float, number: int) -> float:
+        """Places the storeys; returns their top [m]."""
+        at, part, out = (0.0, 0.0, z0), f"stack_{number}", self._out
+        out.place(f"{part}_glass", self._glass, at, rgb=out.glass_rgb)
+        out.place(f"{part}_soffit", self._soffit, at)
+        for k in range(self._groups):
+            z = z0 + k * self._step
+            out.place(f"{part}_storey_{k:02d}", self._walls, (0.0, 0.0, z))
+        return round(z0 + self._height, 3)
+
+
+class GridTower(Building):
+    """The gridded office tower: deep frames, plant floors, offset slabs.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the crown.
+        plan: `box`, `offset` (two slabs that slide past each other) or
+            `notched`.
+        shift: of the slabs or size of the notches, as a part of the depth.
+        lobby: height of the ground floor.
+        storey: wanted height of a storey.
+        pitch: of the frames.
+        pier, beam: what the frames leave of wall beside and below windows.
+        recess: of the windows.
+        double: whether each frame spans two storeys.
+        waist: where a plant floor interrupts the grid, as a part of the
+            height; 0 for none.
+        crown: height of the screen around the roof.
+    """
+
+    def draw(self, d: Dice) -> None:
+        self.plan = d.pick(("box", "offset", "notched"))
+        self.shift = d.uniform(0.1, 0.18)
+        self.lobby = d.uniform(5.5, 8.0, 2)
+        self.storey = d.uniform(3.5, 4.0)
+        self.pitch = max(d.uniform(3.4, 5.0), d.site.open_length / 28)
+        self.pier = d.uniform(0.5, 0.9, 2)
+        self.beam = d.uniform(0.5, 0.9, 2)
+        self.recess = d.uniform(0.4, 0.8, 2)
+        self.double = d.chance(0.4)
+        self.waist = d.uniform(0.45, 0.65) if d.height > 55.0 else 0.0
+        self.crown = d.uniform(2.4, 4.5, 2)
+        self.roof_items = d.some_of(
+            "lift_house cooling_tower air_handler cooling_tower mast ac_unit",
+            3,
+            7,
+        )
+
+    @property
+    def margin(self) -> float:
+        """Width of solid wall at corners, which keeps recesses apart [m]."""
+        return self.recess + 0.15
+
+    def build(self) -> None:
+        """Builds the tower on a rectangle."""
+        plan = np.round(_plan(self, self.site), 2)
+        top = _add_grid_tower_lobby(self, plan)
+        if self.waist > 0:
+            top = _add_grid(self, plan, top, self.waist * self.height, "low")
+            top = _add_plant_floor(self, plan, top)
+        top = _add_grid(self, plan, top, self.height - self.crown, "storey")
+        rim = round(self.height - top, 3)
+        louvre = bays.window(self.pitch - self.pier, 0.5, rim - 0.5, 0.25)
+        louvres = bays.rhythm(self.pitch, [louvre], self.margin)
+        crown = Facade(rim, (Band(0.0, 0.25, -0.1),), louvres)
+        roof = tiers.add_crown(
+            self, plan, crown, top, rim - 0.6, thickness=0.45
+        )
+        free = massing.inset(plan, 0.5)
+        equip_roof(self, free, roof, self.roof_items, clear=0.8)
+
+
+def _plan(p: GridTower, site: Site) -> np.ndarray:
+    """Returns the outline, its front first, a little within the site."""
+    x0, y0, x1, y1 = site.bounds
+    base = massing.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
+    if p.plan == "notched":
+        return massing.notched(base, p.shift * massing.shortest_side(base))
+    if p.plan == "box":
+        return base
+    (a, c), (b, d) = base[0], base[2]
+    sx, my = p.shift * (b - a), (c + d) / 2
+    return np.array(
+        [(a, c), (b - sx, c), (b - sx, my), (b, my), (b, d), (a + sx, d),
+         (a + sx, my), (a, my)]
+    )  # fmt: skip
+
+
+def _add_grid_tower_lobby(p: GridTower, plan: np.ndarray) -> float:
+    """Adds a tall glazed hall behind the feet of the piers."""
+    h = p.lobby
+    pane = bays.window(p.pitch - p.pier, 0.3, h - 1.2, p.recess, transom=3.2)
+    glazing = bays.rhythm(p.pitch, [pane], p.margin)
+    door = bays.entrance(3.6, 3.2, p.recess + 0.6, surround=0.15)
+    layout = bays.with_door(glazing, door, 6.4)
+    facade = Facade(h, (Band(h - 0.9, h - 0.2, -0.12),), layout, (p.recess,))
+    half = min(4.5, details.WallFrame(plan, 0).length / 2 - 0.6)
+    lid = details.front_canopy(plan, half, 1.6, 3.7)
+    return tiers.add_ground(p, plan, facade, [lid])
+
+
+def _add_grid(
+    p: GridTower, plan: np.ndarray, z0: float, goal: float, part: str
+) -> float:
+    """Adds storeys behind frames; returns their top [m]."""
+    unit = p.storey * (2 if p.double else 1)
+    groups, per_group, height = tiers.divided(goal - z0, unit, 7)
+    # A part of the beam closes the storey's top.
+    low, high = round(p.beam - 0.25, 2), height - 0.25
+    frame = bays.window(
+        p.pitch - p.pier, low, high, p.recess, pier=p.pier / 2,
+        transom=round((low + high) / 2, 2) if p.double else None,
+    )  # fmt: skip
+    layout = bays.rhythm(p.pitch, [frame], p.margin)
+    facade = Facade(height, (), layout, (p.recess,))
+    return tiers.add_storeys(p, plan, facade, z0, groups, per_group, part=part)
+
+
+def _add_plant_floor(p: GridTower, plan: np.ndarray, z0: float) -> float:
+    """Adds a floor of louvres, set back behind the grid."""
+    inner = massing.inset(plan, p.recess)
+    slats = [
+        Band(round(0.4 + 0.6 * k, 2), round(0.7 + 0.6 * k, 2), 0.18)
+        for k in range(5)
+    ]
+    facade = Facade(3.9, tuple(slats))
+    ring = tiers.block(inner, facade, z0)
+    p.add("plant", ring)
+    top = round(z0 + 3.9, 3)
+    for z, up in ((z0, True), (top, False)):
+        p.add(f"ledge_{int(up)}", massing.flat(plan, z, up=up))
+    return top
+
+
+_STEEL = (0.52, 0.53, 0.55)
+_TIMBER = (0.72, 0.58, 0.38)
+_SLAB_M = 0.28
+# Room for scaffolds around the frame [m].
+_SCAFFOLD_M = 1.7
+# Cladding stands this far in front of the slabs [m].
+_CLADDING_M = 0.35
+_LIFT_M = 2.0
+
+
+class UnfinishedTower(Building):
+    """The tower under construction: core, concrete frame, scaffolds, cladding.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the core.
+        storeys: slabs above the ground.
+        storey: height of a storey.
+        group: storeys that are placed as one.
+        pitch: of the columns.
+        core: extent of the core, as parts of the plan.
+        clad: storeys whose walls are finished.
+        scaffolds: edges with a scaffold.
+        scaffold_top: storeys it covers.
+        nets: part of the scaffold's bays behind a net.
+        props: whether the top slab is still propped.
+        hoist: whether a hoist climbs the right side.
+    """
+
+    def draw(self, d: Dice) -> None:
+        rise = d.height - d.uniform(3.5, 5.5)
+        storeys = max(3, round(rise / d.uniform(3.4, 4.0)))
+        group = -(-storeys // 8)
+        storeys = group * max(2, round(storeys / group))
+        self.storeys = storeys
+        self.storey = round(rise / storeys, 3)
+        self.pitch = d.uniform(6.0, 8.0)
+        self.core = (d.uniform(0.28, 0.4), d.uniform(0.28, 0.4))
+        self.group = group
+        self.clad = group * d.whole(0, max(1, storeys // group // 2))
+        self.scaffolds = d.pick(((0,), (0, 1), (0, 3), (1, 3)))
+        self.scaffold_top = min(d.whole(storeys // 2, storeys), 8)
+        self.nets = d.uniform(0.2, 0.7)
+        self.props = d.chance(0.7)
+        self.hoist = d.chance(0.6)
+
+    def build(self) -> None:
+        """Builds the tower on a rectangle."""
+        site = massing.rectangle(*self.site.bounds)
+        plan = np.round(massing.inset(site, _SCAFFOLD_M + 0.2), 2)
+        _add_frame(self, plan)
+        _add_core(self, plan)
+        if self.clad:
+            _add_cladding(self, plan)
+        if self.props:
+            _add_props(self, plan)
+        _add_scaffolds(self, plan)
+        if self.hoist:
+            _add_hoist(self, plan)
+
+
+def _columns(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
+    """Returns where the columns stand."""
+    x0, y0, x1, y1 = massing.extent(plan)
+    places = []
+    for a, b in ((x0, x1), (y0, y1)):
+        count = min(6, max(2, round((b - a) / p.pitch) + 1))
+        places.append(np.round(np.linspace(a + 0.5, b - 0.5, count), 2))
+    xs, ys = (place.tolist() for place in places)
+    return [(x, y) for x in xs for y in ys]
+
+
+def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds a storey's columns and the slab on them, over and over."""
+    columns, low = _columns(p, plan), p.storey - _SLAB_M
+    top = p.storeys * p.storey
+    pieces = [massing.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
+    pieces.append(massing.prism(plan, low, p.storey, bottom=True))
+    # Columns of the storey to come, and their bars.
+    stubs = [massing.prism(plan, -massing.FOUNDATION_M, 0.05)]
+    for x, y in columns:
+        foot = (x - 0.25, x + 0.25, y - 0.25, y + 0.25)
+        bar = massing.regular_polygon(0.05, 3, (x + 0.12, y))
+        stubs.append(massing.box(*foot, top - 0.05, top + 0.5))
+        stubs.append(massing.prism(bar, top + 0.45, top + 1.5))
+    for edge in range(4):
+        wall = details.WallFrame(plan, edge)
+        for z in (p.storey + 0.5, p.storey + 1.0):
+            rail = (0.05, wall.length - 0.05, -0.08, -0.03)
+            pieces.append(wall.box(*rail, z, z + 0.06))
+        for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
+            post = (u - 0.03, u + 0.03, -0.09, -0.03)
+            stubs.append(wall.box(*post, top, top + 1.1))
+    group, step = _repeated(pieces, p.group, p.storey), p.group * p.storey
+    p.stack("frame", group, 0.0, step, p.storeys // p.group)
+    p.add("stubs", *stubs)
+
+
+def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds the core with its doorways and the form that climbs on it."""
+    x0, y0, x1, y1 = massing.extent(plan)
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    a, b = p.core[0] * (x1 - x0) / 2, p.core[1] * (y1 - y0) / 2
+    core = np.round(massing.rectangle(x - a, y - b, x + a, y + b), 2)
+    door = bays.alone(bays.window(1.2, 0.05, 2.2, 0.35), 2.0)
+    layout = bays.by_edge({0: door, 2: door}, bays.plain)
+    facade = Facade(p.storey, (), layout).stacked(p.storeys)
+    top, high = round(p.storeys * p.storey, 3), p.height
+    p.add(
+        "core",
+        facade_mesh(core, facade),
+        massing.skirt(core, core, top, high - 0.4),
+        massing.roof_pan(core, high - 2.0, high - 0.4, 0.3),
+    )
+    form = massing.inset(core, -0.3)
+    p.add(
+        "form",
+        massing.skirt(form, form, high - 2.6, high),
+        massing.flat(form, high - 2.6, up=False),
+        massing.roof_pan(form, high - 0.6, high, 0.3),
+        rgb=_TIMBER,
+    )
+
+
+def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds the finished walls of the lower storeys."""
+    outer = massing.inset(plan, -_CLADDING_M)
+    head = round(p.storey - 0.5, 2)
+    pitch = max(p.pitch / 2, max(np.ptp(plan, axis=0)) / 8)
+    rows = bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5)
+    facade = Facade(p.storey, (Band(0.0, 0.2, -0.08),), rows, (0.2,))
+    # The panels' backs, seen from within, and their top edge.
+    backs = massing.skirt(plan[::-1], plan[::-1], 0.0, p.storey)
+    rim = massing.skirt(outer, plan, p.storey, p.storey)
+    walls = [facade_mesh(outer, facade), backs, rim]
+    panes = [glass_mesh(outer, facade)]
+    groups, step = p.clad // p.group, p.group * p.storey
+    for part, pieces, rgb in (
+        ("cladding", walls, p.colours["clad"]),
+        ("cladding_glass", panes, p.glass_rgb),
+    ):
+        mesh = _repeated(pieces, p.group, p.storey)
+        p.stack(part, mesh, 0.0, step, groups, rgb=rgb)
+    p.add("foot", massing.foundation(outer), rgb=p.colours["clad"])
+
+
+def _add_props(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds props below the top slab, along the front and the back."""
+    x0, y0, x1, y1 = massing.extent(plan)
+    low = (p.storeys - 1) * p.storey
+    high = p.storeys * p.storey - _SLAB_M + 0.02
+    props = []
+    for x in np.linspace(x0 + 1.5, x1 - 1.5, max(3, round((x1 - x0) / 3.0))):
+        for y in (y0 + 1.2, y1 - 1.2):
+            shaft = massing.regular_polygon(0.06, 4, (x, y))
+            props.append(massing.skirt(shaft, shaft, low - 0.02, high))
+    p.add("props", *props, rgb=_STEEL)
+
+
+def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds scaffolds: standards of full height, and lifts between them."""
+    lifts = max(2, int(p.scaffold_top * p.storey / _LIFT_M))
+    per_group = -(-lifts // 6)
+    groups = -(-lifts // per_group)
+    lifts, rng = per_group * groups, p.rng
+    levels, standards, nets = [], [], []
+    for edge in p.scaffolds:
+        wall = details.WallFrame(plan, edge)
+        count = max(2, round((wall.length - 0.4) / max(2.8, wall.length / 11)))
+        xs = np.round(
+            np.linspace(0.2, wall.length - 0.2, count + 1), 2
+        ).tolist()
+        levels.append(wall.place(_scaffold_level(xs)))
+        for x in xs:
+            for y in (0.6, 1.45):
+                pole = massing.square(x, y, 0.04)
+                mesh = massing.prism(
+                    pole, -massing.FOUNDATION_M, lifts * _LIFT_M + 0.9
+                )
+                standards.append(wall.place(mesh))
+        for a, b in itertools.pairwise(xs):
+            if rng.random() < p.nets:
+                first = int(rng.integers(0, lifts - 1))
+                last = int(rng.integers(first + 1, lifts + 1))
+                low, high = first * _LIFT_M + 0.2, last * _LIFT_M - 0.2
+                spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
+                nets.append(wall.box(*spot, low, high))
+    stack = _repeated(levels, per_group, _LIFT_M)
+    p.stack("scaffold", stack, 0.0, per_group * _LIFT_M, groups, rgb=_STEEL)
+    p.add("standards", *standards, rgb=_STEEL)
+    p.add("nets", *nets, rgb=p.colours["net"])
+
+
+def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds a hoist's mast and cage at the back."""
+    wall = details.WallFrame(plan, 2)
+    x, top = 0.5 * wall.length, p.storeys * p.storey - 1.0
+    pieces = [
+        wall.standing(u - 0.05, u + 0.05, v - 0.05, v + 0.05, top)
+        for u in (x - 0.3, x + 0.3)
+        for v in (0.3, 0.9)
+    ]
+    for z in np.arange(1.0, top, 4.5).tolist():
+        pieces.append(wall.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
+    z = round(0.55 * top, 1)
+    cage = wall.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
+    p.add("hoist", *pieces, cage, rgb=(0.80, 0.62, 0.16))
+
+
+def _repeated(pieces: list[Mesh], count: int, step: float) -> Mesh:
+    """Returns `count` copies of some meshes above one another."""
+    storey = merge_meshes(*pieces)
+    copies = (storey.moved((0.0, 0.0, k * step)) for k in range(count))
+    return merge_meshes(*copies)
+
+
+def _scaffold_level(xs: list[float]) -> Mesh:
+    """One lift of a scaffold: boards, a guard rail, braces."""
+    a, b, top = xs[0], xs[-1], _LIFT_M
+    pieces = [massing.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
+    for z in (0.5, 1.0):
+        pieces.append(massing.box(a, b, 1.5, 1.54, z, z + 0.06))
+    for x0, x1 in itertools.pairwise(xs[::3]):
+        start, stop = (x0, 1.54, 0.05), (x1, 1.54, top - 0.15)
+        pieces.append(details.beam(start, stop, 0.07))
+    return merge_meshes(*pieces)

@@ -1,0 +1,353 @@
+"""Roofs on posts: gas stations, and pavilions in parks."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from cns_drake.city.facades import bays, details, massing, roofs
+from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.details import add_railing
+from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
+from cns_drake.city.facades.wings import Wing
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+_RECESS = 0.18
+
+
+class GasStation(Building):
+    """The gas station: pumps under a canopy, a shop, a car wash, a price sign.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the price sign, the highest thing.
+        canopy_top: of the canopy.
+        fascia: height of its edge.
+        sloped: whether the canopy is a pair of raised wings.
+        lanes: rows of pumps.
+        pumps: in each row.
+        shop_depth, shop_height: of the shop behind.
+        wash: whether a car wash stands beside the shop.
+        mirrored: whether the car wash and the sign are on the left.
+    """
+
+    def draw(self, d: Dice) -> None:
+        width, depth = d.width, d.depth
+        self.canopy_top = round(min(d.height, d.uniform(5.0, 5.8)), 2)
+        self.fascia = d.uniform(0.6, 1.0, 2)
+        self.sloped = d.chance(0.35)
+        self.lanes = 2 if depth > 24.0 else 1
+        self.pumps = int(np.clip((width - 8.0) / 6.5, 1, 4))
+        self.shop_depth = round(min(d.uniform(6.0, 9.0), 0.36 * depth), 2)
+        self.shop_height = d.uniform(3.6, 4.3, 2)
+        self.wash = width > 26.0 and d.chance(0.7)
+        self.mirrored = d.chance(0.5)
+        self.roof_items = d.some_of("ac_unit vents ac_unit", 1, 4)
+
+    def build(self) -> None:
+        """Builds the station on a rectangle, its forecourt in front."""
+        x0, y0, x1, y1 = self.site.bounds
+        shop_front = y1 - self.shop_depth - 0.3
+        room = shop_front - 3.0 - (y0 + 1.5)
+        deep = min(room, 7.0 * self.lanes + 1.5)
+        middle = y0 + 1.5 + room / 2
+        wide = min(x1 - x0 - 3.0, 6.5 * self.pumps + 4.0)
+        x = (x0 + x1) / 2
+        canopy = massing.rectangle(
+            x - wide / 2, middle - deep / 2, x + wide / 2, middle + deep / 2
+        )
+        _add_canopy(self, canopy)
+        _add_islands(self, canopy)
+        _add_shop(self, (x0, x1), (shop_front, y1 - 0.3))
+        _add_sign(self, (x0, x1), y0)
+
+
+def _rows(p: GasStation, canopy: np.ndarray) -> list[float]:
+    """Returns where the rows of pumps lie, in y [m]."""
+    (_, y0), (_, y1) = canopy[0], canopy[2]
+    return [y0 + (k + 0.5) * (y1 - y0) / p.lanes for k in range(p.lanes)]
+
+
+def _add_canopy(p: GasStation, canopy: np.ndarray) -> None:
+    """Adds the roof on its columns, lights on its underside."""
+    x0, y0, x1, y1 = massing.extent(canopy)
+    top, low = p.canopy_top, p.canopy_top - p.fascia
+    if p.sloped:
+        middle = (y0 + y1) / 2
+        line = [(y0, top - 0.3), (middle, top - 0.9), (y1, top - 0.3)]
+        p.add_to("brand", roofs.shell(line, x0, x1, 0.35))
+        low = top - 1.2
+        rim = (x0 + 0.5, x1 - 0.5, middle - 0.4, middle + 0.4, low, top - 0.6)
+        p.add_to("steel", massing.box(*rim))
+    else:
+        p.add_to(
+            "brand",
+            massing.skirt(canopy, canopy, low, top),
+            massing.roof_pan(canopy, top - 0.4, top, 0.25),
+        )
+        p.add_to("steel", massing.flat(canopy, low, up=False))
+    count = max(2, p.pumps)
+    for y in _rows(p, canopy):
+        for x in np.linspace(x0 + 2.2, x1 - 2.2, count).tolist():
+            p.add_to("steel", massing.post(x, y, 0.22, low + 0.1))
+
+
+def _add_islands(p: GasStation, canopy: np.ndarray) -> None:
+    """Adds kerbed islands with their pumps and bollards."""
+    (x0, _), (x1, _) = canopy[0], canopy[2]
+    step = (x1 - x0 - 3.0) / p.pumps
+    half = min(2.2, 0.4 * step)
+    for y in _rows(p, canopy):
+        for k in range(p.pumps):
+            x = x0 + 1.5 + (k + 0.5) * step
+            kerb = (x - half, x + half, y - 0.55, y + 0.55, 0.18)
+            p.add_to("concrete", massing.standing(*kerb))
+            p.add_to("steel", _pump().moved((x, y, 0.15)))
+            head = (x - 0.42, x + 0.42, y - 0.27, y + 0.27, 1.75, 2.1)
+            p.add_to("brand", massing.box(*head))
+            for u in (x - half + 0.15, x + half - 0.15):
+                post = massing.regular_polygon(0.08, 6, (u, y))
+                p.add_to("brand", massing.prism(post, 0.15, 0.95))
+
+
+def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
+    x0, x1 = xs[0] + 0.4, xs[1] - 0.4
+    wash = 5.2 if p.wash else 0.0
+    wide = min(x1 - x0 - wash - (0.6 if wash else 0.0), 18.0)
+    start = x1 - wide if p.mirrored else x0
+    shop = Wing.flat(start, ys[0], start + wide, ys[1], p.shop_height, 0.5)
+    openings = Openings(shop)
+    glazing = bays.shop_front(2.7, _RECESS, door=False)
+    openings.row((0,), 1.0, 3.4, [glazing], 0.4)
+    doors = bays.window(2.0, 0.0, 2.5, _RECESS, mullions=1)
+    openings.put(0, 0.55 * wide, 2.6, doors)
+    openings.row((1, 2, 3), 1.0, 4.5, [bays.window(1.0, 1.6, 2.3, _RECESS)])
+    openings.enclose(p, (_RECESS,), (Band(0.0, 0.25, -0.05),))
+    sign = (0.3, wide - 0.3, -0.02, 0.3, 2.85, p.shop_height + 0.02)
+    p.add_to("brand", shop.wall(0).box(*sign))
+    equip_roof(p, shop.outline, shop.floor, p.roof_items)
+    if wash:
+        a = x0 if p.mirrored else x1 - wash
+        _add_wash(p, (a, a + wash), ys)
+
+
+def _add_wash(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
+    """Adds a car wash: a gate in front and one behind."""
+    box = Wing.flat(xs[0], ys[0], xs[1], ys[1], p.shop_height - 0.2, 0.3)
+    openings = Openings(box)
+    for edge in (0, 2):
+        openings.put(edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5))
+    openings.row((1, 3), 1.0, 3.0, [bays.window(2.2, 1.0, 2.4, _RECESS)])
+    openings.enclose(p, (_RECESS,))
+
+
+def _add_sign(p: GasStation, xs: bays.Span, y0: float) -> None:
+    """Adds the price sign at a front corner."""
+    x = xs[0] + 1.2 if p.mirrored else xs[1] - 1.2
+    y, top = y0 + 0.9, p.height
+    for u in (x - 0.7, x + 0.7):
+        p.add_to("steel", massing.post(u, y, 0.1, top - 0.5))
+    for k, z in enumerate(np.arange(top - 1.2, 1.9, -0.75).tolist()):
+        board = massing.box(x - 0.85, x + 0.85, y - 0.16, y + 0.16, z, z + 0.65)
+        p.add_to("steel" if k % 2 else "brand", board)
+    crown = massing.box(x - 0.95, x + 0.95, y - 0.2, y + 0.2, top - 0.5, top)
+    p.add_to("brand", crown)
+
+
+def _pump() -> Mesh:
+    """A double-sided pump with its screen and nozzles, on z = 0."""
+    pieces = [massing.box(-0.38, 0.38, -0.22, 0.22, 0.0, 1.65, bottom=False)]
+    for side in (-1.0, 1.0):
+        y0, y1 = sorted((side * 0.2, side * 0.3))
+        pieces.append(massing.box(-0.3, 0.3, y0, y1, 1.0, 1.45))
+        for x in (-0.34, 0.26):
+            pieces.append(massing.box(x, x + 0.1, y0, y1, 0.55, 0.95))
+    return merge_meshes(*pieces)
+
+
+_EAVES_M = 0.6
+
+
+class ParkPavilion(Building):
+    """The park pavilion: a bandstand, a shelter with tables, or a tea house.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the finial.
+        form: `bandstand` (open, round), `tea_house` (glazed, round) or
+            `shelter` (open, long).
+        sides: of a round one.
+        floor: height of the deck.
+        eaves: height of the posts above the deck.
+        lantern: whether a lantern sits on the roof.
+        bell: whether the roof is bent like a bell.
+    """
+
+    def draw(self, d: Dice) -> None:
+        ratio = d.width / d.depth
+        long = not 0.67 < ratio < 1.5
+        floor = d.uniform(0.3, 0.9, 2)
+        self.form = (
+            "shelter"
+            if long
+            else d.pick(("bandstand", "bandstand", "tea_house", "shelter"))
+        )
+        self.sides = d.pick((6, 8, 8))
+        self.floor = floor
+        self.eaves = round(max(2.2, 0.5 * (d.height - floor)), 2)
+        self.lantern = d.height > 5.0 and d.chance(0.5)
+        self.bell = d.chance(0.5)
+
+    def build(self) -> None:
+        """Builds the pavilion in the middle of a rectangle."""
+        x0, y0, x1, y1 = self.site.bounds
+        if self.form == "shelter":
+            _add_shelter(self, (x0, y0, x1, y1))
+        else:
+            center = ((x0 + x1) / 2, (y0 + y1) / 2)
+            reach = min(x1 - x0, y1 - y0) / 2 - _EAVES_M
+            _add_round(self, center, reach)
+
+
+def _add_round(p: ParkPavilion, center: massing.Point, reach: float) -> None:
+    """Adds a deck, posts or glazed walls, and a roof over a polygon."""
+    phase = -math.pi / 2 + math.pi / p.sides
+    count = max(2, round(p.floor / 0.17))
+    radius = (reach - 0.45 * 0.3 * count) / math.cos(math.pi / p.sides)
+    radius = min(radius, reach, 7.0)
+    plan = massing.regular_polygon(radius, p.sides, center, phase)
+    # The front edge is the one that looks to -y: it ends at `phase`.
+    plan = np.roll(plan, 1, axis=0)
+    p.add_to("stone", massing.prism(plan, -massing.FOUNDATION_M, p.floor))
+    wall = details.WallFrame(plan, 0)
+    x, half = wall.length / 2, min(0.9, 0.4 * wall.length)
+    flight = details.steps(x - half, x + half, 0.26 * count, p.floor, count)
+    p.add_to("stone", wall.place(flight))
+    z = p.floor + p.eaves
+    posts = massing.inset(plan, 0.25)
+    if p.form == "tea_house":
+        _add_glazing(p, posts)
+    else:
+        for spot in posts:
+            shaft = massing.regular_polygon(0.13, 6, spot)
+            p.add_to("timber", massing.skirt(shaft, shaft, p.floor, z))
+        for edge in range(1, p.sides):
+            side = details.WallFrame(posts, edge)
+            ends = (0.1, 0.0), (side.length - 0.1, 0.0)
+            add_railing(
+                p, f"railing_{edge}", side, *ends, p.floor, p.colours["timber"]
+            )
+    beam = massing.inset(posts, -0.12)
+    p.add_to(
+        "timber",
+        massing.skirt(beam, beam, z - 0.3, z + 0.02),
+        massing.flat(beam, z - 0.3, up=False),
+    )
+    _add_round_roof(p, center, plan, z)
+
+
+def _add_glazing(p: ParkPavilion, plan: np.ndarray) -> None:
+    """Adds walls of glass over a parapet, a door in front."""
+    window = bays.ribbon(0.8, p.eaves - 0.5, 0.12, 0.3)
+    door = bays.window(1.5, 0.05, p.eaves - 0.5, 0.12, mullions=1)
+    rows = bays.rhythm(2.0, [window], 0.1)
+    layout = bays.by_edge({0: bays.alone(door, 1.9)}, rows)
+    bands = (Band(0.0, 0.15, -0.05),)
+    facade = Facade(round(p.eaves - 0.2, 2), bands, layout, (0.12,))
+    p.add_to("timber", facade_mesh(plan, facade, p.floor))
+    p.add_to("glass", glass_mesh(plan, facade, p.floor))
+
+
+def _add_round_roof(
+    p: ParkPavilion, center: massing.Point, plan: np.ndarray, z: float
+) -> None:
+    """Adds a cone, straight or bent, with its lantern and finial."""
+    eaves = massing.inset(plan, -_EAVES_M * 0.8)
+    top = p.height - 0.5
+    head = top - 1.0 if p.lantern else top
+
+    def ring(share: float) -> np.ndarray:
+        return np.asarray(center) + share * (eaves - center)
+
+    pieces = [
+        massing.flat(eaves, z, up=False),
+        massing.skirt(eaves, eaves, z, z + 0.15),
+    ]
+    levels = [(1.0, z + 0.15)]
+    if p.bell:
+        rise = head - z - 0.15
+        levels += [(0.62, z + 0.15 + 0.28 * rise),
+                   (0.36, z + 0.15 + 0.58 * rise)]  # fmt: skip
+    neck = 0.24
+    if p.lantern:
+        levels.append((neck, head))
+    for (a, za), (b, zb) in itertools.pairwise(levels):
+        pieces.append(massing.skirt(ring(a), ring(b), za, zb))
+    hat, low = ring(levels[-1][0]), levels[-1][1]
+    if p.lantern:
+        drum = ring(0.8 * neck)
+        pieces.append(massing.flat(hat, head))
+        p.add_to("timber", massing.skirt(drum, drum, head, top - 0.4))
+        hat, low = ring(1.15 * neck), top - 0.4
+        pieces.append(massing.flat(hat, low, up=False))
+    p.add_to("roof", *pieces, massing.spire(hat, center, low, top))
+    finial = massing.regular_polygon(0.07, 6, center)
+    p.add_to("timber", massing.prism(finial, top - 0.3, p.height))
+
+
+def _add_shelter(p: ParkPavilion, area: massing.Area) -> None:
+    """Adds a hipped or gabled roof on posts, tables and a hearth."""
+    x0, y0, x1, y1 = area
+    a, b = x0 + _EAVES_M + 0.1, x1 - _EAVES_M - 0.1
+    c, d = y0 + _EAVES_M + 0.1, y1 - _EAVES_M - 0.1
+    floor, z = 0.12, 0.12 + p.eaves
+    slab = (a - 0.3, b + 0.3, c - 0.3, d + 0.3, floor)
+    p.add_to("stone", massing.standing(*slab, bottom=True))
+    plan = massing.rectangle(a, c, b, d)
+    across = max(2, round((b - a) / 3.5) + 1)
+    deep = max(2, round((d - c) / 3.5) + 1)
+    places: list[tuple[float, float]] = [
+        *((u, v) for u in np.linspace(a, b, across) for v in (c, d)),
+        *((u, v) for v in np.linspace(c, d, deep) for u in (a, b)),
+    ]
+    spots = {(round(u, 2), round(v, 2)) for u, v in places}
+    for u, v in sorted(spots):
+        p.add_to("timber", massing.post(u, v, 0.11, z, floor))
+    frame = massing.inset(plan, -0.12)
+    ceiling = massing.prism(frame, z - 0.25, z + 0.02, bottom=True)
+    p.add_to("timber", ceiling)
+    if p.bell:
+        roof = roofs.hip(plan, z, p.height, 0.55, 0.15)
+    else:
+        along_y = d - c > b - a
+        low, high = (a, b) if along_y else (c, d)
+        start, end = (c, d) if along_y else (a, b)
+        line = roofs.gable_line(low, high, z + 0.15, p.height)
+        line = roofs.with_eaves(line, 0.5, 0.5)
+        roof = roofs.shell(line, start - 0.5, end + 0.5, 0.15, along_y=along_y)
+    p.add_to("roof", roof)
+    _add_tables(p, (a, b, c, d), floor)
+
+
+def _add_tables(p: ParkPavilion, area: massing.Area, floor: float) -> None:
+    """Adds tables with benches, and a hearth at one end."""
+    a, b, c, d = area
+    y, z = (c + d) / 2, floor
+    for x, _ in bays.stretches(b - a, 3.0, 0.6)[1:]:
+        u = a + x
+        top = (u - 0.4, u + 0.4, y - 0.9, y + 0.9, z + 0.7, z + 0.78)
+        leg = (u - 0.1, u + 0.1, y - 0.6, y + 0.6, z, z + 0.72)
+        seats = (
+            (v - 0.15, v + 0.15, y - 0.9, y + 0.9, z, z + 0.45)
+            for v in (u - 0.75, u + 0.75)
+        )
+        feet = (massing.box(*spot, bottom=False) for spot in (leg, *seats))
+        p.add_to("timber", massing.box(*top), *feet)
+    hearth = massing.box(a + 0.3, a + 1.0, y - 0.5, y + 0.5, z, z + 1.0)
+    p.add_to("stone", hearth)

@@ -1,1 +1,0 @@
-"""Buildings that stand alone: churches, schools, stations, car parks."""

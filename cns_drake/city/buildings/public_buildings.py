@@ -1,0 +1,449 @@
+"""Buildings for everybody: schools and chapels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
+from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.house_walls import Openings, free_stretches
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
+from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.geometry.mesh import Mesh
+
+_MARGIN = 0.6
+_RECESS = 0.16
+
+
+class School(Building):
+    """The school: classroom wings, a glazed entrance, a gymnasium.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the ridge of the classrooms, or of their stair.
+        roof: `hip` or `flat`.
+        rise: of a hipped roof.
+        storeys: of classrooms.
+        depth: of the classroom wing.
+        wing: depth of the wing behind, as a part of the site; 0 for none.
+        mirrored: whether gymnasium and wing stand on the left.
+        gym: width of the gymnasium; 0 for none.
+        gym_roof: `barrel`, `shed` or `flat`.
+        pitch: width of a classroom's window group.
+        entrance: width of the glazed hall.
+    """
+
+    def draw(self, d: Dice) -> None:
+        width, depth = d.width, d.depth
+        deep = min(d.uniform(9.0, 12.0), depth - 4.5)
+        rise = round(d.uniform(0.26, 0.36) * deep, 2)
+        roof = d.pick(("hip", "flat", "flat"))
+        body = d.height - (rise if roof == "hip" else 2.4)
+        if body < 3.6:
+            roof, body = "flat", d.height - 1.0
+        gym = 0.0
+        if width > 34.0 and depth > 16.0:
+            gym = round(d.uniform(0.3, 0.38) * width, 1)
+        self.roof = roof
+        self.rise = rise
+        self.storeys = int(np.clip(round(body / 3.5), 1, 4))
+        self.depth = round(deep, 1)
+        self.wing = depth > 22.0 and d.chance(0.8)
+        self.mirrored = d.chance(0.5)
+        self.gym = min(gym, 28.0)
+        self.gym_roof = d.pick(("barrel", "shed", "flat"))
+        self.pitch = max(d.uniform(3.2, 4.4), width / 15)
+        self.mullions = d.whole(1, 3)
+        self.entrance = d.uniform(4.5, 6.5, 1)
+        self.roof_items = d.some_of(
+            "air_handler vents skylight skylight vents", 2, 6
+        )
+
+    def build(self) -> None:
+        """Builds the school on a rectangle, its entrance in front."""
+        x0, y0, x1, y1 = self.site.bounds
+        front = y0 + 3.2
+        left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
+        gym = self.gym + 1.5 * (self.gym > 0)
+        a, b = (left + gym, right) if self.mirrored else (left, right - gym)
+        bar = np.round(massing.rectangle(a, front, b, front + self.depth), 2)
+        top = _add_classes(self, bar)
+        _add_entrance(self, bar, top)
+        if self.wing and back - bar[2, 1] > 6.0:
+            _add_back_wing(self, bar, back, top)
+        if self.gym:
+            xs = (left, a + 0.05) if self.mirrored else (b - 0.05, right)
+            _add_gym(self, xs, (front, back), bar)
+
+
+def _add_classes(p: School, bar: np.ndarray) -> float:
+    """Adds the classroom wing; returns the top of its walls [m]."""
+    room = p.height - (p.rise + 0.1 if p.roof == "hip" else 2.4)
+    storey = round(max(room, 3.2) / p.storeys, 3)
+    if p.roof == "flat" and p.storeys == 1:
+        storey = min(storey, p.height - 1.0)
+    head = storey - 0.6
+    group = bays.window(p.pitch - 0.9, 0.9, head, _RECESS, mullions=p.mullions)
+    small = bays.window(1.4, 1.2, head, _RECESS)
+    layouts = {
+        0: bays.rhythm(p.pitch, [group], 0.5),
+        2: bays.rhythm(p.pitch, [small], 0.5),
+    }
+    layout = bays.by_edge(layouts, bays.alone(small, 2.4))
+    walls = Facade(storey, (Band(0.0, 0.3, -0.06),), layout, (_RECESS,))
+    p.add("foundation", massing.foundation(bar))
+    top = tiers.add_storeys(p, bar, walls, 0.0, p.storeys, 1)
+    if p.roof == "hip":
+        roof = roofs.hip(bar, top - 0.02, p.height, 0.5, 0.3)
+        p.add("hip", roof, rgb=p.colours["roof"])
+        return top
+    rim = 0.7
+    crown = Facade(rim, (Band(rim - 0.3, rim, -0.15),))
+    z = tiers.add_crown(p, bar, crown, top, 0.5, thickness=0.3)
+    equip_roof(p, bar, z, p.roof_items)
+    return top
+
+
+def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
+    """Adds a stair hall with glass, a canopy on posts and steps."""
+    wall = details.WallFrame(bar, 0)
+    share = 0.72 if p.mirrored else 0.28
+    x, half = share * wall.length, min(p.entrance, 0.4 * wall.length) / 2
+    x = float(np.clip(x, half + 0.4, wall.length - half - 0.4))
+    high = p.height if p.roof == "flat" else min(top + 0.5, p.height)
+    x0, y0 = wall.point(x - half, 1.2)
+    hall = Wing.flat(x0, y0, x0 + 2 * half, bar[0, 1] + 4.0, high, 0.4)
+    openings = Openings(hall)
+    glazing = bays.window(
+        2 * half - 0.9, 2.9, high - 0.9, _RECESS, mullions=2, transom=3.0
+    )
+    openings.put(0, half, 2 * half - 0.4, glazing)
+    doors = bays.window(2 * half - 1.4, 0.05, 2.5, _RECESS, mullions=3)
+    openings.add(0, doors(0.2, 2 * half - 0.2))
+    openings.enclose(p, (_RECESS,), material="accent")
+    front = hall.wall(0)
+    a, b = -0.8, 2 * half + 0.8
+    posts = (
+        front.standing(u - 0.1, u + 0.1, 1.4, 1.6, 2.65)
+        for u in (a + 0.3, b - 0.3)
+    )
+    step = front.standing(a, b, -0.02, 1.8, 0.15, bottom=True)
+    p.add_to("trim", front.box(a, b, -0.02, 1.75, 2.6, 2.85), *posts, step)
+
+
+def _add_back_wing(p: School, bar: np.ndarray, back: float, top: float) -> None:
+    """Adds a lower wing behind, on the side away from the gymnasium."""
+    (a, _), (b, y) = bar[0], bar[2]
+    wide = min(9.0, 0.4 * (b - a))
+    x0 = b - wide - 0.3 if p.mirrored else a + 0.3
+    high = min(top, 4.2 if p.storeys < 3 else 7.6)
+    area = (x0, y - 0.05, x0 + wide, min(back, y + 22.0))
+    openings = Openings(Wing.flat(*area, high, 0.4, rim=0.6))
+    for k in range(2 if high > 6.0 else 1):
+        z = 3.4 * k
+        pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
+        openings.row((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
+    openings.enclose(p, (_RECESS,), material="gym")
+
+
+def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
+    """Adds the gymnasium with high windows, and its link to the school."""
+    a, b = xs
+    x0, x1 = (a, b - 1.5) if p.mirrored else (a + 1.5, b)
+    y0 = ys[0] + 1.0
+    y1 = min(ys[1], y0 + 24.0)
+    top = min(p.height, 9.5)
+    drop = {"barrel": 0.16 * (x1 - x0), "shed": 1.2}.get(p.gym_roof, 0.3)
+    wall = max(top - drop, 0.55 * top)
+    eaves = 0.0 if p.gym_roof == "barrel" else 0.4
+    roof = Roof(p.gym_roof, True, eaves, 0.4, 0.25, parapet=0.5)
+    gym = Wing.at(x0, y0, x1, y1, wall, top, roof)
+    link_y = min(bar[2, 1], y1) - 3.4
+    ends = (bar[1, 0] - 0.1, x0 + 0.1)
+    if p.mirrored:
+        ends = (min(x1, bar[1, 0]) - 0.1, bar[0, 0] + 0.1)
+    link = Wing.flat(ends[0], link_y, ends[1], link_y + 3.0, 3.4, 0.2, rim=0.3)
+    boxes = (gym, link)
+    openings = Openings(gym, boxes)
+    high = bays.window(2.6, wall - 2.2, wall - 0.7, _RECESS, mullions=1)
+    openings.row((1, 2, 3), 3.5, 3.6, [high], 0.9)
+    openings.put(0, (x1 - x0) / 2, 3.4, bays.gate(2.4, 2.6, 0.3))
+    for edge in (1, 3):
+        side = gym.wall(edge)
+        for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist():
+            pier = side.box(u - 0.2, u + 0.2, -0.02, 0.25, 0.0, wall - 0.3)
+            p.add_to("accent", pier)
+    openings.enclose(p, (_RECESS,), material="gym")
+    passage = Openings(link, boxes)
+    passage.row((0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3)
+    passage.enclose(p, (_RECESS,), material="trim")
+
+
+_CHAPEL_MARGIN = 0.45
+_CHAPEL_RECESS = 0.22
+_THICK = 0.2
+
+
+class Chapel(Building):
+    """The chapel: a nave under a steep roof, a tower or a bell cote, a porch.
+
+    Lengths are in metres.
+
+    Attributes:
+        height: of the cross on top.
+        belfry: `front` (a tower in the middle of the front), `side` (a
+            tower beside the nave) or `cote` (a bell gable on the roof).
+        spire: `needle`, `broach` or `cap`.
+        tower: side of the tower.
+        nave: width of the nave, as a part of the site's.
+        pitch_deg: of the nave's roof.
+        bay: distance between the side windows.
+        buttresses: whether the long walls have them.
+        porch: whether the door has a porch (with a cote or a side tower).
+        annex: whether a vestry stands beside the choir.
+    """
+
+    def draw(self, d: Dice) -> None:
+        width = min(d.width, d.depth, 18.0)
+        small = d.height < 13.0
+        self.belfry = "cote" if small else d.pick(("front", "side", "front"))
+        self.spire = d.pick(("needle", "broach", "cap"))
+        self.tower = round(d.uniform(0.24, 0.3) * width + 0.6, 2)
+        self.nave = d.uniform(0.62, 0.72)
+        self.pitch_deg = d.uniform(44.0, 54.0)
+        self.bay = d.uniform(2.8, 3.8)
+        self.buttresses = d.chance(0.5)
+        self.porch = d.chance(0.7)
+        self.annex = d.chance(0.6)
+        self.mirrored = d.chance(0.5)
+
+    def build(self) -> None:
+        """Builds the chapel along the longer side of a rectangle.
+
+        Its door is in front, or on the left where it lies along x.
+        """
+        x0, y0, x1, y1 = self.site.bounds
+        if y1 - y0 >= x1 - x0:
+            _add_all(self, x1 - x0, y1 - y0)
+            self.turn((x0, y0, 0.0), 0.0)
+        else:
+            # The chapel is built along y, then turned a quarter to the right.
+            _add_all(self, y1 - y0, x1 - x0)
+            self.turn((x0, y1, 0.0), -np.pi / 2)
+
+
+def _add_all(p: Chapel, width: float, length: float) -> None:
+    """Adds the chapel over 0..width, 0..length, its door at y = 0."""
+    nave = _nave(p, width, length)
+    boxes = [nave]
+    tower = porch = None
+    if p.belfry != "cote":
+        tower = _tower(p, nave)
+        boxes.append(tower)
+    if p.porch and p.belfry != "front" and nave.y0 > 2.2:
+        porch = _porch(nave)
+        boxes.append(porch)
+    annex = _annex(nave, width) if p.annex else None
+    if annex is not None:
+        boxes.append(annex)
+    _add_nave(p, nave, boxes)
+    if p.buttresses:
+        _add_buttresses(p, nave, boxes)
+    if tower is not None:
+        _add_tower(p, tower, boxes)
+    else:
+        _add_cote(p, nave)
+    for wing in boxes:
+        if wing is not nave and wing is not tower:
+            _add_small(p, wing, boxes, is_porch=wing is porch)
+
+
+def _nave(p: Chapel, width: float, length: float) -> Wing:
+    wide = min(p.nave * width, 11.0)
+    if p.belfry == "side":
+        wide = min(wide, width - p.tower - 2 * _CHAPEL_MARGIN - 0.1)
+    x = (width - wide) / 2
+    if p.belfry == "side":
+        x = _CHAPEL_MARGIN if p.mirrored else width - _CHAPEL_MARGIN - wide
+    ahead = 0.6 * p.tower + _CHAPEL_MARGIN if p.belfry == "front" else 2.4
+    rise = min(wings.ridge_rise(wide, p.pitch_deg), 0.42 * p.height)
+    share = 0.8 if p.belfry == "cote" else 0.62
+    top = min(share * p.height, rise + 7.5)
+    wall_top = max(top - rise - _THICK, 0.35 * top)
+    roof = Roof("gable", True, 0.35, 0.25, _THICK)
+    back = min(length - _CHAPEL_MARGIN, ahead + 2.6 * wide)
+    return Wing.at(x, min(ahead, 0.3 * length), x + wide, back, wall_top, top,
+                   roof)  # fmt: skip
+
+
+def _tower(p: Chapel, nave: Wing) -> Wing:
+    """Returns the shaft of the tower, up to the foot of the spire."""
+    side = p.tower
+    top = max(0.62 * p.height, nave.top - 0.3 * (nave.top - nave.wall_top))
+    y0 = nave.y0 - 0.6 * side
+    x0 = nave.center[0] - side / 2
+    if p.belfry == "side":
+        x0 = nave.x1 - 0.1 if p.mirrored else nave.x0 + 0.1 - side
+        y0 = nave.y0 + 0.8
+    return Wing.at(x0, y0, x0 + side, y0 + side, top, top, Roof("flat"))
+
+
+def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
+    openings = Openings(nave, boxes)
+    high = nave.wall_top
+    spring = max(1.6, high - 1.5)
+    lancet = bays.arched(1.0, 1.2, spring, _CHAPEL_RECESS, rise=0.7)
+    openings.row((1, 3), 1.5, p.bay, [lancet], 1.0)
+    middle = nave.width / 2
+    if p.belfry != "front":
+        door = bays.arched(1.6, 0.0, 2.0, 0.5, rise=0.8)
+        if high > 3.1 and not any(w.roof.thickness == 0.15 for w in boxes[1:]):
+            openings.put(0, middle, 2.2, door)
+        elif not any(w.y0 < nave.y0 for w in boxes[1:]):
+            openings.put(0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4))
+    low = high + 0.2 * (nave.top - high)
+    rose = wings.attic_window(1.3, low, low + 1.6, _CHAPEL_RECESS)
+    openings.enclose(
+        p, (_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose
+    )
+
+
+def _add_buttresses(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
+    high = 0.75 * nave.wall_top
+    for edge in (1, 3):
+        wall = nave.wall(edge)
+        for a, b in free_stretches(nave, edge, boxes, 0.5):
+            for x, _ in bays.stretches(b - a, p.bay, 1.0)[1:]:
+                left, right = a + x - 0.22, a + x + 0.22
+                plan = massing.rectangle(left, -0.05, right, 0.42)
+                slope = massing.rectangle(left, -0.05, right, 0.05)
+                body = massing.skirt(plan, plan, -massing.FOUNDATION_M, high)
+                cap = massing.frustum(plan, slope, high, high + 0.5)
+                p.add_to("walls", wall.place(body), wall.place(cap))
+
+
+def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
+    """Adds the shaft, its bell chamber and the spire with a cross."""
+    openings = Openings(tower, boxes)
+    side, top = tower.width, tower.wall_top
+    width = round(min(1.2, 0.4 * side), 2)
+    louvre = bays.arched(width, top - 2.6, top - 1.3, _CHAPEL_RECESS)
+    slit = bays.window(0.5, 0.5 * top, 0.5 * top + 1.2, _CHAPEL_RECESS)
+    for edge in range(4):
+        openings.put(edge, side / 2, width + 0.7, louvre)
+        if p.belfry != "side" or edge != 3 - 2 * p.mirrored:
+            openings.put(edge, side / 2, 1.0, slit)
+    if p.belfry == "front":
+        width = round(min(1.7, side - 1.1), 2)
+        door = bays.arched(width, 0.0, 2.1, 0.45)
+        openings.put(0, side / 2, width + 0.6, door)
+    bands = (Band(0.0, 0.45, -0.1), Band(top - 3.1, top - 2.9, -0.08),
+             Band(top - 0.3, top, -0.18))  # fmt: skip
+    openings.add_walls(p, (_CHAPEL_RECESS,), bands)
+    p.add_to("roof", *_spire(p, tower))
+    p.add_to("trim", *_cross(*tower.center, p.height - 1.3, p.height))
+
+
+def _spire(p: Chapel, tower: Wing) -> list[Mesh]:
+    z, tip, center = tower.wall_top, p.height - 1.0, tower.center
+    eaves = massing.inset(tower.outline, -0.3)
+    pieces = [
+        massing.flat(eaves, z - 0.02, up=False),
+        massing.skirt(eaves, eaves, z - 0.02, z + 0.2),
+    ]
+    if p.spire == "cap":
+        knee = z + 0.45 * (tip - z)
+        waist = massing.inset(tower.outline, 0.32 * tower.width)
+        pieces += [
+            massing.skirt(eaves, waist, z + 0.2, knee),
+            massing.spire(waist, center, knee, tip),
+        ]
+    elif p.spire == "broach":
+        # Eight sides on a square: a low pyramid with a needle through it.
+        ring = massing.regular_polygon(0.5 * tower.width, 8, center, np.pi / 8)
+        pieces += [
+            massing.spire(eaves, center, z + 0.2, z + 0.45 * (tip - z)),
+            massing.spire(ring, center, z + 0.1, tip),
+        ]
+    else:
+        pieces.append(massing.spire(eaves, center, z + 0.2, tip))
+    return pieces
+
+
+def _add_cote(p: Chapel, nave: Wing) -> None:
+    """Adds a small open belfry on the ridge at the front."""
+    x, y = nave.center[0], nave.y0 + 1.1
+    low, high = nave.top - 0.9, p.height - 1.6
+    if high - nave.top < 0.9:
+        p.add_to("trim", *_cross(x, nave.y0, nave.top - 0.3, p.height))
+        return
+    p.add_to("walls", massing.post(x, y, 0.7, nave.top + 0.3, low))
+    posts = (
+        massing.post(u, v, 0.1, high, nave.top + 0.2)
+        for u in (x - 0.55, x + 0.55)
+        for v in (y - 0.55, y + 0.55)
+    )
+    bell = [(0.34, high - 0.75), (0.24, high - 0.45), (0.12, high - 0.2)]
+    rim = massing.regular_polygon(0.34, 8, (x, y))
+    p.add_to(
+        "trim",
+        *posts,
+        massing.revolved(bell, 8, (x, y)),
+        massing.flat(rim, high - 0.75, up=False),
+        *_cross(x, y, p.height - 1.0, p.height),
+    )
+    eaves, z = massing.square(x, y, 0.95), high - 0.02
+    p.add_to("roof", massing.tent(eaves, (x, y), z, p.height - 0.8))
+
+
+def _add_small(
+    p: Chapel, wing: Wing, boxes: list[Wing], *, is_porch: bool
+) -> None:
+    """Adds the porch or the vestry."""
+    openings = Openings(wing, boxes)
+    if is_porch:
+        arch = bays.window(1.5, 0.0, wing.wall_top - 0.3, 0.9)
+        openings.put(0, wing.width / 2, 2.2, arch)
+    else:
+        head = round(min(2.0, wing.wall_top - 0.3), 2)
+        openings.row(
+            range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _CHAPEL_RECESS)]
+        )
+    openings.enclose(p, (_CHAPEL_RECESS,))
+
+
+def _porch(nave: Wing) -> Wing:
+    middle, half = nave.center[0], 1.3
+    roof = Roof("gable", True, 0.25, 0.25, 0.15)
+    area = (middle - half, nave.y0 - 1.7, middle + half, nave.y0 + 0.1)
+    top = min(4.2, nave.wall_top + 0.8)
+    return Wing.at(*area, min(2.6, nave.wall_top - 0.2), top, roof)
+
+
+def _annex(nave: Wing, width: float) -> Wing | None:
+    """Returns a vestry beside the choir, where there is room."""
+    room = width - _CHAPEL_MARGIN - nave.x1, nave.x0 - _CHAPEL_MARGIN
+    side = int(room[1] > room[0])
+    if room[side] < 1.5:
+        return None
+    reach = min(room[side], 3.2)
+    high = min(nave.wall_top - 0.2, 3.6)
+    low = max(high - 0.45 * reach, 1.9)
+    y0 = nave.y1 - 4.2
+    a, b = nave.x1 - 0.05, nave.x1 + reach
+    if side == 1:
+        a, b = nave.x0 - reach, nave.x0 + 0.05
+    roof = Roof("shed", True, 0.25, 0.2, 0.15, falling=side == 0)
+    if high - low < 0.3 or y0 < nave.y0 + 1.0:
+        return None
+    return Wing.at(a, y0, b, nave.y1 - 0.4, low, high, roof)
+
+
+def _cross(x: float, y: float, z0: float, z1: float) -> list[Mesh]:
+    arm, ys = z1 - 0.4, (y - 0.06, y + 0.06)
+    return [
+        massing.box(x - 0.06, x + 0.06, *ys, z0, z1),
+        massing.box(x - 0.35, x + 0.35, *ys, arm, arm + 0.12),
+    ]

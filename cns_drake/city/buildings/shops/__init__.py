@@ -1,1 +1,0 @@
-"""Shops, markets and filling stations."""

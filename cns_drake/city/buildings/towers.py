@@ -1,0 +1,501 @@
+"""Towers that step back: setbacks, podiums, a hotel behind its forecourt."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cns_drake.city.facades import bays, details, massing, tiers
+from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.walls import Band, Facade
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+
+class ArtDecoTower(Building):
+    """The art-deco tower: symmetric setbacks, tall piers, a stepped crown.
+
+    Lengths are in metres.
+
+    `steps` has, for each tier above the base, where it starts (as a
+    fraction of the height) and how far it steps back across the front and
+    along the sides.
+    """
+
+    def draw(self, d: Dice) -> None:
+        starts = d.pick(((0.5,), (0.3, 0.62)))
+        share = 0.24 if len(starts) == 2 else 0.4
+        steps, across, along = ([], 0.0, 0.0)
+        for start in starts:
+            across += share * d.uniform(0.3, 0.9) * d.depth / 2
+            along += share * d.uniform(0.6, 1.2) * d.width / 2
+            jitter = d.uniform(-0.04, 0.04)
+            steps.append((start + jitter, round(across, 1), round(along, 1)))
+        self.ground_height = d.uniform(6.5, 8.5, 2)
+        self.wall = tiers.Grooves(
+            storey_height=d.uniform(3.4, 3.8),
+            spandrel=d.uniform(1.1, 1.6, 2),
+            ledge=0.0,
+            glass_depth=d.uniform(0.2, 0.4, 2),
+            pitch=max(d.uniform(2.6, 3.6), d.site.open_length / 34),
+            width=d.uniform(0.8, 1.4, 2),
+            reach=d.uniform(0.2, 0.34, 2),
+            corner=d.uniform(1.4, 2.4, 2),
+        )
+        self.steps = tuple(steps)
+        self.portal_width = d.uniform(4.0, 5.5, 1)
+        self.crown_steps = d.whole(2, 5)
+        self.spire = d.uniform(0.35, 0.6)
+        self.notch = d.pick((0.0, 1.2, 2.0))
+
+    def build(self) -> None:
+        """Builds the tower on a rectangle."""
+        base = self.site.outline
+        plan = massing.notched(base, self.notch) if self.notch else base
+        top = _add_ground(self, plan)
+        crown_height = round(min(0.16 * self.height, 16.0), 1)
+        goals = [self.height * f for f, _, _ in self.steps] + [
+            self.height - crown_height
+        ]
+        for k, goal in enumerate(goals):
+            goal = round(goal, 1)
+            top = tiers.add_grooved(
+                self, plan, self.wall, top, goal, f"tier_{k}", rise=1.7
+            )
+            if k == len(goals) - 1:
+                break
+            _add_terrace(self, plan, top, k)
+            _, across, along = self.steps[k]
+            plan = massing.inset(base, (across, along, across, along))
+            plan = massing.notched(plan, self.notch) if self.notch else plan
+        _add_crown(self, plan, top)
+
+
+def _add_ground(p: ArtDecoTower, plan: np.ndarray) -> float:
+    h = p.ground_height
+    portal = bays.entrance(p.portal_width, h - 1.6, 1.4, surround=0.3)
+    arch = bays.arched(3.4, 0.5, 3.2, 0.5)
+    arches = bays.rhythm(1.7 * p.wall.pitch, [arch], margin=1.4)
+    bands = (Band(h - 0.7, h - 0.4, -0.15), Band(h - 0.4, h, -0.3))
+    layout = bays.with_door(arches, portal, p.portal_width + 2.0)
+    roof = details.front_canopy(plan, 2.4, 1.4, 3.6)
+    return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.5,)), [roof])
+
+
+def _add_terrace(p: ArtDecoTower, plan: np.ndarray, z: float, k: int) -> None:
+    parapet = Facade(1.3, (Band(0.0, 0.3, -0.12), Band(1.0, 1.3, -0.1)))
+    tiers.add_crown(p, plan, parapet, z, 1.1, part=f"terrace_{k}")
+
+
+def _add_crown(p: ArtDecoTower, plan: np.ndarray, z0: float) -> None:
+    pieces = []
+    height = p.height - z0
+    step = round((1.0 - p.spire) * height / p.crown_steps, 2)
+    side = massing.shortest_side(plan)
+    bands = (Band(0.6, 0.5 * step, 0.25), Band(step - 0.4, step, -0.25))
+    for k in range(p.crown_steps):
+        pieces.append(tiers.block(plan, Facade(step, bands), z0 + k * step))
+        plan = massing.inset(plan, 0.28 * side / p.crown_steps)
+    z = z0 + p.crown_steps * step
+    pieces.append(massing.spire(plan, np.mean(plan, axis=0), z, z0 + height))
+    p.add("crown", *pieces)
+
+
+_TINTS = (
+    ((0.62, 0.66, 0.70), (0.24, 0.34, 0.42)),
+    ((0.42, 0.45, 0.50), (0.17, 0.23, 0.30)),
+    ((0.72, 0.71, 0.68), (0.28, 0.36, 0.38)),
+    ((0.35, 0.33, 0.31), (0.25, 0.22, 0.18)),
+)
+_CORNERS = ("plain", "chamfered", "notched", "rounded")
+_CROWNS = ("screen", "wedge", "stepped")
+_ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")
+
+
+class GlassSkyscraper(Building):
+    """The glass skyscraper: curtain walls with fins, setbacks, a crown.
+
+    Lengths are in metres.
+
+    `setbacks` has, for each tier above the first, where it starts (as a
+    fraction of the height) and how far each edge of the site steps back.
+    """
+
+    def draw(self, d: Dice) -> None:
+        outline = d.site.outline
+        side = massing.shortest_side(outline)
+        count = len(outline)
+        heights = d.pick(((0.62,), (0.45, 0.78)))
+        style = d.whole(0, 4)  # Ribbons, a grid, or fins (twice).
+        total: np.ndarray = np.zeros(count)
+        setbacks = []
+        for fraction in heights:
+            if count == 4:
+                step = (
+                    d.rng.uniform(0.06, 0.13, 4)
+                    * (d.rng.random(4) < 0.6)
+                    * side
+                )
+            else:
+                reach = min(0.08 * side, 0.5 * massing.inset_limit(outline))
+                step = np.full(count, d.rng.uniform(0.5, 1.0) * reach)
+            total = total + np.round(step, 1)
+            setbacks.append(
+                (fraction + d.uniform(-0.06, 0.06), tuple(total.tolist()))
+            )
+        rgb, glass_rgb = d.pick(_TINTS)
+        corner = d.pick(_CORNERS)
+        self.lobby_height = d.uniform(6.0, 9.0, 2)
+        self.wall = tiers.Grooves(
+            storey_height=d.uniform(3.7, 4.2),
+            spandrel=d.uniform(0.6, 1.2, 2),
+            ledge=d.uniform(0.3, 0.6, 2) * (style < 2),
+            glass_depth=d.uniform(0.2, 0.4, 2),
+            pitch=max(d.uniform(2.2, 3.6), d.site.open_length / 38),
+            width=d.uniform(0.12, 0.3, 2) * (style > 0),
+            reach=d.uniform(0.2, 0.55, 2),
+            corner=0.0,
+        )
+        self.corner = corner if count == 4 else "plain"
+        self.corner_size = round(d.uniform(0.08, 0.16) * side, 1)
+        self.setbacks = tuple(setbacks)
+        self.crown = d.pick(_CROWNS)
+        self.crown_height = d.uniform(5.0, 9.0, 1)
+        self.rgb = rgb
+        self.glass_rgb = glass_rgb
+
+    def build(self) -> None:
+        """Builds the skyscraper on any outline."""
+        base = self.site.outline
+        plan = _shaped(self, base)
+        top = _add_lobby(self, plan)
+        levels = [*(round(f * self.height, 1) for f, _ in self.setbacks)]
+        for k, goal in enumerate(levels):
+            top = tiers.add_grooved(
+                self, plan, self.wall, top, goal, f"tier_{k}", rise=1.1
+            )
+            terrace = Facade(1.1, (Band(0.8, 1.1, -0.1),))
+            tiers.add_crown(self, plan, terrace, top, 1.0, part=f"terrace_{k}")
+            plan = _shaped(self, massing.inset(base, self.setbacks[k][1]))
+        rise = self.crown_height if self.crown == "screen" else 0.0
+        goal = self.height - self.crown_height
+        top = tiers.add_grooved(
+            self, plan, self.wall, top, goal, "tier_top", rise=rise
+        )
+        _add_glass_skyscraper_crown(self, plan, top)
+
+
+def _shaped(p: GlassSkyscraper, outline: np.ndarray) -> np.ndarray:
+    size = p.corner_size
+    if p.corner == "chamfered":
+        return massing.chamfered(outline, size)
+    if p.corner == "notched":
+        return massing.notched(outline, 0.6 * size)
+    if p.corner == "rounded":
+        corners = dict.fromkeys(range(len(outline)), size)
+        return massing.rounded(outline, corners, 3.5)
+    return outline
+
+
+def _add_lobby(p: GlassSkyscraper, plan: np.ndarray) -> float:
+    height, length = p.lobby_height, details.WallFrame(plan, 0).length
+    door = bays.entrance(min(5.0, length / 3), 3.6, 1.6)
+    bar = bays.bar(0.12, 0.0, height - 0.8, 0.4)
+    mullions = bays.rhythm(2 * p.wall.pitch, [bar], margin=1.0)
+    bands = (
+        Band(0.0, height - 0.8, 0.7),
+        Band(0.0, 0.3, 0.45),
+        Band(height - 0.8, height - 0.5, -0.25),
+    )
+    layout = bays.with_door(mullions, door, 7.0)
+    columns = details.piers(
+        plan, 7.0, 0.9, 0.25, 0.0, height - 0.8, depth=0.75, margin=0.55,
+        entrance=min(5.8, length / 2),
+    )  # fmt: skip
+    roof = details.front_canopy(plan, 4.0, 1.5, 4.2)
+    lobby = Facade(height, bands, layout, (0.7,))
+    return tiers.add_ground(p, plan, lobby, [columns, roof])
+
+
+def _add_glass_skyscraper_crown(
+    p: GlassSkyscraper, plan: np.ndarray, z0: float
+) -> None:
+    height = round(p.height - z0, 3)
+    if p.crown == "wedge":
+        p.add("crown", massing.sloped_prism(plan, z0, height, 0.35))
+        return
+    if p.crown == "stepped":
+        low = round(0.45 * height, 2)
+        ledge = Facade(low, (Band(low - 0.5, low, -0.3),))
+        tiers.add_crown(p, plan, ledge, z0, 1.0, part="crown_low")
+        reach = 0.12 * massing.shortest_side(plan)
+        plan = massing.inset(plan, min(reach, massing.inset_limit(plan)))
+        z0, height = round(z0 + low - 1.0, 3), round(height - low + 1.0, 3)
+    louvres = tuple(
+        Band(z, z + 0.5, 0.2)
+        for z in np.arange(0.8, height - 1.5, 1.0).tolist()
+    )
+    parapet = 0.7 * height if p.crown == "screen" else 1.0
+    walls = Facade(height, louvres)
+    roof = tiers.add_crown(p, plan, walls, z0, parapet)
+    equip_roof(p, plan, roof, _ROOF_ITEMS)
+
+
+_FORECOURT_M = 7.0
+_HOTEL_ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
+
+
+class Hotel(Building):
+    """The hotel: balconies along rounded walls, a forecourt, a rooftop bar."""
+
+    def draw(self, d: Dice) -> None:
+        depth = d.depth - _FORECOURT_M
+        pitch = max(d.uniform(3.6, 4.6), d.width / 11)
+        self.ground_height = d.uniform(5.0, 6.2, 2)
+        self.storey_height = d.uniform(3.1, 3.4)
+        self.round_ends = bool(d.chance(0.5) and d.width > 1.5 * depth)
+        self.corner = round(d.uniform(0.2, 0.35) * min(depth, d.width), 1)
+        self.pitch = pitch
+        self.side_pitch = max(2.7, (d.width + 2 * depth) / 34)
+        self.recess = d.uniform(0.2, 0.35, 2)
+        self.balcony_reach = d.uniform(1.1, 1.45, 2)
+        self.balcony_width = round(d.uniform(0.6, 0.95) * pitch, 2)
+        self.rail = d.uniform(0.95, 1.1, 2)
+        self.bar_height = d.uniform(4.0, 5.0, 1)
+        self.bar_inset = d.uniform(1.8, 3.0, 1)
+        self.sign_left = d.chance(0.5)
+
+    def build(self) -> None:
+        """Builds the hotel on a rectangle, behind a forecourt."""
+        x0, y0, x1, y1 = self.site.bounds
+        front = y0 + _FORECOURT_M
+        if self.round_ends:
+            plan = massing.stadium(x0, front, x1, y1, 3.2)
+        else:
+            block = massing.rectangle(x0, front, x1, y1)
+            plan = massing.rounded(block, {0: self.corner, 1: self.corner}, 2.8)
+        top = _add_hotel_lobby(self, plan, y0)
+        goal = self.height - self.bar_height - 1.2
+        top = _add_rooms(self, plan, top, goal)
+        edge = Facade(1.2, (Band(0.0, 0.3, -0.15), Band(0.9, 1.2, -0.2)))
+        roof = tiers.add_crown(self, plan, edge, top, 1.1)
+        bar = massing.inset(plan, self.bar_inset)
+        h = round(self.height - roof, 3)
+        bands = (Band(0.4, h - 1.2, 0.3), Band(h - 0.9, h - 0.5, -1.3))
+        walls = Facade(h, bands, glass=(0.3,))
+        roof = tiers.add_crown(self, bar, walls, roof, 0.4, part="bar")
+        equip_roof(self, bar, roof, _HOTEL_ROOF_ITEMS)
+        _add_sign(self, plan)
+
+
+def _add_hotel_lobby(p: Hotel, plan: np.ndarray, y0: float) -> float:
+    h = p.ground_height
+    pane = bays.ribbon(0.4, h - 1.2, 0.4, 0.5)
+    glazing = bays.rhythm(p.pitch, [pane], margin=0.5)
+    layout = bays.with_door(glazing, bays.entrance(4.4, 3.4, 1.5), 6.4)
+    bands = (Band(0.0, 0.4, -0.1), Band(h - 0.8, h - 0.3, -0.4))
+    # The drive-in roof stands on four pillars in the forecourt.
+    middle = float(np.mean(plan[:2, 0]))
+    front = float(plan[0, 1])
+    left, right, z = middle - 6.0, middle + 6.0, 4.2
+    roof = massing.box(left, right, y0 + 0.3, front + 0.2, z, z + 0.7)
+    pillars = [
+        massing.standing(x, x + 0.7, y, y + 0.7, z)
+        for x in (left + 0.6, right - 1.3)
+        for y in (y0 + 0.8, front - 2.0)
+    ]
+    drive = massing.standing(
+        middle - 2.8, middle + 2.8, front - 2.2, front, 0.14
+    )
+    lobby = Facade(h, bands, layout, (0.4,))
+    return tiers.add_ground(p, plan, lobby, [roof, *pillars, drive])
+
+
+def _add_rooms(p: Hotel, plan: np.ndarray, z0: float, goal: float) -> float:
+    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height, 15)
+    head = round(storey - 0.45, 2)
+    french = bays.window(p.pitch - 1.2, 0.0, head, p.recess, mullions=1)
+    plain = bays.window(1.5, 0.8, head, p.recess)
+    front_rooms = {0: bays.rhythm(p.pitch, [french], margin=0.4)}
+    others = bays.rhythm(p.side_pitch, [plain], margin=0.35)
+    layout = bays.by_edge(front_rooms, others)
+    band = Band(storey - 0.12, storey, -0.08)
+    walls = Facade(storey, (band,), layout, (p.recess,))
+    front, balconies = details.WallFrame(plan, 0), []
+    for a, b in bays.stretches(front.length, p.pitch, 0.4):
+        half, x = p.balcony_width / 2, (a + b) / 2
+        ends = round(x - half, 2), round(x + half, 2)
+        rail = details.balcony(*ends, p.balcony_reach, 0.0, p.rail)
+        balconies.append(front.place(rail))
+    return tiers.add_storeys(p, plan, walls, z0, groups, per_group, balconies)
+
+
+def _add_sign(p: Hotel, plan: np.ndarray) -> None:
+    """A blade sign up the front, at one end of the balconies."""
+    front = details.WallFrame(plan, 0)
+    x = 0.4 if p.sign_left else front.length - 0.4
+    low, high = p.ground_height + 3.0, 0.7 * p.height
+    blade = front.box(x - 0.15, x + 0.15, 0.25, 1.3, low, high)
+    arms = (
+        front.box(x - 0.08, x + 0.08, 0.0, 0.4, z, z + 0.15)
+        for z in (low + 0.5, high - 0.7)
+    )
+    p.add("sign", blade, *arms, rgb=(0.55, 0.16, 0.14))
+
+
+_CLADDINGS = (
+    ((0.70, 0.66, 0.60), (0.84, 0.83, 0.80)),
+    ((0.45, 0.42, 0.40), (0.72, 0.70, 0.66)),
+    ((0.60, 0.50, 0.42), (0.56, 0.60, 0.63)),
+)
+_PODIUM_TOWER_ROOF_ITEMS = (
+    "lift_house",
+    "cooling_tower",
+    "air_handler",
+    "mast",
+)
+
+
+class PodiumTower(Building):
+    """The podium tower: a block of shops with a tower set back on its roof.
+
+    Lengths are in metres.
+
+    The tower covers the share `tower` of the podium along x and y and
+    stands at the fraction `at` of the room that is left.
+    """
+
+    def draw(self, d: Dice) -> None:
+        x0, y0, x1, y1 = d.site.bounds
+        podium_rgb, tower_rgb = d.pick(_CLADDINGS)
+        share = d.rng.uniform(0.5, 0.68, 2)
+        run = 2 * (share[0] * d.width + share[1] * d.depth)
+        self.podium_storeys = d.whole(2, 4)
+        self.ground_height = d.uniform(4.8, 5.6, 2)
+        self.storey_height = d.uniform(3.2, 3.7)
+        self.shop_pitch = d.uniform(5.5, 7.5) * min(
+            1.3, max(1.0, (x1 - x0 + y1 - y0) / 70)
+        )
+        self.tower = (float(share[0]), float(share[1]))
+        self.at = tuple(d.rng.choice([0.15, 0.5, 0.85], 2).tolist())
+        self.chamfer = d.pick((0.0, 2.0, 3.5))
+        self.pitch = max(d.uniform(3.0, 4.2), run / 19)
+        self.recess = d.uniform(0.35, 0.5, 2)
+        self.frame = d.uniform(0.5, 0.9, 2)
+        self.mullions = int(run < 70.0)
+        self.balconies = d.chance(0.5)
+        self.awnings = d.uniform(0.3, 0.9)
+        self.rgb = podium_rgb
+        self.tower_rgb = tower_rgb
+
+    def build(self) -> None:
+        """Builds podium and tower on a rectangle."""
+        (x0, y0, x1, y1), base = self.site.bounds, self.site.outline
+        top, walls = _add_shops(self), _podium_storey(self)
+        top = tiers.add_storeys(
+            self, base, walls, top, self.podium_storeys, 1, part="podium"
+        )
+        edge = Facade(1.6, (Band(0.2, 0.7, -0.3), Band(1.4, 1.6, -0.1)))
+        roof = tiers.add_crown(self, base, edge, top, 1.2, part="terrace")
+        width, depth = self.tower[0] * (x1 - x0), self.tower[1] * (y1 - y0)
+        left = round(x0 + self.at[0] * (x1 - x0 - width), 2)
+        near = round(y0 + self.at[1] * (y1 - y0 - depth), 2)
+        right, far = round(left + width, 2), round(near + depth, 2)
+        plan = massing.rectangle(left, near, right, far)
+        _add_garden(self, plan, roof)
+        if self.chamfer:
+            plan = massing.chamfered(plan, self.chamfer)
+        self.rgb = self.tower_rgb
+        _add_tower(self, plan, roof)
+
+
+def _add_shops(p: PodiumTower) -> float:
+    outline, h = p.site.outline, p.ground_height
+    front, pitch = details.WallFrame(outline, 0), p.shop_pitch
+    choices = [bays.shop_front(h - 0.6, 0.45, door=d) for d in (True, False)]
+    shops = bays.rhythm(pitch, choices, margin=0.8)
+    gates = [bays.gate(4.0, 3.4), bays.blank]
+    main = bays.with_middle(shops, bays.entrance(4.0, 3.8, 1.6), 6.0)
+    service = bays.rhythm(pitch, gates, margin=1.0)
+    layout = bays.by_edge({0: main, 2: service}, shops)
+    bands = (Band(0.0, 0.3, -0.06), Band(h - 1.1, h - 0.2, -0.2))
+    cells = bays.stretches(front.length, pitch, 0.8)
+    shape = (0.4, 1.35, 2.7, h - 1.3)
+    shades = details.awnings(front, cells, p.rng, p.awnings, shape, 3.2)
+    tiers.add_awnings(p, shades)
+    roof = details.front_canopy(outline, 3.2, 1.45, 4.0)
+    facade = Facade(h, bands, layout, (0.45,))
+    return tiers.add_ground(p, outline, facade, [roof])
+
+
+def _podium_storey(p: PodiumTower) -> Facade:
+    storey = 4.2
+    window = bays.window(p.shop_pitch - 1.4, 0.7, storey - 0.7, 0.3, mullions=2)
+    layout = bays.rhythm(p.shop_pitch, [window], margin=0.8)
+    return Facade(storey, (Band(0.0, 0.25, -0.12),), layout, glass=(0.3,))
+
+
+def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
+    room = p.height - 3.0 - z0
+    groups, per_group, storey = tiers.divided(room, p.storey_height)
+    # Deep frames, one bay wide, with the glass at their backs.
+    frame = bays.window(
+        1e3, round(p.frame / 2, 2), round(storey - p.frame / 2, 2), p.recess,
+        pier=round(p.frame / 2, 2), mullions=p.mullions,
+    )  # fmt: skip
+    layout = bays.rhythm(p.pitch, [frame], margin=0.5)
+    walls = Facade(storey, (), layout, (p.recess,))
+    extras = []
+    for edge in range(len(plan)) if p.balconies else ():
+        wall = details.WallFrame(plan, edge)
+        if wall.length > 3 * p.pitch:
+            x = 0.5 + p.pitch
+            extras.append(wall.place(details.balcony(x - 2.6, x, 1.4, 0.0)))
+    top = tiers.add_storeys(p, plan, walls, z0, groups, per_group, extras)
+    crown = round(p.height - top, 3)
+    louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
+    screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
+    roof = tiers.add_crown(p, plan, screen, top, 2.2)
+    equip_roof(p, plan, roof, _PODIUM_TOWER_ROOF_ITEMS)
+
+
+def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:
+    """Planters and a pergola on the widest strip of the podium's roof."""
+    x0, y0, x1, y1 = p.site.bounds
+    (tx0, ty0), (tx1, ty1) = tower[0], tower[2]
+    strips = (
+        (x0, tx0, y0, y1),
+        (tx1, x1, y0, y1),
+        (x0, x1, y0, ty0),
+        (x0, x1, ty1, y1),
+    )
+    a, b, c, d = max(strips, key=lambda s: min(s[1] - s[0], s[3] - s[2]))
+    a, b, c, d = a + 1.4, b - 1.4, c + 1.4, d - 1.4
+    if min(b - a, d - c) < 2.0:
+        return
+    if b - a > d - c:
+        garden = _garden(b - a, d - c).moved((a, c, z))
+    else:
+        garden = _garden(d - c, b - a).moved((b, c, z), math.pi / 2)
+    p.add("garden", garden, rgb=(0.45, 0.40, 0.33))
+
+
+def _garden(length: float, width: float) -> Mesh:
+    """Planters along x, behind them the posts and beams of a pergola."""
+    planters = (
+        (u * length, (u + 0.12) * length, 0.0, 1.2, -0.1, 0.8)
+        for u in (0.1, 0.32, 0.54, 0.76)
+    )
+    places = [round(u * length, 2) for u in np.linspace(0.25, 0.75, 7)]
+    beams = (massing.box(x, x + 0.15, 1.5, width, 2.6, 2.85) for x in places)
+    posts = (
+        (x, x + 0.15, y, y + 0.15, -0.1, 2.7)
+        for x in (places[0], places[-1])
+        for y in (1.6, width - 0.2)
+    )
+    return merge_meshes(
+        *(massing.box(*spot, bottom=False) for spot in planters),
+        *beams,
+        *(massing.box(*spot, bottom=False) for spot in posts),
+    )
