@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Set
 import contextlib
 from dataclasses import dataclass, field, replace
+from importlib import resources
 import logging
 
 import numpy as np
@@ -20,15 +21,17 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 
 from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
-from cns_drake.pictures.daylight import set_view
-from cns_drake.pictures.drive_panel import CHANGE_RGB, make_panel, template
-from cns_drake.pictures.drive_plots import make_plots, motion_curves
 from cns_drake.pictures.meshcat_drawing import (
+    END_RGB,
+    POINT_HEIGHTS,
+    START_RGB,
     draw_body,
     draw_marker,
     draw_parts,
     draw_points,
     draw_route,
+    height_rgb,
+    set_view,
 )
 from cns_drake.pictures.static_page import make_static_page
 from cns_drake.scene.perception_geometry import (
@@ -37,6 +40,19 @@ from cns_drake.scene.perception_geometry import (
 )
 from cns_drake.scene.world import World
 
+Rgb = tuple[float, float, float]
+
+# Colours of change, and their legends.
+CHANGE_RGB: dict[str, Rgb] = {
+    "absent": (0.86, 0.08, 0.20),
+    "lower": (0.96, 0.50, 0.05),
+    "additional": (0.60, 0.42, 0.92),
+}
+_CHANGES = {
+    "absent": "not here, but in {other}",
+    "lower": "higher in {other}",
+    "additional": "not in {other}, or lower there",
+}
 # Absent structures are translucent, hidden behind present ones, and cast no
 # shadow.
 _OPACITY = 0.45
@@ -49,6 +65,12 @@ _UNREAL = {
 # Traffic has a pose only every few frames, which keeps pages small. In the
 # tightest turns at 10 m/s the error between them is 0.1 m.
 _TRAFFIC_INTERVAL = 5
+# More samples of a plot would not be visible.
+_MAX_SAMPLES = 400
+# Size of a plot in units of its own; the page stretches it.
+_PLOT_WIDTH, _PLOT_HEIGHT = 400.0, 20.0
+# Least range of a plot: a smaller one would magnify noise.
+_LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
 
 
 @dataclass(frozen=True)
@@ -99,15 +121,15 @@ def make_drive_page(
     page:
 
     - `/city/<class>`: the structures of the stage in their own colours,
-    - `/vehicle/<body>`, `/moving/<body>`: the moving bodies, - `/route`: a
-    ribbon from red (start) to blue (end), - `/scans/<k>`: LiDAR points coloured
-    by height, as soon as measured, - `/stage_difference/additional/<class>`:
-    parts of the city that the other stage lacks or has lower; they are not in
-    `/city`, - `/stage_difference/absent/<class>`: structures of the other stage
-    that
+    - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
+    - `/route`: a ribbon from red (start) to blue (end),
+    - `/scans/<k>`: LiDAR points coloured by height, as soon as measured,
+    - `/stage_difference/additional/<class>`: parts of the city that the other
+      stage lacks or has lower; they are not in `/city`,
+    - `/stage_difference/absent/<class>`: structures of the other stage that
       this one lacks, translucent red, off when the page opens,
     - `/stage_difference/lower/<class>`: parts of the other stage above their
-    height here, translucent orange, off when the page opens.
+      height here, translucent orange, off when the page opens.
 
     A panel has the title and a legend; buttons play the drive, let the camera
     follow the car, switch points off, and show the change: additional parts are
@@ -130,18 +152,119 @@ def make_drive_page(
     _animate(meshcat, drive, world)
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
     set_view(meshcat, p_WBset.min(axis=0), p_WBset.max(axis=0))
-    curves = motion_curves(
-        drive.speeds, drive.specific_forces_I, drive.angular_velocities_I
-    )
-    plots = make_plots(curves, stage, stages)
     return make_static_page(
         meshcat,
         title,
-        body=make_panel(
-            title, drive.X_WBs, drive.period, changes, other_name, plots
-        ),
-        script=template("drive.js"),
+        body=make_panel(title, drive, changes, other_name, stage, stages),
+        script=_read_template("drive.js"),
     )
+
+
+def make_panel(
+    title: str,
+    drive: DriveRecord,
+    changes: Set[str],
+    other_name: str,
+    stage: str | None = None,
+    stages: Sequence[str] = (),
+) -> str:
+    """Returns the HTML of title, legend, plots and buttons.
+
+    Args:
+        title: plain text.
+        drive: the record of the drive.
+        changes: the keys of `CHANGE_RGB` that the page has.
+        other_name: the name of the other stage.
+        stage: name of the stage, if the world is one of a map.
+        stages: names of all stages of that map, the earliest first.
+    """
+    # Only pages need templates, whose import takes a moment.
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
+    length = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1).sum()
+    minutes, seconds = divmod(int((len(p_WBset) - 1) * drive.period), 60)
+    lowest, highest = POINT_HEIGHTS
+    environment = Environment(
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    return environment.from_string(_read_template("panel.html")).render(
+        style=Markup(_read_template("drive.css")),
+        title=title,
+        facts=f"{length / 1000.0:.2f} km in {minutes} min {seconds} s",
+        points=_gradient(height_rgb(np.linspace(lowest, highest, 9))),
+        heights=f"{lowest:g} to {highest:g} m",
+        route=_gradient([START_RGB, END_RGB]),
+        colours={name: _hex(rgb) for name, rgb in CHANGE_RGB.items()},
+        changes={
+            name: words.format(other=other_name)
+            for name, words in _CHANGES.items()
+            if name in changes
+        },
+        plots=motion_plots(drive),
+        stage=stage,
+        stages=stages,
+    )
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A curve over the time of the drive, as the page's template draws it.
+
+    Attributes:
+        name: its name in the page.
+        unit: a key of `_LEAST_RANGE`.
+        values: what is said at some times, evenly spread over the drive.
+        points: the curve, as SVG has it.
+        zero: height of zero, as SVG has it.
+    """
+
+    name: str
+    unit: str
+    values: str
+    points: str
+    zero: str
+
+    @classmethod
+    def of(cls, name: str, unit: str, values: np.ndarray) -> Plot:
+        """Returns the plot of values (F,), one for each frame."""
+        count = min(len(values), _MAX_SAMPLES)
+        frames = np.linspace(0, len(values) - 1, count).round().astype(int)
+        values = values[frames]
+        low, high = min(values.min(), 0.0), max(values.max(), 0.0)
+        missing = max(_LEAST_RANGE[unit] - (high - low), 0.0)
+        if low < 0.0:  # Zero stays within the plot.
+            low -= missing / 2.0
+            missing /= 2.0
+        high += missing
+        x = np.linspace(0.0, _PLOT_WIDTH, count)
+        y = _PLOT_HEIGHT * (high - values) / (high - low)
+        zero = _PLOT_HEIGHT * high / (high - low)
+        return cls(
+            name,
+            unit,
+            ",".join(f"{value:.1f}" for value in values),
+            " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True)),
+            f"{zero:.1f}",
+        )
+
+
+def motion_plots(drive: DriveRecord) -> list[Plot]:
+    """Returns the plots of speed and IMU; none of less than two frames."""
+    if len(drive.speeds) < 2:
+        return []
+    forces = np.array(drive.specific_forces_I)
+    turns = np.rad2deg(drive.angular_velocities_I)
+    return [
+        Plot.of("Speed", "km/h", 3.6 * np.array(drive.speeds)),
+        Plot.of("IMU, forward", "m/s²", forces[:, 0]),
+        Plot.of("IMU, left", "m/s²", forces[:, 1]),
+        Plot.of("IMU, turn", "deg/s", turns[:, 2]),
+    ]
 
 
 def moving_frames(world: World) -> tuple[FrameId, ...]:
@@ -272,3 +395,16 @@ def _quiet() -> Iterator[None]:
         yield
     finally:
         logger.setLevel(level)
+
+
+def _read_template(name: str) -> str:
+    folder = resources.files("cns_drake.pictures") / "page_template"
+    return (folder / name).read_text(encoding="utf-8")
+
+
+def _gradient(colours: Sequence[np.ndarray] | np.ndarray) -> str:
+    return f"linear-gradient(90deg, {', '.join(map(_hex, colours))})"
+
+
+def _hex(rgb: Rgb | np.ndarray) -> str:
+    return "#" + "".join(f"{round(255.0 * value):02x}" for value in rgb)

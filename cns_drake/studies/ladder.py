@@ -29,14 +29,15 @@ from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.report.ladder_figure import draw_ladder
-from evaluation.report.ladder_rows import (
+from evaluation.report.ladder import (
     LadderRung,
     MeasuredRung,
+    draw_ladder,
+    ladder_query_table,
     ladder_rows,
+    ladder_table,
+    ladder_text,
 )
-from evaluation.report.ladder_tables import ladder_query_table, ladder_table
-from evaluation.report.ladder_text import ladder_text
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.described_drives import DescribeDrive
 from evaluation.study.parts import read_part

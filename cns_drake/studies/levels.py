@@ -20,8 +20,7 @@ from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.studies.ladder_causes import ALL, NONE, STRENGTHS
 from cns_drake.studies.ladder_rungs import Extent, plan_rungs
 from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.report.method_titles import in_table_order, title
-from evaluation.report.tables import Table
+from evaluation.report.tables import Table, in_table_order, title
 
 # All causes together, at the ladder's strengths, would leave nothing to
 # measure.

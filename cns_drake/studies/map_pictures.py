@@ -97,11 +97,11 @@ class DrawDrives(_Picture):
     def prepare(self) -> None:
         super().prepare()
         with uninterrupted():
-            import cns_drake.pictures.aerial_pictures  # noqa: F401
+            import cns_drake.pictures.stage_pictures  # noqa: F401
 
     def make(self, reporter: Reporter) -> None:
         with uninterrupted():
-            from cns_drake.pictures.aerial_pictures import draw_drives
+            from cns_drake.pictures.stage_pictures import draw_drives
 
         draw_drives(
             {one.name.replace("_", " "): one for one in self._scenarios()},

@@ -17,8 +17,8 @@ from evaluation.report.drawing import (
     plain,
     save,
 )
-from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.reference import NO_REFERENCE, Reference
+from evaluation.report.tables import in_table_order, title
 
 # The least number of points that a line is fitted through.
 _LEAST_POINTS = 5

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cns_drake.base.files import completing
-from evaluation.report.method_titles import title
+from evaluation.report.tables import title
 
 # Okabe and Ito's colours, distinct for all kinds of colour vision; line
 # styles and markers for prints without colour.

@@ -1,9 +1,16 @@
-"""Pictures of the maps: the routes, and the change."""
+"""Pictures of the maps: the routes, and the change.
+
+Millions of points are projected orthographically, hidden ones removed by a
+depth buffer, and edges darkened where the depth steps (eye-dome lighting:
+Boucheny 2009), which shows shape without normals.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import itertools
+import math
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -11,6 +18,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 import numpy as np
+from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from evaluation.change.tcr import TAU, TemporalChange
@@ -18,13 +26,6 @@ from evaluation.geometry.hull import in_convex_hull
 from evaluation.geometry.nearest import NearestPoints
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.report.drawing import PIXELS, Legend, plain, save, unit
-from evaluation.report.point_rendering import (
-    Picture,
-    View,
-    colour_by_height,
-    render,
-    shade_by_height,
-)
 
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)
@@ -47,11 +48,6 @@ SETS_LEGEND: Legend = (
 _GROUND = (226, 229, 232)
 _HIGHEST = (72, 88, 112)
 
-_OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
-_SMALL_OBLIQUE = View(
-    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=1.8
-)
-_FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 # Red at the start and blue at the end, as in the paper.
 ROUTE_COLOURS = "turbo_r"
 # Margin of a view from above around the route [m].
@@ -59,6 +55,73 @@ _MARGIN = 60.0
 _SCALE_BAR = 50.0
 _ROUTE_POINTS = 400
 _PANEL_INCHES = 4.2
+_WHITE = 255
+# Strength of the darkening: a step of one metre darkens by 1 - exp(-strength).
+_STEP_STRENGTH = 0.35
+# Deeper steps darken no more than this [m].
+_STEP_LIMIT = 4.0
+
+
+@dataclass(frozen=True)
+class View:
+    """An orthographic camera that looks at the ground.
+
+    Attributes:
+        azimuth_deg: direction from the scene to the camera, seen from above
+            [deg].
+        elevation_deg: of the camera above the horizon, up to 90 [deg].
+        pixels_per_metre: scale.
+    """
+
+    azimuth_deg: float = -60.0
+    elevation_deg: float = 35.0
+    pixels_per_metre: float = 3.0
+
+    def axes(self) -> np.ndarray:
+        """Returns rows right, up and towards the camera (3, 3), in W."""
+        azimuth = math.radians(self.azimuth_deg)
+        elevation = math.radians(self.elevation_deg)
+        towards = [
+            math.cos(elevation) * math.cos(azimuth),
+            math.cos(elevation) * math.sin(azimuth),
+            math.sin(elevation),
+        ]
+        right = [-math.sin(azimuth), math.cos(azimuth), 0.0]
+        return np.array([right, np.cross(towards, right), towards])
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered cloud.
+
+    Attributes:
+        image: (height, width, 3) uint8; white where there is no point.
+        origin: coordinates along right and up of the lower left corner [m].
+        view: how it was taken.
+    """
+
+    image: np.ndarray
+    origin: np.ndarray
+    view: View
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top of the image, along its axes [m]."""
+        height, width = self.image.shape[:2]
+        scale = self.view.pixels_per_metre
+        left, bottom = self.origin
+        return left, left + width / scale, bottom, bottom + height / scale
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Returns points (N, 3) along right and up (N, 2) [m]."""
+        return points @ self.view.axes()[:2].T
+
+
+_OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
+_SMALL_OBLIQUE = View(
+    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=1.8
+)
+_FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 
 
 @dataclass(frozen=True)
@@ -136,16 +199,16 @@ def draw_routes(map_name: str, routes: Sequence[SeenRoute], stem: Path) -> None:
     """Draws the routes of a city over their maps, red to blue, from above.
 
     Args:
-        map_name: of the city.
+        map_name: name of the city.
         routes: one for each of its stages.
         stem: path to write, without ending.
     """
-    figure, grid = _picture_grid([route.view for route in routes])
-    for axes, route in zip(grid, routes, strict=True):
-        _show(axes, route.view)
-        _draw_route(axes, route.view.project(route.positions))
-        axes.set_title(plain(f"{map_name} {route.name}"), fontsize=9)
-    save(figure, stem, PIXELS)
+    _draw_panels(
+        [f"{map_name} {route.name}" for route in routes],
+        [route.view for route in routes],
+        stem,
+        routes=[route.view.project(route.positions) for route in routes],
+    )
 
 
 def draw_change(
@@ -199,24 +262,15 @@ def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
 def _draw_absent(
     map_name: str, stages: tuple[Stage, Stage], stem: Path
 ) -> None:
-    pictures = []
-    for stage, other in zip(stages, stages[::-1], strict=True):
+    titles, pictures = [], []
+    for stage, other in itertools.permutations(stages):
         absent, in_hull = judge_points(stage.fine, other.coarse.centroids_W)
         rgb = np.full((len(absent), 3), _UNCHANGED, dtype=np.uint8)
         rgb[absent] = _ABSENT_OUTSIDE
         rgb[absent & in_hull] = _CHANGED
+        titles.append(f"{map_name} {stage.name}: what {other.name} lacks")
         pictures.append(_render_shaded(stage.fine, rgb, _OBLIQUE))
-    figure, grid = _picture_grid(pictures)
-    names = [stage.name for stage in stages]
-    titles = (
-        f"{map_name} {names[0]}: what {names[1]} lacks",
-        f"{map_name} {names[1]}: what {names[0]} lacks",
-    )
-    for axes, picture, text in zip(grid, pictures, titles, strict=True):
-        _show(axes, picture)
-        axes.set_title(plain(text), fontsize=9)
-    _show_legend(figure, CHANGE_LEGEND)
-    save(figure, stem, PIXELS)
+    _draw_panels(titles, pictures, stem, CHANGE_LEGEND)
 
 
 def _draw_sets(
@@ -225,33 +279,29 @@ def _draw_sets(
     change: TemporalChange,
     stem: Path,
 ) -> None:
-    clouds, colours = [], []
+    clouds, colours = [stage.fine for stage in stages], []
     sides = (change.source_to_target, change.target_to_source)
     for stage, side in zip(stages, sides, strict=True):
         rgb = np.full((len(stage.coarse), 3), _OUTSIDE_H, dtype=np.uint8)
         rgb[side.in_hull] = _ONLY_IN_H
         rgb[side.unchanged] = _IN_O
-        rgb = rgb[voxel_of_each(stage.fine, stage.coarse)]
-        clouds.append(stage.fine)
-        colours.append(rgb)
+        colours.append(rgb[voxel_of_each(stage.fine, stage.coarse)])
     clouds.append(np.concatenate(clouds))
     colours.append(np.concatenate(colours))
-    pictures = [
-        _render_shaded(cloud, rgb, _SMALL_OBLIQUE)
-        for cloud, rgb in zip(clouds, colours, strict=True)
-    ]
-    figure, grid = _picture_grid(pictures)
     first, last = (stage.name for stage in stages)
-    titles = (
-        f"H({first}, {last}): TCR {change.source_to_target.ratio:.4f}",
-        f"H({last}, {first}): TCR {change.target_to_source.ratio:.4f}",
-        f"union: TCR_sym {change.symmetric:.4f}",
+    _draw_panels(
+        [
+            f"{map_name} H({first}, {last}): TCR {sides[0].ratio:.4f}",
+            f"{map_name} H({last}, {first}): TCR {sides[1].ratio:.4f}",
+            f"{map_name} union: TCR_sym {change.symmetric:.4f}",
+        ],
+        [
+            _render_shaded(cloud, rgb, _SMALL_OBLIQUE)
+            for cloud, rgb in zip(clouds, colours, strict=True)
+        ],
+        stem,
+        SETS_LEGEND,
     )
-    for axes, picture, text in zip(grid, pictures, titles, strict=True):
-        _show(axes, picture)
-        axes.set_title(plain(f"{map_name} {text}"), fontsize=9)
-    _show_legend(figure, SETS_LEGEND)
-    save(figure, stem, PIXELS)
 
 
 def _render_shaded(points: np.ndarray, rgb: np.ndarray, view: View) -> Picture:
@@ -260,8 +310,22 @@ def _render_shaded(points: np.ndarray, rgb: np.ndarray, view: View) -> Picture:
     )
 
 
-def _picture_grid(pictures: Sequence[Picture]) -> tuple[Figure, np.ndarray]:
-    """Returns a figure with a column of equal height for each picture."""
+def _draw_panels(
+    titles: Sequence[str],
+    pictures: Sequence[Picture],
+    stem: Path,
+    legend: Legend = (),
+    routes: Sequence[np.ndarray] = (),
+) -> None:
+    """Draws pictures side by side, of equal height.
+
+    Args:
+        titles: one for each picture.
+        pictures: from left to right.
+        stem: path to write, without ending.
+        legend: stands below all pictures.
+        routes: the route (N, 2) on each picture [m]; empty for none.
+    """
     shapes = [(e[1] - e[0], e[3] - e[2]) for e in (p.extent for p in pictures)]
     tallest = max(height / width for width, height in shapes)
     figure = Figure(
@@ -271,8 +335,23 @@ def _picture_grid(pictures: Sequence[Picture]) -> tuple[Figure, np.ndarray]:
         ),
         layout="constrained",
     )
-    grid = figure.subplots(1, len(pictures), squeeze=False)[0]
-    return figure, grid
+    panels = figure.subplots(1, len(pictures), squeeze=False)[0]
+    for axes, title, picture in zip(panels, titles, pictures, strict=True):
+        _show(axes, picture)
+        axes.set_title(plain(title), fontsize=9)
+    for axes, route in zip(panels, routes, strict=False):
+        _draw_route(axes, route)
+    if legend:
+        figure.legend(
+            handles=[
+                Patch(color=unit(rgb), label=text) for rgb, text in legend
+            ],
+            loc="outside lower center",
+            ncols=len(legend),
+            frameon=False,
+            fontsize=8,
+        )
+    save(figure, stem, PIXELS)
 
 
 def _show(axes: Axes, picture: Picture) -> None:
@@ -318,13 +397,108 @@ def _draw_route(axes: Axes, line: np.ndarray) -> None:
     axes.legend(fontsize=7, loc="upper right", framealpha=0.8)
 
 
-def _show_legend(figure: Figure, entries: Legend) -> None:
-    figure.legend(
-        handles=[
-            Patch(color=unit(colour), label=label) for colour, label in entries
-        ],
-        loc="outside lower center",
-        ncols=len(entries),
-        frameon=False,
-        fontsize=8,
+def render(
+    points: np.ndarray, rgb: np.ndarray, view: View, size_px: int = 3
+) -> Picture:
+    """Draws a cloud.
+
+    Args:
+        points: (N, 3) in W [m], N > 0.
+        rgb: (N, 3) uint8 colour of each.
+        view: the camera.
+        size_px: side of the square that a point covers.
+    """
+    seen = points @ view.axes().T
+    # One column at a time: a minimum over rows takes many times as long.
+    origin = np.array([seen[:, 0].min(), seen[:, 1].min()])
+    column, up = (
+        np.floor((seen[:, :2] - origin) * view.pixels_per_metre)
+        .astype(np.int64)
+        .T
     )
+    width = int(column.max()) + size_px
+    height = int(up.max()) + size_px
+    # The number of each pixel's point, from the farthest to the nearest: where
+    # several have the same pixel, NumPy keeps the last.
+    order = np.argsort(seen[:, 2], kind="stable")
+    corners = np.full((height, width), -1, np.int32)
+    corners[height - size_px - up[order], column[order]] = np.arange(len(order))
+    # A square lies below and right of its corner.
+    nearest = maximum_filter(
+        corners, size_px, origin=(size_px - 1) // 2, mode="constant", cval=-1
+    )
+    filled = nearest >= 0
+    front = order[nearest[filled]]
+    depth = np.full((height, width), -np.inf)
+    depth[filled] = seen[front, 2]
+    image = np.full((height, width, 3), _WHITE, dtype=np.uint8)
+    image[filled] = (rgb[front] * _shade(depth)[filled, None]).astype(np.uint8)
+    return Picture(image, origin, view)
+
+
+def shade_by_height(
+    rgb: np.ndarray, heights: np.ndarray, darkest: float = 0.75
+) -> np.ndarray:
+    """Returns colours that are darker the lower their points are.
+
+    Args:
+        rgb: (N, 3) uint8.
+        heights: (N,) [m].
+        darkest: factor at the lowest point.
+    """
+    factor = darkest + (1.0 - darkest) * _height_parts(heights)
+    return (rgb * factor[:, None]).astype(np.uint8)
+
+
+def colour_by_height(
+    heights: np.ndarray,
+    lowest: tuple[int, int, int],
+    highest: tuple[int, int, int],
+) -> np.ndarray:
+    """Returns colours (N, 3) uint8 between two by height.
+
+    Args:
+        heights: (N,) [m].
+        lowest: colour of the lowest point.
+        highest: colour of the highest.
+    """
+    part = _height_parts(heights)[:, None]
+    return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
+
+
+def _height_parts(heights: np.ndarray) -> np.ndarray:
+    """Returns 0 for low points to 1 for high ones; stray ones do not count."""
+    # A river's bed is up to 5 %, and must be no brighter than streets.
+    low, high = np.quantile(heights, [0.05, 0.99])
+    part = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)
+    # The square root spreads low heights, because most of a city is near the
+    # ground.
+    return np.sqrt(part)
+
+
+def _shade(depth: np.ndarray) -> np.ndarray:
+    """Returns the brightness of each pixel, 0 to 1, from steps in depth.
+
+    It is NaN where there is nothing.
+
+    Args:
+        depth: (H, W) towards the camera [m]; -inf where there is nothing.
+    """
+    padded = np.pad(depth, 1, constant_values=-np.inf)
+    height, width = depth.shape
+    steps = np.zeros_like(depth)
+    neighbours = [
+        (0, 1),
+        (1, 0),
+        (1, 2),
+        (2, 1),
+        (0, 0),
+        (0, 2),
+        (2, 0),
+        (2, 2),
+    ]
+    for row, column in neighbours:
+        other = padded[row : row + height, column : column + width]
+        with np.errstate(invalid="ignore"):
+            steps += np.clip(other - depth, 0.0, _STEP_LIMIT)
+    return np.exp(-_STEP_STRENGTH * steps / len(neighbours))

@@ -1,45 +1,68 @@
-"""The report as one page, which needs neither a network nor other files."""
+"""A report: its tables as files, its text, and its page.
+
+The page needs neither a network nor other files.
+"""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+import functools
+from importlib import resources
+import itertools
 import json
 from pathlib import Path
-from typing import get_args
+from urllib.parse import quote
 
+from jinja2 import (
+    Environment,
+    PackageLoader,
+    StrictUndefined,
+    select_autoescape,
+)
 from markupsafe import Markup
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+import numpy as np
 
 from cns_drake.base.files import completing
-from evaluation.change.drive_change import (
-    ChangeResult,
-    symmetric_changes,
-)
+from evaluation.change.drive_change import ChangeResult, symmetric_changes
+from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.survival import Survival
-from evaluation.report.page_data import (
-    Illustration,
-    PageDrive,
-    Section,
-    browser_data,
+from evaluation.report.figures import ROUTE_COLOURS
+from evaluation.report.page_data import Illustration, PageDrive, browser_data
+from evaluation.report.reference import NO_REFERENCE, Reference
+from evaluation.report.result_tables import (
+    DriveTrack,
+    audit_table,
+    change_table,
+    cost_numbers,
+    cost_table,
+    fault_numbers,
+    fault_table,
+    metric_numbers,
+    pose_numbers,
+    pose_table,
+    query_table,
+    recognition_tables,
 )
-from evaluation.report.page_routes import (
-    BAR_LENGTH,
-    route_colours,
-    route_picture,
-)
-from evaluation.report.page_survival import survival_groups
-from evaluation.report.page_templates import read_asset, render
-from evaluation.report.reference import Judgement
-from evaluation.report.survival_tables import (
-    SURVIVAL_CAPTION,
+from evaluation.report.survival import (
+    NO_CONTROL,
+    by_pair,
+    interval_text,
+    percent,
+    survival_numbers,
     survival_summary,
+    survival_table,
 )
-from evaluation.report.tables import Table
+from evaluation.report.tables import MISSING, Table, escape_markdown, title
 
+_TEMPLATES = "page_template"
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
 # Name of a section -> its heading, in the order of the page.
 _SECTIONS = {
@@ -53,132 +76,203 @@ _SECTIONS = {
 }
 # Each script uses only those before it.
 _SCRIPTS = ("state.js", "pictures.js", "page.js")
+# Number of pieces of one colour in a drawn route.
+_NUM_PIECES = 48
+# Size of the marks of start and end, as a part of the picture.
+_MARK = 0.016
+# Length of the scale bar [m].
+_BAR_LENGTH = 50.0
 
 
-@dataclass(frozen=True)
-class PageContent:
-    """All that the page shows.
+@dataclass
+class Report:
+    """What a report is made of.
 
     Attributes:
-        notes: cities without a pair to compare.
-        judgements: claims and their verdicts.
-        beside: source of the published numbers beside ours; empty for none.
         changes: TCR of all pairs.
-        change: Table I.
-        recognition: all forms of Table II; the last but one is that of mode
-            all.
-        audit: all numbers.
-        why: reasons for wrong best places.
-        evidence: (database, query) -> evidence of these reasons.
-        poses: errors of the poses that methods estimate.
-        costs: of the methods; without rows if they were not measured.
-        illustrations: figures, already written.
-        recognitions: place recognition of all pairs.
-        survivals: the same with their controls.
+        survivals: place recognition of all pairs, with their controls.
+        recognitions: the same results without controls, and those of drives
+            compared with themselves.
+        evidence: (database, query) -> evidence why best places are wrong.
+        tracks: drive -> its track, also for the controls.
         drives: name -> drive, for all drives of a pair.
+        illustrations: figures, already written.
+        costs: costs of the methods; empty if they were not measured.
+        notes: cities without a pair to compare.
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
+        reference: published numbers and claims.
     """
 
-    notes: Sequence[str]
-    judgements: Sequence[Judgement]
-    beside: str
-    changes: Sequence[ChangeResult]
-    change: Table
-    recognition: Sequence[Table]
-    audit: Table
-    why: Table
-    evidence: Mapping[tuple[str, str], PairEvidence]
-    poses: Table
-    costs: Table
-    illustrations: Sequence[Illustration]
-    recognitions: Sequence[RecognitionResult]
-    survivals: Sequence[Survival]
-    drives: Mapping[str, PageDrive]
+    changes: list[ChangeResult] = field(default_factory=list)
+    survivals: list[Survival] = field(default_factory=list)
+    recognitions: list[RecognitionResult] = field(default_factory=list)
+    evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
+    tracks: dict[str, DriveTrack] = field(default_factory=dict)
+    drives: dict[str, PageDrive] = field(default_factory=dict)
+    illustrations: list[Illustration] = field(default_factory=list)
+    costs: Sequence[Cost] = ()
+    notes: Sequence[str] = ()
     pages: Mapping[str, str] = field(default_factory=dict)
+    reference: Reference = NO_REFERENCE
+
+    @property
+    def has_published(self) -> bool:
+        """Whether the reference has numbers beside ours."""
+        return any(map(self.reference.covers, self.recognitions))
 
 
-def write_page(path: Path, content: PageContent) -> None:
+def write_report(report: Report, folder: Path) -> Path:
+    """Writes all files but the figures; returns the path of `report.html`.
+
+    Args:
+        report: what to write.
+        folder: an existing one.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    results, controls = report.recognitions, report.survivals
+    tables = _shown_tables(report)
+    numbers = {
+        "survival": survival_numbers(report.survivals),
+        "tcr": change_table(report.changes, report.reference),
+        "place_recognition": audit_table(results, report.reference),
+        "poses": pose_numbers(results),
+        "metrics": metric_numbers(results),
+        "why": fault_numbers(results, report.evidence),
+        "queries": query_table(
+            [(one.pair, one) for one in results],
+            report.tracks,
+            report.evidence,
+        ),
+        "queries_unchanged": query_table(
+            [(one.pair, one.unchanged) for one in controls if one.unchanged],
+            report.tracks,
+            {},
+        ),
+    }
+    if report.costs:
+        numbers["costs"] = cost_numbers(report.costs)
+    for name, table in numbers.items():
+        _write(folder / f"{name}.csv", table.to_csv())
+        if name != "why" and name in tables:
+            forms = {
+                "md": map(_captioned, tables[name]),
+                "tex": (shown.to_latex() for shown in tables[name]),
+            }
+            for ending, texts in forms.items():
+                _write(folder / f"{name}.{ending}", "\n".join(texts))
+    text = _render("report.md", **_content(report, tables))
+    _write(folder / "report.md", text.rstrip() + "\n")
+    path = folder / "report.html"
+    write_page(path, report)
+    return path
+
+
+def write_page(path: Path, report: Report) -> None:
     """Writes the page.
 
     Raises:
-        InputError: if it cannot be written.
+        InputError: it cannot be written.
     """
     data = None
-    if content.recognitions:
+    if report.recognitions:
         data = browser_data(
-            content.recognitions,
-            content.drives,
-            symmetric_changes(content.changes),
-            content.pages,
-            content.evidence,
+            report.recognitions,
+            report.drives,
+            symmetric_changes(report.changes),
+            report.pages,
+            report.evidence,
         )
-    illustrations = _by_section(content.illustrations)
-    drives_of_maps = _drives_of_maps(content)
-    tables = content.recognition[1:]
-    modes = MODES[len(MODES) - len(tables) :]
+    tables = _shown_tables(report)
+    illustrations = defaultdict(list)
+    for one in report.illustrations:
+        illustrations[one.section].append(one)
+    drives_of_maps = _drives_of_maps(report)
+    others = tables["place_recognition"][1:]
+    # A section without an entry is always there.
     has_section = {
-        "survival": bool(content.survivals),
-        "summary": True,
+        "survival": bool(report.survivals),
         "maps": bool(drives_of_maps),
-        "change": bool(content.change.rows or illustrations["change"]),
-        "recognition": bool(content.recognitions),
+        "change": bool(tables["tcr"][0].rows or illustrations["change"]),
+        "recognition": bool(report.recognitions),
         "figures": bool(illustrations["figures"]),
-        "browser": bool(content.recognitions),
+        "browser": bool(report.recognitions),
     }
-    text = render(
+    text = _render(
         "page.html",
-        content=content,
-        sections={n: w for n, w in _SECTIONS.items() if has_section[n]},
+        **_content(report, tables),
+        sections={
+            name: words
+            for name, words in _SECTIONS.items()
+            if has_section.get(name, True)
+        },
         illustrations=illustrations,
-        data_of=_data_address,
-        survival_groups=survival_groups(content.survivals),
-        survival_summary=survival_summary(content.survivals),
-        survival_caption=SURVIVAL_CAPTION,
-        facts=_facts(content),
+        survivals_by_pair=by_pair(report.survivals),
+        facts=_facts(report),
         drives_of_maps=drives_of_maps,
-        route_picture=route_picture,
-        route_colours=route_colours(),
-        route_bar=round(BAR_LENGTH),
-        modes=list(zip(modes, tables, strict=True)),
+        modes=list(zip(MODES[-len(others) :], others, strict=True)),
         fault_kinds=FAULT_KINDS,
-        style=read_asset("page.css"),
-        script=Markup("\n").join(map(read_asset, _SCRIPTS)),
+        style=_read_asset("page.css"),
+        script=Markup("\n").join(map(_read_asset, _SCRIPTS)),
         data=_to_script(data),
     )
-    with completing(path) as part:
-        part.write_text(text, encoding="utf-8")
+    _write(path, text)
 
 
-def _by_section(
-    illustrations: Sequence[Illustration],
-) -> dict[Section, list[Illustration]]:
+def _shown_tables(report: Report) -> dict[str, list[Table]]:
+    """Returns name of a file -> its tables for print."""
+    results = report.recognitions
+    changes = change_table(report.changes, report.reference)
     return {
-        section: [one for one in illustrations if one.section == section]
-        for section in get_args(Section)
+        "survival": [survival_table(report.survivals)],
+        "tcr": [changes.without_empty("paper")],
+        "place_recognition": recognition_tables(
+            results, report.changes, report.reference
+        ),
+        "why": [fault_table(results, report.evidence)],
+        "poses": [pose_table(results)],
+        "costs": [cost_table(report.costs)],
+        "audit": [audit_table(results, report.reference)],
     }
 
 
-def _facts(content: PageContent) -> list[tuple[str, int]]:
+def _content(
+    report: Report, tables: Mapping[str, Sequence[Table]]
+) -> dict[str, object]:
+    """Returns what both the text and the page show."""
+    return {
+        "report": report,
+        "tables": tables,
+        "judgements": report.reference.judge(
+            report.recognitions, report.changes
+        ),
+        "survival_summary": survival_summary(report.survivals),
+    }
+
+
+def _captioned(table: Table) -> str:
+    return f"{escape_markdown(table.caption)}\n\n{table.to_markdown()}"
+
+
+def _facts(report: Report) -> list[tuple[str, int]]:
     """Returns the labels and numbers of maps, pairs and methods."""
-    maps = {result.map_name for result in content.changes}
-    pairs = {result.pair for result in content.recognitions}
-    methods = {result.method for result in content.recognitions}
     return [
-        ("maps", len(maps)),
-        ("pairs of stages", len(content.changes)),
-        ("database → query", len(pairs)),
-        ("methods", len(methods)),
+        ("maps", len({one.map_name for one in report.changes})),
+        ("pairs of stages", len(report.changes)),
+        ("database → query", len({one.pair for one in report.recognitions})),
+        ("methods", len({one.method for one in report.recognitions})),
     ]
 
 
-def _drives_of_maps(content: PageContent) -> dict[str, list[str]]:
+def _drives_of_maps(report: Report) -> dict[str, list[str]]:
     """Returns map -> its drives, in the order of stages.
 
     A drive that is in no pair stands under its own name.
     """
     found: dict[str, dict[str, str]] = {}
-    for result in content.recognitions:
+    for result in report.recognitions:
         names = (result.outcome.database, result.outcome.query)
         found.setdefault(result.map_name, {}).update(
             zip(result.stages, names, strict=True)
@@ -188,8 +282,56 @@ def _drives_of_maps(content: PageContent) -> dict[str, list[str]]:
         for map_name, stages in found.items()
     }
     placed = {name for names in groups.values() for name in names}
-    groups.update({n: [n] for n in content.drives if n not in placed})
+    groups.update({n: [n] for n in report.drives if n not in placed})
     return groups
+
+
+def route_picture(drive: PageDrive) -> Markup:
+    """Returns an SVG element: the map, over it the route from red to blue.
+
+    One unit is one metre, y points down. The element `image` in it has the
+    id `view-` and the drive's name, and serves the query browser as well.
+    """
+    left, right, bottom, top = drive.extent
+    width, height = right - left, top - bottom
+    size = _MARK * max(width, height)
+    data = base64.b64encode(drive.view).decode("ascii")
+    route = drive.route * [1.0, -1.0]
+    (x0, y0), (x1, y1) = route[0], route[-1]
+    end, base = right - 0.03 * width, -bottom - 0.03 * height
+    mark = [[x0, y0 - size], [x0 - size, y0 + size], [x0 + size, y0 + size]]
+    # Pieces are joined at their ends.
+    last = len(route) - 1
+    num = min(_NUM_PIECES, max(last, 1))
+    ends = np.linspace(0, last, num + 1).astype(int)
+    pieces = [route[a : b + 1] for a, b in itertools.pairwise(ends)]
+    return Markup(
+        _render(
+            "route.svg",
+            name=drive.name,
+            box=_numbers([left, -top, width, height]),
+            image=f"data:image/webp;base64,{data}",
+            route=_points(route),
+            pieces=zip(_route_colours(num), map(_points, pieces), strict=True),
+            start=_points(np.array(mark)),
+            end=_numbers([x1 - size, y1 - size, 2 * size]),
+            bar=_numbers([end - _BAR_LENGTH, end, base]),
+        )
+    )
+
+
+def _route_colours(num: int = 9) -> list[str]:
+    """Returns colours from the start of a route to its end."""
+    colours = colormaps[ROUTE_COLOURS](np.linspace(0.0, 1.0, num))
+    return [to_hex(colour) for colour in colours]
+
+
+def _points(line: np.ndarray) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
+
+
+def _numbers(values: Iterable[float]) -> list[str]:
+    return [f"{value:.2f}" for value in values]
 
 
 def _data_address(one: Illustration) -> str:
@@ -203,3 +345,47 @@ def _to_script(data: dict | None) -> Markup:
     """Returns JSON that cannot end the script element around it."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))
+
+
+def _render(name: str, /, **values: object) -> str:
+    """Returns a template filled with values; HTML and SVG escape their text."""
+    return _environment().get_template(name).render(values)
+
+
+def _read_asset(name: str) -> Markup:
+    """Returns a style sheet or a script unchanged."""
+    folder = resources.files(__package__) / _TEMPLATES
+    return Markup((folder / name).read_text("utf-8"))
+
+
+@functools.cache
+def _environment() -> Environment:
+    found = Environment(
+        loader=PackageLoader(__package__, _TEMPLATES),
+        autoescape=select_autoescape(["html", "svg"]),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    found.filters |= {
+        "captioned": _captioned,
+        "data_address": _data_address,
+        "interval_text": interval_text,
+        "markdown": escape_markdown,
+        "method_title": title,
+        "percent": percent,
+        "quoted": quote,
+        "route_picture": route_picture,
+    }
+    found.globals |= {
+        "bar_length": round(_BAR_LENGTH),
+        "missing": MISSING,
+        "no_control": NO_CONTROL,
+        "route_colours": _route_colours(),
+    }
+    return found
+
+
+def _write(path: Path, text: str) -> None:
+    with completing(path) as part:
+        part.write_text(text, encoding="utf-8")

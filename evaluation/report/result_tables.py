@@ -1,30 +1,155 @@
-"""The results of a report, and the tables made of them."""
+"""The tables of a report: change, recognition, faults, poses, costs, queries.
+
+Those for print are called `..._table`; `..._numbers` have all digits for files.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
-from evaluation.recognition.metrics import MODES, Mode
-from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.recognition.protocol import (
-    PROTOCOL_COLUMNS,
-    protocol_values,
+from evaluation.recognition.costs import Cost
+from evaluation.recognition.fault_kinds import (
+    FAULT_KINDS,
+    PairEvidence,
+    fault_kinds,
 )
-from evaluation.report.method_titles import in_table_order, title
-from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.tables import Table, ranked
+from evaluation.recognition.metrics import (
+    MODES,
+    Mode,
+    PlaceRecognitionMetrics,
+)
+from evaluation.recognition.place_recognition import RADII, RecognitionResult
+from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.protocol import PROTOCOL_COLUMNS
+from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.report.reference import NO_REFERENCE, Published, Reference
+from evaluation.report.tables import (
+    Columns,
+    Table,
+    in_table_order,
+    keyed,
+    ranked,
+    title,
+)
+
+_CHANGE_CAPTION = (
+    "Temporal change ratio: TCR_sym is 0 where nothing changed and 1 where"
+    " everything did. Same stage: TCR_sym of the two routes in one stage of the"
+    " city, where nothing changed. Where both drove: only voxels within 40 m of"
+    " both routes."
+)
+_AUDIT_CAPTION = (
+    "All numbers with 95 % intervals (bootstrap over queries) and the counts"
+    " they are made of: R@1 = TP / N, F1max = 2 TP / (TP + T)."
+)
+_FAULT_CAPTION = (
+    "Why best places are wrong: of all queries with a wrong best place, how"
+    " many have none in the database (no place); got no candidate; were put"
+    " just too far away, within two radii; have a right place from which less"
+    " than half of their scan is seen, since something hides it (hidden) or"
+    " for another reason (no overlap); have a right place of whose standing"
+    " points a quarter or more has come or gone (changed, and the class of"
+    " most of it); were taken to a twin, which fits on them as well as the"
+    " right place does. Elsewhere is the method's own fault. Each counts"
+    " once, under the first of these."
+)
+_POSE_CAPTION = (
+    "Poses that come with the places. Errors of the accepted matches: best"
+    " places that are right, with a score from that of the greatest F1 on."
+    " Success: queries with a match whose pose is wrong by at most 2 m and"
+    " 5 deg, whatever the score. Recall at full precision: the greatest at"
+    " which no accepted place is wrong. Scan Context++ and SOLiD estimate"
+    " little more than the turn."
+)
+_COST_CAPTION = (
+    "What each method costs on one core of the machine that made this report:"
+    " time of the processor, medians over some scans. This table alone"
+    " differs from run to run (--no-costs leaves it out)."
+)
+# Name in Table II -> attribute of our metrics and of published numbers.
+_MEASURES = {"AUC": "auc", "R@1": "recall_at_1", "F1": "f1_max"}
+# Frame, time and pose of a sensor, as columns of files.
+_MOMENT = ("frame", "stamp_ns", "x", "y", "z", "qx", "qy", "qz", "qw")
+
+# Evidence for pairs of drives: (database, query) -> evidence.
+Evidence = Mapping[tuple[str, str], PairEvidence]
 
 
-def protocol_text(results: Sequence[RecognitionResult]) -> str:
-    """Returns the protocol in words; each method sets its scans per place."""
-    if not results:
-        return ""
-    return replace(results[0].outcome.protocol, scans_per_place=None).to_text()
+def protocol_columns(path: str) -> Columns[Any]:
+    """Returns columns for the options of an item's protocol.
+
+    Args:
+        path: attributes that lead from the item to its protocol.
+    """
+    return {name: attrgetter(f"{path}.{name}") for name in PROTOCOL_COLUMNS}
 
 
-def by_pair_and_method(
+def _inner(columns: Columns[RecognitionResult]) -> Columns[Any]:
+    """Returns the columns for items that hold a `result`."""
+    return keyed(columns, lambda item, value: value(item.result))
+
+
+# The first columns, for print and in files, and the last ones in files.
+_SHOWN: Columns[RecognitionResult] = {
+    "map": lambda r: r.map_name,
+    "DB → query": lambda r: " → ".join(r.stages),
+    "method": lambda r: title(r.method),
+}
+_KEYS: Columns[RecognitionResult] = {
+    "map": lambda r: r.map_name,
+    "db": lambda r: r.stages[0],
+    "query": lambda r: r.stages[1],
+    "method": lambda r: r.method,
+}
+_PROTOCOL = protocol_columns("outcome.protocol")
+
+
+def change_table(
+    results: Sequence[ChangeResult], reference: Reference = NO_REFERENCE
+) -> Table:
+    """Returns Table I: the change of each pair, and its parts.
+
+    Args:
+        results: for all pairs.
+        reference: its published values stand beside ours, and below.
+    """
+    table = Table.of(
+        results,
+        {
+            "map": lambda r: r.map_name,
+            "stages": lambda r: " ↔ ".join(r.stages),
+            "TCR_sym": lambda r: r.report.change.symmetric,
+            "paper": lambda r: reference.change(r.map_name, r.stages),
+            "earlier → later": lambda r: r.report.change.source_to_target.ratio,
+            "later → earlier": lambda r: r.report.change.target_to_source.ratio,
+            "same stage, both routes": lambda r: (
+                r.report.control.symmetric if r.report.control else None
+            ),
+            "where both drove": lambda r: (
+                r.report.masked.symmetric if r.report.masked else None
+            ),
+            "voxels in hulls": lambda r: r.report.change.num_in_hull,
+            "unchanged": lambda r: r.report.change.num_unchanged,
+        },
+        _CHANGE_CAPTION,
+    )
+    names = {result.map_name for result in results}
+    further = tuple(
+        (label, stages, None, value, *(None,) * 6)
+        for label, stages, value in reference.further_changes(names)
+    )
+    return replace(table, rows=table.rows + further)
+
+
+def _by_pair_and_method(
     results: Sequence[RecognitionResult],
 ) -> list[RecognitionResult]:
     """Returns results pair by pair, methods in the order of tables."""
@@ -36,56 +161,24 @@ def by_pair_and_method(
     )
 
 
-def change_table(
-    results: Sequence[ChangeResult], reference: Reference = NO_REFERENCE
-) -> Table:
-    """Returns Table I: the change of each pair, and its parts.
+class _Counted(NamedTuple):
+    """A result in a mode, with what is published of it."""
 
-    Args:
-        results: of all pairs.
-        reference: its published values stand beside ours, and below.
-    """
-    header = (
-        "map",
-        "stages",
-        "TCR_sym",
-        "paper",
-        "earlier → later",
-        "later → earlier",
-        "same stage, both routes",
-        "where both drove",
-        "voxels in hulls",
-        "unchanged",
-    )
-    rows: list[tuple] = []
-    for result in results:
-        report = result.report
-        change = report.change
-        rows.append(
-            (
-                result.map_name,
-                " ↔ ".join(result.stages),
-                change.symmetric,
-                reference.change(result.map_name, result.stages),
-                change.source_to_target.ratio,
-                change.target_to_source.ratio,
-                report.control.symmetric if report.control else None,
-                report.masked.symmetric if report.masked else None,
-                change.num_in_hull,
-                change.num_unchanged,
-            )
-        )
-    names = {result.map_name for result in results}
-    for label, stages, value in reference.further_changes(names):
-        rows.append((label, stages, None, value, *(None,) * 6))
-    return Table(
-        header,
-        tuple(rows),
-        caption="Temporal change ratio: TCR_sym is 0 where nothing changed and"
-        " 1 where everything did. Same stage: TCR_sym of the two routes in one"
-        " stage of the city, where nothing changed. Where both drove: only"
-        " voxels within 40 m of both routes.",
-    )
+    result: RecognitionResult
+    metrics: PlaceRecognitionMetrics
+    printed: Published | None
+
+    @classmethod
+    def of(
+        cls, result: RecognitionResult, mode: Mode, reference: Reference
+    ) -> _Counted:
+        printed = reference.values(result, mode)
+        return cls(result, result.metrics[mode], printed)
+
+    def at_f1_max(self, counts: np.ndarray) -> int | None:
+        """Returns the count at the greatest F1, of those along the curve."""
+        index = self.metrics.f1_max_index
+        return None if index is None else int(counts[index])
 
 
 def recognition_tables(
@@ -115,48 +208,50 @@ def recognition_table(
     """Returns Table II: a row for each pair, three columns for each method.
 
     Args:
-        results: of all pairs and methods.
+        results: for all pairs and methods.
         changes: for the TCR_sym of the pairs.
         mode: mode in which methods are counted; None for the mode that the
             reference used for each.
         reference: its values stand beside ours.
     """
     methods = in_table_order(result.method for result in results)
-    names = ("AUC", "R@1", "F1")
     tcr = symmetric_changes(changes)
-    by_pair: dict[tuple, dict[str, RecognitionResult]] = {}
-    for result in results:
-        by_pair.setdefault(result.pair, {})[result.method] = result
+    by_pair: dict[tuple, dict[str, _Counted]] = {}
+    for one in results:
+        counted = _Counted.of(
+            one, mode or reference.mode(one.method), reference
+        )
+        by_pair.setdefault(one.pair, {})[one.method] = counted
     rows = []
     for pair, of_method in by_pair.items():
-        map_name, *stages = pair
-        columns = []
-        for name in names:
-            values, printed = [], []
-            for method in methods:
-                ours, theirs = _numbers(
-                    of_method.get(method), mode, name, reference
-                )
-                values.append(ours)
-                printed.append(theirs)
-            columns.append(ranked(values, printed))
+        found = [of_method.get(method) for method in methods]
+        columns = [
+            ranked(
+                [one and getattr(one.metrics, name) for one in found],
+                [one and getattr(one.printed, name, None) for one in found],
+            )
+            for name in _MEASURES.values()
+        ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
-        rows.append((map_name, " → ".join(stages), tcr.get(pair), *cells))
+        rows.append((pair[0], " → ".join(pair[1:]), tcr.get(pair), *cells))
     captions = {
         None: f", {reference.counting[0]}",
         "all": ", all queries counted (mode all)",
         "filtered": ", only queries counted that have a match (mode filtered;"
         " F1 then says no more than R@1)",
     }
-    beside = ""
+    protocol = beside = ""
+    if results:
+        # Each method sets its scans per place.
+        shared = replace(results[0].outcome.protocol, scans_per_place=None)
+        protocol = shared.to_text()
     if any(map(reference.covers, results)):
         beside = f" In brackets or small: the value of {reference.title}."
     return Table(
-        ("map", "DB → query", "TCR_sym", *names * len(methods)),
+        ("map", "DB → query", "TCR_sym", *tuple(_MEASURES) * len(methods)),
         tuple(rows),
         groups=(("", 3), *((title(method), 3) for method in methods)),
-        caption=f"Place recognition{captions[mode]}."
-        f" {protocol_text(results)}{beside}"
+        caption=f"Place recognition{captions[mode]}. {protocol}{beside}"
         " Bold: best of a row; underlined: second.",
     )
 
@@ -165,93 +260,353 @@ def audit_table(
     results: Sequence[RecognitionResult], reference: Reference = NO_REFERENCE
 ) -> Table:
     """Returns all numbers with the counts behind them, a row each."""
-    header = (
-        "map",
-        "DB → query",
-        "method",
-        "mode",
-        "AUC",
-        "AUC low",
-        "AUC high",
-        "paper's AUC",
-        "R@1",
-        "R@1 low",
-        "R@1 high",
-        "paper's R@1",
-        "R@5",
-        "R@25",
-        "R@1%",
-        "F1max",
-        "paper's F1",
-        "queries",
-        "N (with a match)",
-        "TP of R@1",
-        "TP of F1max",
-        "T of F1max",
-        *PROTOCOL_COLUMNS,
+    return Table.of(
+        [_Counted.of(r, mode, reference) for r in results for mode in MODES],
+        {
+            "map": lambda c: c.result.map_name,
+            "DB → query": lambda c: " → ".join(c.result.stages),
+            "method": lambda c: c.result.method,
+            "mode": lambda c: c.metrics.mode,
+            "AUC": lambda c: c.metrics.auc,
+            "AUC low": lambda c: c.metrics.auc_interval.low,
+            "AUC high": lambda c: c.metrics.auc_interval.high,
+            "paper's AUC": lambda c: c.printed and c.printed.auc,
+            "R@1": lambda c: c.metrics.recall_at_1,
+            "R@1 low": lambda c: c.metrics.recall_at_1_interval.low,
+            "R@1 high": lambda c: c.metrics.recall_at_1_interval.high,
+            "paper's R@1": lambda c: c.printed and c.printed.recall_at_1,
+            "R@5": lambda c: float(c.metrics.recall_at_n[4]),
+            "R@25": lambda c: float(c.metrics.recall_at_n[24]),
+            "R@1%": lambda c: float(c.metrics.recall_at_1_percent),
+            "F1max": lambda c: c.metrics.f1_max,
+            "paper's F1": lambda c: c.printed and c.printed.f1_max,
+            "queries": lambda c: c.metrics.num_queries,
+            "N (with a match)": lambda c: c.metrics.num_with_match,
+            "TP of R@1": lambda c: c.metrics.num_right,
+            "TP of F1max": lambda c: c.at_f1_max(
+                c.metrics.curve.true_positives
+            ),
+            "T of F1max": lambda c: c.at_f1_max(c.metrics.curve.counted),
+            **protocol_columns("result.outcome.protocol"),
+        },
+        _AUDIT_CAPTION,
     )
-    rows = []
-    for result in results:
-        for mode in MODES:
-            metrics = result.metrics[mode]
-            printed = reference.values(result, mode)
-            index = metrics.f1_max_index
-            curve = metrics.curve
-            rows.append(
-                (
-                    result.map_name,
-                    " → ".join(result.stages),
-                    result.method,
-                    mode,
-                    metrics.auc,
-                    metrics.auc_interval.low,
-                    metrics.auc_interval.high,
-                    printed.auc if printed else None,
-                    metrics.recall_at_1,
-                    metrics.recall_at_1_interval.low,
-                    metrics.recall_at_1_interval.high,
-                    printed.recall_at_1 if printed else None,
-                    float(metrics.recall_at_n[4]),
-                    float(metrics.recall_at_n[24]),
-                    float(metrics.recall_at_1_percent),
-                    metrics.f1_max,
-                    printed.f1_max if printed else None,
-                    metrics.num_queries,
-                    metrics.num_with_match,
-                    metrics.num_right,
-                    None if index is None else int(curve.true_positives[index]),
-                    None if index is None else int(curve.counted[index]),
-                    *protocol_values(result.outcome.protocol),
+
+
+def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
+    """Returns the metrics of other publications, as `metrics.csv` has them."""
+    return Table.of(
+        [
+            _Metrics(one, one.outcome.outcomes, one.outcome.auc_over_radius())
+            for one in _by_pair_and_method(results)
+        ],
+        {
+            **_inner(_KEYS),
+            "recall_at_1": lambda m: m.outcomes.recall_at(1),
+            "recall_at_1_percent": lambda m: m.outcomes.recall_at(
+                m.outcomes.one_percent_rank
+            ),
+            "mean_reciprocal_rank": lambda m: m.outcomes.mean_reciprocal_rank,
+            "recall_at_full_precision": lambda m: _full_precision(m.result),
+            "match_auroc": lambda m: m.outcomes.match_auroc,
+            "pose_success": lambda m: m.result.outcome.pose.success,
+            **keyed(
+                {f"auc_within_{radius:g}_m": radius for radius in RADII},
+                lambda m, radius: m.areas[radius],
+            ),
+            **protocol_columns("result.outcome.protocol"),
+        },
+    )
+
+
+class _Metrics(NamedTuple):
+    """A result, its outcomes, and radius of a match [m] -> AUC."""
+
+    result: RecognitionResult
+    outcomes: QueryOutcomes
+    areas: Mapping[float, float]
+
+
+def pose_table(results: Sequence[RecognitionResult]) -> Table:
+    """Returns the errors of estimated poses for print."""
+    return Table.of(
+        _by_pair_and_method(results),
+        {
+            **_SHOWN,
+            ("translation [m]", "median"): lambda r: (
+                r.outcome.pose.translation_median
+            ),
+            ("translation [m]", "90 %"): lambda r: (
+                r.outcome.pose.translation_90
+            ),
+            ("rotation [deg]", "median"): lambda r: (
+                r.outcome.pose.rotation_median_deg
+            ),
+            ("rotation [deg]", "90 %"): lambda r: (
+                r.outcome.pose.rotation_90_deg
+            ),
+            "success": lambda r: r.outcome.pose.success,
+            "recall at full precision": _full_precision,
+        },
+        _POSE_CAPTION,
+    )
+
+
+def pose_numbers(results: Sequence[RecognitionResult]) -> Table:
+    """Returns the same numbers, as `poses.csv` has them."""
+    return Table.of(
+        results,
+        {
+            **_KEYS,
+            "accepted_matches": lambda r: r.outcome.pose.num_accepted,
+            "translation_median": lambda r: r.outcome.pose.translation_median,
+            "translation_90": lambda r: r.outcome.pose.translation_90,
+            "rotation_median_deg": lambda r: r.outcome.pose.rotation_median_deg,
+            "rotation_90_deg": lambda r: r.outcome.pose.rotation_90_deg,
+            "success": lambda r: r.outcome.pose.success,
+            "recall_at_100_precision": _full_precision,
+            **_PROTOCOL,
+        },
+    )
+
+
+def _full_precision(result: RecognitionResult) -> float:
+    return result.metrics["all"].curve.recall_at_full_precision
+
+
+class _Faults(NamedTuple):
+    """The wrong best places of a result: their kinds, and what changed."""
+
+    result: RecognitionResult
+    kinds: Counter[str]
+    changed: Counter[str]
+
+
+def fault_table(
+    results: Sequence[RecognitionResult], evidence: Evidence
+) -> Table:
+    """Returns the reasons for wrong best places for print.
+
+    Args:
+        results: for all pairs and methods.
+        evidence: a pair without it has no row.
+    """
+
+    def share(one: _Faults, kind: str) -> str | None:
+        part = one.kinds[kind] / max(one.kinds.total(), 1)
+        return f"{100.0 * part:.0f} %" if part else None
+
+    return Table.of(
+        _count_faults(results, evidence),
+        {
+            **_inner(_SHOWN),
+            "wrong": lambda one: one.kinds.total(),
+            **keyed({k.replace("_", " "): k for k in FAULT_KINDS}, share),
+            "changed by": lambda one: (
+                ", ".join(
+                    f"{n} {name}" for name, n in one.changed.most_common()
                 )
-            )
-    return Table(
-        header,
-        tuple(rows),
-        caption="All numbers with 95 % intervals (bootstrap over queries) and"
-        " the counts they are made of: R@1 = TP / N, F1max = 2 TP / (TP + T).",
+                or None
+            ),
+        },
+        _FAULT_CAPTION,
     )
 
 
-def _numbers(
-    result: RecognitionResult | None,
-    mode: Mode | None,
-    name: str,
-    reference: Reference,
-) -> tuple[float | None, float | None]:
-    """Returns our value and the reference's."""
-    if result is None:
-        return None, None
-    mode = reference.mode(result.method) if mode is None else mode
-    metrics, printed = result.metrics[mode], reference.values(result, mode)
-    ours = {
-        "AUC": metrics.auc,
-        "R@1": metrics.recall_at_1,
-        "F1": metrics.f1_max,
-    }[name]
-    if printed is None:
-        return ours, None
-    return ours, {
-        "AUC": printed.auc,
-        "R@1": printed.recall_at_1,
-        "F1": printed.f1_max,
-    }[name]
+def fault_numbers(
+    results: Sequence[RecognitionResult], evidence: Evidence
+) -> Table:
+    """Returns all counts, as `why.csv` has them."""
+    return Table.of(
+        _count_faults(results, evidence),
+        {
+            **_inner(_KEYS),
+            "queries": lambda one: len(one.result.outcome.outcomes),
+            "wrong": lambda one: one.kinds.total(),
+            **keyed(
+                {kind: kind for kind in FAULT_KINDS},
+                lambda one, kind: one.kinds[kind],
+            ),
+            "changed_by": lambda one: (
+                " ".join(f"{name}:{n}" for name, n in one.changed.most_common())
+                or None
+            ),
+            **protocol_columns("result.outcome.protocol"),
+        },
+    )
+
+
+def _count_faults(
+    results: Sequence[RecognitionResult], evidence: Evidence
+) -> Iterator[_Faults]:
+    for result in _by_pair_and_method(results):
+        known = evidence.get((result.outcome.database, result.outcome.query))
+        if known is None:
+            continue
+        kinds = fault_kinds(result, known)
+        yield _Faults(
+            result,
+            Counter(filter(None, kinds)),
+            Counter(
+                name
+                for kind, name in zip(kinds, known.changed_classes, strict=True)
+                if kind == "changed"
+            ),
+        )
+
+
+def cost_table(costs: Sequence[Cost]) -> Table:
+    """Returns the costs for print, a row for each method."""
+    by_method = {cost.method: cost for cost in costs}
+    return Table.of(
+        map(by_method.__getitem__, in_table_order(by_method)),
+        {
+            "method": lambda c: title(c.method),
+            "scans a place": lambda c: c.scans_per_place,
+            "points": lambda c: f"{c.points:.0f}",
+            "describe [ms]": lambda c: f"{c.describe_ms:.1f}",
+            "query [ms]": lambda c: f"{c.query_ms:.1f}",
+            "of places": lambda c: c.places,
+            "bytes a place": lambda c: f"{c.place_bytes:.0f}",
+        },
+        _COST_CAPTION,
+    )
+
+
+def cost_numbers(costs: Sequence[Cost]) -> Table:
+    """Returns all numbers, as `costs.csv` has them."""
+    return Table.of(costs, {f.name: attrgetter(f.name) for f in fields(Cost)})
+
+
+@dataclass(frozen=True)
+class DriveTrack:
+    """Times and poses of the sensor.
+
+    Attributes:
+        stamps_ns: (N,) int64 of all frames.
+        X_WS: (N, 4, 4) poses there.
+    """
+
+    stamps_ns: np.ndarray
+    X_WS: np.ndarray
+
+    def moments(self, frames: np.ndarray) -> list[np.ndarray]:
+        """Returns frame, stamp, position and quaternion of the sensor.
+
+        Args:
+            frames: (Q,) indices of frames; those below 0 are missing.
+
+        Returns:
+            9 arrays (Q,) of objects, one for each name in `_MOMENT`; None
+            where a frame is missing.
+        """
+        X_WS = self.X_WS[frames]
+        quats_xyzw = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat()
+        poses = np.concatenate([X_WS[:, :3, 3], quats_xyzw], axis=1)
+        columns = [
+            column.astype(object)
+            for column in (frames, self.stamps_ns[frames], *poses.T)
+        ]
+        for column in columns:
+            column[frames < 0] = None
+        return columns
+
+
+class _Queries(NamedTuple):
+    """The queries of a result.
+
+    Attributes:
+        pair: map, database and query.
+        result: the result.
+        query, match: moments of the queries, and of their best places.
+        distances: to the best places [m]; NaN without one.
+        evidence: for the pair; None if there is none.
+    """
+
+    pair: tuple[str, str, str]
+    result: RecognitionResult
+    query: list[np.ndarray]
+    match: list[np.ndarray]
+    distances: np.ndarray
+    evidence: PairEvidence | None
+
+    @property
+    def outcomes(self) -> QueryOutcomes:
+        return self.result.outcome.outcomes
+
+    @property
+    def errors(self) -> PoseErrors:
+        return self.result.outcome.retrieval.pose_errors
+
+
+def _moment_columns(side: str) -> Columns[_Queries]:
+    return keyed(
+        {f"{side}_{name}": k for k, name in enumerate(_MOMENT)},
+        lambda q, k: getattr(q, side)[k],
+    )
+
+
+_QUERY_COLUMNS: Columns[_Queries] = {
+    "map": lambda q: q.pair[0],
+    "db": lambda q: q.pair[1],
+    "query": lambda q: q.pair[2],
+    "method": lambda q: q.result.method,
+    "correct": lambda q: q.outcomes.is_right,
+    "has_match": lambda q: q.outcomes.has_match,
+    "score": lambda q: q.outcomes.best_scores,
+    "first_right_rank": lambda q: finite_ranks(q.outcomes),
+    "places": lambda q: q.outcomes.num_places,
+    "query_drive": lambda q: q.result.outcome.query,
+    **_moment_columns("query"),
+    "match_drive": lambda q: q.result.outcome.database,
+    **_moment_columns("match"),
+    "distance": lambda q: q.distances,
+    "translation_error": lambda q: q.errors.translation,
+    "rotation_error_deg": lambda q: q.errors.rotation_deg,
+    **protocol_columns("result.outcome.protocol"),
+    "why": lambda q: q.evidence and fault_kinds(q.result, q.evidence),
+    "overlap": lambda q: q.evidence and q.evidence.overlaps,
+    "hidden": lambda q: q.evidence and q.evidence.hidden,
+    "changed": lambda q: q.evidence and q.evidence.changed,
+    "changed_class": lambda q: q.evidence and q.evidence.changed_classes,
+    "right_fit": lambda q: q.evidence and q.evidence.right_fits,
+    "wrong_fit": lambda q: q.evidence and q.evidence.fits[q.result.method],
+}
+
+
+def query_table(
+    results: Iterable[tuple[tuple[str, str, str], RecognitionResult]],
+    tracks: Mapping[str, DriveTrack],
+    evidence: Evidence,
+) -> Table:
+    """Returns a row for each pair, method and query, in the queries' order.
+
+    Args:
+        results: each with its map, database and query.
+        tracks: drive -> its track, for all drives.
+        evidence: why best places are wrong; its columns are empty for pairs
+            without it.
+    """
+
+    def queries() -> Iterator[_Queries]:
+        for pair, result in results:
+            outcome, found = result.outcome, result.outcome.retrieval
+            best = found.best_places
+            frames = np.where(best < 0, -1, found.database_frames[best])
+            distances = found.distances[np.arange(len(best)), best]
+            yield _Queries(
+                pair,
+                result,
+                tracks[outcome.query].moments(found.query_frames),
+                tracks[outcome.database].moments(frames),
+                np.where(best < 0, np.nan, distances),
+                evidence.get((outcome.database, outcome.query)),
+            )
+
+    return Table.of(queries(), _QUERY_COLUMNS)
+
+
+def finite_ranks(outcomes: QueryOutcomes) -> list[int | None]:
+    """Returns the rank of each query's best true match, None without one."""
+    ranks = outcomes.first_right_ranks
+    return [int(rank) if np.isfinite(rank) else None for rank in ranks]

@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import csv
 from dataclasses import dataclass, replace
 import html
 import io
+from itertools import groupby
 import math
 import re
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+_Item = TypeVar("_Item")
+_Key = TypeVar("_Key")
+
+# What a table shows of each item: the name of a column, or the name of its
+# group and its own -> the function that returns the value. An item may have
+# several rows; values are then arrays or lists with one for each of them.
+Columns = Mapping[str | tuple[str, str], Callable[[_Item], object]]
 
 MISSING = "–"
+# The spelling of the methods' authors, in the order of tables; our methods come
+# last.
+_METHOD_TITLES = {
+    "scan-context++": "Scan Context++",
+    "solid": "SOLiD",
+    "ring++": "RING++",
+    "btc": "BTC",
+    "layered-overlap": "Layered overlap",
+}
 
 _LATEX = {
     "\\": r"\textbackslash{}",
@@ -43,7 +64,8 @@ class Cell:
     Attributes:
         value: our number; None or NaN if there is none.
         printed: the paper's number; None if there is none.
-        rank: 1 for the best of its row, 2 for the second, None for others.
+        rank: 1 for the best number in its row, 2 for the second, None for
+            others.
     """
 
     value: float | None
@@ -70,11 +92,33 @@ class Table:
     groups: tuple[tuple[str, int], ...] = ()
     caption: str = ""
 
+    @classmethod
+    def of(
+        cls,
+        items: Iterable[_Item],
+        columns: Columns[_Item],
+        caption: str = "",
+    ) -> Table:
+        """Returns a table with a row, or several, for each item."""
+        names = [n if isinstance(n, tuple) else ("", n) for n in columns]
+        groups = groupby(group for group, _ in names)
+        spans = tuple((group, len(list(same))) for group, same in groups)
+        return cls(
+            tuple(name for _, name in names),
+            tuple(
+                row
+                for item in items
+                for row in _rows([value(item) for value in columns.values()])
+            ),
+            spans if any(group for group, _ in spans) else (),
+            caption,
+        )
+
     def without_empty(self, name: str) -> Table:
         """Returns the table without a column that has no value in any row.
 
         Args:
-            name: of the column; the table has no groups.
+            name: the column's, in a table without groups.
         """
         column = self.header.index(name)
         if not all(_is_missing(row[column]) for row in self.rows):
@@ -86,27 +130,28 @@ class Table:
         )
 
     def to_csv(self) -> str:
-        """Returns the table with all digits; a missing value is empty.
+        """Returns the table with all digits.
 
-        A cell becomes two columns; the second holds the paper's number.
+        A missing value is empty, and a truth value is 0 or 1. A cell becomes
+        two columns; the second holds the paper's number.
         """
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
         columns = list(zip(*self.rows, strict=True)) or [()] * len(self.header)
         expanded = []
-        for name, group, column in zip(
-            self.header, self._group_of_each(), columns, strict=True
-        ):
-            full = f"{group} {name}".strip()
+        for name, column in zip(self._full_names(), columns, strict=True):
             if any(isinstance(value, Cell) for value in column):
-                expanded.append([full, *(value.value for value in column)])
+                expanded.append([name, *(value.value for value in column)])
                 expanded.append(
-                    [f"paper's {full}", *(value.printed for value in column)]
+                    [f"paper's {name}", *(value.printed for value in column)]
                 )
             else:
-                expanded.append([full, *column])
+                expanded.append([name, *column])
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
         for row in zip(*expanded, strict=True):
-            writer.writerow(["" if _is_missing(v) else v for v in row])
+            writer.writerow(
+                int(v) if isinstance(v, bool) else "" if _is_missing(v) else v
+                for v in row
+            )
         return stream.getvalue()
 
     def to_markdown(self) -> str:
@@ -114,35 +159,32 @@ class Table:
 
         The paper's values follow in brackets.
         """
-        header = [
-            escape_markdown(f"{group} {name}".strip())
-            for group, name in zip(
-                self._group_of_each(), self.header, strict=True
-            )
+        lines = [
+            [escape_markdown(name) for name in self._full_names()],
+            ["---"] * len(self.header),
+            *([_MARKDOWN_FORM.cell(value) for value in r] for r in self.rows),
         ]
-        lines = [header, ["---"] * len(self.header)]
-        lines += [[_to_markdown(value) for value in row] for row in self.rows]
         return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
     def to_html(self) -> str:
         """Returns a `table` element."""
-        parts = ["<table>"]
-        if self.caption:
-            parts.append(f"<caption>{html.escape(self.caption)}</caption>")
-        parts.append("<thead>")
-        if self.groups:
-            cells = "".join(
+        caption = html.escape(self.caption)
+        lines = [
+            "".join(
                 f'<th colspan="{span}" class="group">{html.escape(name)}</th>'
                 for name, span in self.groups
-            )
-            parts.append(f"<tr>{cells}</tr>")
-        names = "".join(f"<th>{html.escape(name)}</th>" for name in self.header)
-        parts.append(f"<tr>{names}</tr></thead><tbody>")
-        for row in self.rows:
-            cells = "".join(f"<td>{_to_html(value)}</td>" for value in row)
-            parts.append(f"<tr>{cells}</tr>")
-        parts.append("</tbody></table>")
-        return "".join(parts)
+            ),
+            "".join(f"<th>{html.escape(name)}</th>" for name in self.header),
+        ]
+        head = "".join(f"<tr>{line}</tr>" for line in lines if line)
+        body = "".join(
+            f"<tr>{''.join(f'<td>{_HTML_FORM.cell(v)}</td>' for v in row)}</tr>"
+            for row in self.rows
+        )
+        return (
+            f"<table>{caption and f'<caption>{caption}</caption>'}"
+            f"<thead>{head}</thead><tbody>{body}</tbody></table>"
+        )
 
     def to_latex(self) -> str:
         r"""Returns a `table*` for a document with the package booktabs."""
@@ -152,7 +194,7 @@ class Table:
             r"\centering",
         ]
         if self.caption:
-            lines.append(rf"\caption{{{_escape(self.caption)}}}")
+            lines.append(rf"\caption{{{_escape_latex(self.caption)}}}")
         lines += [
             r"\resizebox{\textwidth}{!}{%",
             rf"\begin{{tabular}}{{@{{}}{'c' * len(self.header)}@{{}}}}",
@@ -160,26 +202,56 @@ class Table:
         ]
         if self.groups:
             lines += self._latex_groups()
-        lines.append(_latex_row(_escape(name) for name in self.header))
+        lines.append(_latex_row(map(_escape_latex, self.header)))
         lines.append(r"\midrule")
-        lines += [_latex_row(map(_to_latex, row)) for row in self.rows]
+        lines += [_latex_row(map(_LATEX_FORM.cell, row)) for row in self.rows]
         lines += [r"\bottomrule", r"\end{tabular}}", r"\end{table*}"]
         return "\n".join(lines) + "\n"
 
     def _latex_groups(self) -> list[str]:
-        names, rules, column = [], [], 1
+        names, rules, column = [], "", 1
         for name, span in self.groups:
-            names.append(rf"\multicolumn{{{span}}}{{c}}{{{_escape(name)}}}")
+            text = _escape_latex(name)
+            names.append(rf"\multicolumn{{{span}}}{{c}}{{{text}}}")
             if name:
-                rules.append(rf"\cmidrule(lr){{{column}-{column + span - 1}}}")
+                rules += rf"\cmidrule(lr){{{column}-{column + span - 1}}}"
             column += span
-        return [_latex_row(names), "".join(rules)]
+        return [_latex_row(names), rules]
 
-    def _group_of_each(self) -> list[str]:
-        """Returns the name over each column."""
-        if not self.groups:
-            return [""] * len(self.header)
-        return [name for name, span in self.groups for _ in range(span)]
+    def _full_names(self) -> list[str]:
+        """Returns the name of each column behind that of its group."""
+        groups = [name for name, span in self.groups for _ in range(span)]
+        return [
+            f"{group} {name}".strip()
+            for group, name in zip(
+                groups or [""] * len(self.header), self.header, strict=True
+            )
+        ]
+
+
+def keyed(
+    keys: Mapping[str | tuple[str, str], _Key],
+    value: Callable[[_Item, _Key], object],
+) -> Columns[_Item]:
+    """Returns a column for each key.
+
+    Args:
+        keys: name of a column -> its key.
+        value: returns what a column shows, from an item and the key.
+    """
+
+    def column(key: _Key) -> Callable[[_Item], object]:
+        return lambda item: value(item, key)
+
+    return {name: column(key) for name, key in keys.items()}
+
+
+def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:
+    """Returns rows of values, of which single ones stand in each row."""
+    lists = [v.tolist() if isinstance(v, np.ndarray) else v for v in values]
+    number = max((len(v) for v in lists if isinstance(v, list)), default=1)
+    columns = [v if isinstance(v, list) else [v] * number for v in lists]
+    return list(zip(*columns, strict=True))
 
 
 def ranked(
@@ -203,6 +275,20 @@ def ranked(
     ]
 
 
+def title(method: str) -> str:
+    """Returns a method's name as its authors write it."""
+    return _METHOD_TITLES.get(method, method)
+
+
+def in_table_order(methods: Iterable[str]) -> list[str]:
+    """Returns methods in the order of tables, others after them by name."""
+    known = list(_METHOD_TITLES)
+    return sorted(
+        set(methods),
+        key=lambda m: (known.index(m) if m in known else len(known), m),
+    )
+
+
 def to_text(value: object) -> str:
     """Returns a value as tables show it."""
     if _is_missing(value):
@@ -217,48 +303,47 @@ def escape_markdown(text: str) -> str:
     return re.sub(r"(?<=\w)\\_(?=\w)", "_", named.translate(_MARKDOWN))
 
 
-def _to_markdown(value: object) -> str:
-    if not isinstance(value, Cell):
-        return escape_markdown(to_text(value))
-    text = to_text(value.value)
-    if value.rank == 1:
-        text = f"**{text}**"
-    elif value.rank == 2:
-        text = f"<u>{text}</u>"
-    return text if value.printed is None else f"{text} ({value.printed:.4f})"
+def _escape_latex(text: str) -> str:
+    return "".join(_LATEX.get(letter, letter) for letter in text)
 
 
-def _to_html(value: object) -> str:
-    if not isinstance(value, Cell):
-        return html.escape(to_text(value))
-    text = to_text(value.value)
-    tag = {1: "b", 2: "u"}.get(value.rank or 0)
-    if tag:
-        text = f"<{tag}>{text}</{tag}>"
-    if value.printed is None:
-        return text
-    return f"{text}<small>{value.printed:.4f}</small>"
+class _Form(NamedTuple):
+    """How a markup language writes the values of a table.
+
+    Attributes:
+        escape: returns text that is shown unchanged.
+        marks: formats of the best and the second value in a row.
+        printed: format of our value with the paper's.
+    """
+
+    escape: Callable[[str], str]
+    marks: tuple[str, str]
+    printed: str
+
+    def cell(self, value: object) -> str:
+        if not isinstance(value, Cell):
+            return self.escape(to_text(value))
+        text = self.escape(to_text(value.value))
+        if value.rank is not None:
+            text = self.marks[value.rank - 1].format(text)
+        if value.printed is None:
+            return text
+        return self.printed.format(text, value.printed)
 
 
-def _to_latex(value: object) -> str:
-    if not isinstance(value, Cell):
-        return _escape(to_text(value))
-    text = _escape(to_text(value.value))
-    if value.rank == 1:
-        text = rf"\textbf{{{text}}}"
-    elif value.rank == 2:
-        text = rf"\underline{{{text}}}"
-    if value.printed is None:
-        return text
-    return rf"\shortstack{{{text}\\{{\scriptsize {value.printed:.4f}}}}}"
+_MARKDOWN_FORM = _Form(escape_markdown, ("**{}**", "<u>{}</u>"), "{} ({:.4f})")
+_HTML_FORM = _Form(
+    html.escape, ("<b>{}</b>", "<u>{}</u>"), "{}<small>{:.4f}</small>"
+)
+_LATEX_FORM = _Form(
+    _escape_latex,
+    (r"\textbf{{{}}}", r"\underline{{{}}}"),
+    r"\shortstack{{{}\\{{\scriptsize {:.4f}}}}}",
+)
 
 
 def _latex_row(cells: Iterable[str]) -> str:
     return " & ".join(cells) + r" \\"
-
-
-def _escape(text: str) -> str:
-    return "".join(_LATEX.get(letter, letter) for letter in text)
 
 
 def _is_missing(value: object) -> bool:

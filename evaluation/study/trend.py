@@ -22,7 +22,7 @@ from evaluation.recognition.protocol import (
     protocol_values,
 )
 from evaluation.report.drawing import method_entry, method_style, save
-from evaluation.report.method_titles import in_table_order
+from evaluation.report.tables import in_table_order
 from evaluation.study.trend_points import TrendPoint
 
 # Width of the kernel that smooths over TCR_sym, as part of its range. The band

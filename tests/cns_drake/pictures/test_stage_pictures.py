@@ -7,9 +7,9 @@ from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.pictures import rendering
-from cns_drake.pictures.rendering import look_at, render
+from cns_drake.pictures import stage_scene
 from cns_drake.pictures.stage_pictures import draw_stages, load_views
+from cns_drake.pictures.stage_scene import look_at, render
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.perception_geometry import PerceptionGeometry
@@ -65,7 +65,7 @@ def test_pictures_do_not_depend_on_the_blocks_of_their_rows(monkeypatch):
     scene = RayCastingScene(geometries, frames, lambda f: RigidTransform())
     pictures = []
     for rows in (7, 30, 100):
-        monkeypatch.setattr(rendering, "_ROWS", rows)
+        monkeypatch.setattr(stage_scene, "_ROWS", rows)
         pictures.append(
             render(scene, geometries, RigidTransform(), width=40, height=30)
         )

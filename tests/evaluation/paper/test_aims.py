@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from evaluation.paper import printed_values
-from evaluation.paper.aims import MET, MISSED, aims
+from evaluation.paper.paper_reference import MET, MISSED, aims
 from evaluation.recognition.protocol import RetrievalProtocol
 
 

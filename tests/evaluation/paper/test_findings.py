@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from evaluation.paper.findings import findings, paper_trend, trend
+from evaluation.paper.paper_reference import findings, paper_trend, trend
 from evaluation.recognition.protocol import RetrievalProtocol
 
 MODES = ("all", "filtered")

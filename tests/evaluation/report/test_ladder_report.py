@@ -11,14 +11,15 @@ from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.rung_outcome import RungOutcome
-from evaluation.report.ladder_figure import draw_ladder
-from evaluation.report.ladder_rows import (
+from evaluation.report.ladder import (
     LadderRung,
     MeasuredRung,
+    draw_ladder,
+    ladder_query_table,
     ladder_rows,
+    ladder_table,
+    ladder_text,
 )
-from evaluation.report.ladder_tables import ladder_query_table, ladder_table
-from evaluation.report.ladder_text import ladder_text
 
 
 def answered(method, gated, is_right, scores=None):

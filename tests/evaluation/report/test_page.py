@@ -6,10 +6,8 @@ from helpers.small_page import make_content
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
-from evaluation.report.page import write_page
+from evaluation.report.page import route_picture, write_page
 from evaluation.report.page_data import browser_data
-from evaluation.report.page_routes import route_picture
-from evaluation.report.result_tables import audit_table
 
 PAIR = ("metropolis", "01", "04")
 PAGES = {"metropolis_04": "../pages/metropolis_04.html?a=1&b"}
@@ -171,8 +169,6 @@ def test_route_from_red_to_blue(content):
 def test_page_without_recognition_has_no_browser(content, tmp_path):
     empty = make_content(
         tmp_path,
-        recognition=[],
-        audit=audit_table([]),
         recognitions=[],
         survivals=[],
         illustrations=[],

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.report.point_rendering import (
+from evaluation.report.figures import (
     View,
     colour_by_height,
     render,

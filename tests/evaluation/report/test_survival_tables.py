@@ -7,10 +7,10 @@ import pytest
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.resampling import Interval
 from evaluation.recognition.survival import Kept
-from evaluation.report import survival_figure
+from evaluation.report import survival
 from evaluation.report.page import write_page
-from evaluation.report.survival_figure import draw_survival
-from evaluation.report.survival_tables import (
+from evaluation.report.survival import (
+    draw_survival,
     survival_numbers,
     survival_summary,
     survival_table,
@@ -102,7 +102,7 @@ def test_section_of_the_page(tmp_path):
 def test_figure_shows_the_pairs_that_have_a_control(monkeypatch, tmp_path):
     drawn = []
     monkeypatch.setattr(
-        survival_figure, "save", lambda figure, stem: drawn.append(figure)
+        survival, "save", lambda figure, stem: drawn.append(figure)
     )
     draw_survival([*SOME, NO_CONTROL], tmp_path / "survival")
     (axes,) = drawn[0].axes

@@ -20,7 +20,7 @@ from evaluation.recognition.place_recognition import (
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.report.fault_tables import fault_numbers, fault_table
+from evaluation.report.result_tables import fault_numbers, fault_table
 from evaluation.study.fault_evidence import find_evidence
 
 HEIGHT = 1.6

@@ -1,0 +1,546 @@
+"""The results of a ladder: their numbers, tables, words and figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+import math
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+import numpy as np
+
+from cns_drake.base.jobs.fingerprint import fingerprint
+from evaluation.recognition.pr_curve import pr_curve
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.resampling import (
+    Interval,
+    percentile_interval,
+    resampled_metrics,
+    resampled_weights,
+)
+from evaluation.recognition.rung_outcome import FAULTS, RungOutcome
+from evaluation.recognition.survival import Kept
+from evaluation.report.drawing import plain, save
+from evaluation.report.result_tables import finite_ranks
+from evaluation.report.tables import (
+    Columns,
+    Table,
+    in_table_order,
+    keyed,
+    title,
+)
+
+# The options of the protocol that all rungs share.
+_OPTIONS = ("query_spacing", "place_spacing", "max_range")
+# A kept share of AUC from this one on counts as a small loss.
+_MUCH = 0.95
+# Least difference of the kept shares with and without the gate that is named.
+_DIFFERENT = 0.1
+# Rungs with more than one cause.
+_NONE, _ALL = "none", "all"
+# Told apart by all kinds of colour vision.
+_COLOURS = colormaps["RdYlBu"]
+# Letters on these shares are black.
+_LIGHT = (0.15, 0.85)
+_SHARES = Normalize(0.0, 1.0)
+_CELL_WIDTH, _CELL_HEIGHT = 0.95, 0.3
+_EDGES = (2.4, 1.6)
+_FONT_SIZE = 8.5
+_TITLES = {False: "without the gate", True: "with the gate"}
+
+
+@dataclass(frozen=True)
+class LadderRung:
+    """The change between two drives.
+
+    Attributes:
+        map_name: of the city.
+        database: name of the drive along the database's route.
+        query: name of the query drive.
+        cause: of the change; `none` without one.
+        level: its strength, from 1 to 4; 0 without a change.
+        strength: in words.
+        radius: of a match [m].
+    """
+
+    map_name: str
+    database: str
+    query: str
+    cause: str
+    level: int
+    strength: str
+    radius: float
+
+
+@dataclass(frozen=True)
+class MeasuredRung:
+    """The outcomes of all methods on a rung, with one random draw.
+
+    Attributes:
+        rung: which.
+        seed: of the draw.
+        drives: fingerprint of the drives.
+        outcomes: one for each method, without and with the gate.
+    """
+
+    rung: LadderRung
+    seed: int
+    drives: str
+    outcomes: Sequence[RungOutcome]
+
+
+@dataclass(frozen=True)
+class LadderRow:
+    """A method on a rung: means over the draws.
+
+    Attributes:
+        rung: which.
+        method: its name.
+        is_gated: whether it was gated by the radius.
+        auc_interval: 95 % interval of AUC by bootstrap over queries; a sample
+            has the same queries in each draw.
+        r1: R@1.
+        kept: share of the AUC on the rung `none` of the same map.
+        queries: number of queries in each draw.
+        with_match: number of those with a match.
+        places: number of places of the database.
+        draws: number of random draws.
+        drives: fingerprints of the drives of all draws.
+        lost: mean number of queries that are right on the rung `none` and wrong
+            here.
+        found: mean number of queries that are wrong there and right here.
+        hidden: see `RungOutcome.num_hidden`; mean.
+        overlap: mean over queries, see `RungOutcome.overlaps`.
+        faults: fault -> mean number of queries with it. See
+            `RungOutcome.faults`.
+    """
+
+    rung: LadderRung
+    method: str
+    is_gated: bool
+    auc_interval: Interval
+    r1: float
+    kept: Kept
+    queries: int
+    with_match: int
+    places: int
+    draws: int
+    drives: str
+    lost: float
+    found: float
+    hidden: float
+    overlap: float
+    faults: Mapping[str, float]
+
+    @property
+    def auc(self) -> float:
+        return self.kept.changed
+
+
+def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
+    """Returns a row for each rung, method and gate.
+
+    Args:
+        measured: of all maps; the rung `none` of a map comes first.
+    """
+    groups: dict[tuple[LadderRung, str, bool], list[RungOutcome]] = {}
+    drives: dict[LadderRung, list[str]] = {}
+    for one in measured:
+        drives.setdefault(one.rung, []).append(one.drives)
+        for outcome in one.outcomes:
+            key = one.rung, outcome.method, outcome.is_gated
+            groups.setdefault(key, []).append(outcome)
+    none: dict[tuple[str, str, bool], list[RungOutcome]] = {}
+    rows = []
+    for (rung, method, is_gated), draws in groups.items():
+        unchanged = none.setdefault((rung.map_name, method, is_gated), draws)
+        drawn = fingerprint({"drives": drives[rung]})
+        rows.append(_row(rung, drawn, unchanged, draws))
+    return rows
+
+
+def _row(
+    rung: LadderRung,
+    drives: str,
+    unchanged: Sequence[RungOutcome],
+    draws: Sequence[RungOutcome],
+) -> LadderRow:
+    first = draws[0]
+    num_queries = len(first.outcomes)
+    weights = resampled_weights(num_queries)
+    samples = _sampled_auc(draws, weights)
+    share = Interval(math.nan, math.nan)
+    lost = found = math.nan
+    if len(unchanged[0].outcomes) == num_queries:
+        before = _sampled_auc(unchanged, weights)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = percentile_interval(
+                np.where(before > 0.0, samples / before, math.nan)
+            )
+        right = unchanged[0].outcomes.is_right
+        lost, found = (
+            _mean([float((a & ~b).sum()) for a, b in pairs])
+            for pairs in (
+                [(right, one.outcomes.is_right) for one in draws],
+                [(one.outcomes.is_right, right) for one in draws],
+            )
+        )
+    faults = [fault for one in draws for fault in one.faults(rung.radius)]
+    return LadderRow(
+        rung=rung,
+        method=first.method,
+        is_gated=first.is_gated,
+        auc_interval=percentile_interval(samples),
+        r1=_mean([one.outcomes.recall_at(1) for one in draws]),
+        kept=Kept(_auc(unchanged), _auc(draws), share),
+        queries=num_queries,
+        with_match=int(first.outcomes.has_match.sum()),
+        places=first.outcomes.num_places,
+        draws=len(draws),
+        drives=drives,
+        lost=lost,
+        found=found,
+        hidden=_mean([one.num_hidden for one in draws]),
+        overlap=_mean_known(np.concatenate([one.overlaps for one in draws])),
+        faults={name: faults.count(name) / len(draws) for name in FAULTS},
+    )
+
+
+def _auc(draws: Sequence[RungOutcome]) -> float:
+    return _mean([pr_curve(one.outcomes).auc for one in draws])
+
+
+def _sampled_auc(
+    draws: Sequence[RungOutcome], weights: np.ndarray
+) -> np.ndarray:
+    """Returns the mean AUC over draws, of samples of the queries."""
+    return np.mean(
+        [resampled_metrics(one.outcomes, weights)[0] for one in draws], axis=0
+    )
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values))
+
+
+def _mean_known(values: np.ndarray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+class _Answers(NamedTuple):
+    """The answers of a method to the queries on a rung, in one draw."""
+
+    rung: LadderRung
+    seed: int
+    outcome: RungOutcome
+
+
+def _keys(path: str = "") -> Columns[Any]:
+    """Returns the first columns.
+
+    Args:
+        path: attributes that lead from an item to its method and gate.
+    """
+    return {
+        "map": lambda one: one.rung.map_name,
+        "db": lambda one: one.rung.database,
+        "query": lambda one: one.rung.query,
+        "cause": lambda one: one.rung.cause,
+        "level": lambda one: one.rung.level,
+        "method": attrgetter(f"{path}method"),
+        "gate": attrgetter(f"{path}is_gated"),
+    }
+
+
+_ROW_COLUMNS: Columns[LadderRow] = {
+    **_keys(),
+    "auc": lambda row: row.auc,
+    "r1": lambda row: row.r1,
+    "kept": lambda row: row.kept.share,
+    "kept_low": lambda row: row.kept.interval.low,
+    "kept_high": lambda row: row.kept.interval.high,
+    "auc_low": lambda row: row.auc_interval.low,
+    "auc_high": lambda row: row.auc_interval.high,
+    "auc_none": lambda row: row.kept.unchanged,
+    "queries": lambda row: row.queries,
+    "with_match": lambda row: row.with_match,
+    "places": lambda row: row.places,
+    "draws": lambda row: row.draws,
+    "drives": lambda row: row.drives,
+    "lost": lambda row: row.lost,
+    "found": lambda row: row.found,
+    "hidden": lambda row: row.hidden,
+    "overlap": lambda row: row.overlap,
+    **keyed({name: name for name in FAULTS}, lambda row, k: row.faults[k]),
+    "strength": lambda row: row.rung.strength,
+    "radius": lambda row: row.rung.radius,
+}
+_ANSWER_COLUMNS: Columns[_Answers] = {
+    **_keys("outcome."),
+    "seed": lambda a: a.seed,
+    "query_frame": lambda a: a.outcome.query_frames,
+    "query_stamp_ns": lambda a: a.outcome.stamps_ns,
+    "query_x": lambda a: a.outcome.p_WQs[:, 0],
+    "query_y": lambda a: a.outcome.p_WQs[:, 1],
+    "query_z": lambda a: a.outcome.p_WQs[:, 2],
+    "correct": lambda a: a.outcome.outcomes.is_right,
+    "has_match": lambda a: a.outcome.outcomes.has_match,
+    "score": lambda a: a.outcome.outcomes.best_scores,
+    "first_right_rank": lambda a: finite_ranks(a.outcome.outcomes),
+    "why": lambda a: a.outcome.faults(a.rung.radius),
+    "match_drive": lambda a: a.outcome.match_drives,
+    "match_frame": lambda a: [
+        frame if frame >= 0 else None
+        for frame in a.outcome.match_frames.tolist()
+    ],
+    "distance": lambda a: a.outcome.distances,
+    "translation_error": lambda a: a.outcome.pose_errors.translation,
+    "rotation_error_deg": lambda a: a.outcome.pose_errors.rotation_deg,
+    "overlap": lambda a: a.outcome.overlaps,
+}
+
+
+def ladder_table(
+    rows: Iterable[LadderRow], protocol: RetrievalProtocol
+) -> Table:
+    """Returns one row for each rung, method and gate."""
+    options: Columns[LadderRow] = keyed(
+        {name: name for name in _OPTIONS},
+        lambda row, name: getattr(protocol, name),
+    )
+    return Table.of(rows, {**_ROW_COLUMNS, **options})
+
+
+def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:
+    """Returns one row for each rung, draw, method, gate and query."""
+    answers = (
+        _Answers(one.rung, one.seed, outcome)
+        for one in measured
+        for outcome in one.outcomes
+    )
+    return Table.of(answers, _ANSWER_COLUMNS)
+
+
+def ladder_text(rows: Sequence[LadderRow]) -> str:
+    """Returns a paragraph for each map.
+
+    Args:
+        rows: of all maps.
+    """
+    maps = dict.fromkeys(row.rung.map_name for row in rows)
+    return "\n\n".join(
+        _paragraph([row for row in rows if row.rung.map_name == name])
+        for name in maps
+    )
+
+
+def _paragraph(rows: Sequence[LadderRow]) -> str:
+    first = rows[0].rung
+    parts = [
+        f"{first.map_name.capitalize()}, {rows[0].queries} queries of drive"
+        f" {first.query}: what each cause of change, at its strongest level,"
+        " leaves of the AUC without a change (95 % intervals)."
+    ]
+    ungated, gated = (
+        _strongest([row for row in rows if row.is_gated == is_gated])
+        for is_gated in (False, True)
+    )
+    sentences = [
+        _sentence([row for row in ungated if row.method == method])
+        for method in in_table_order(row.method for row in ungated)
+    ]
+    if any(sentences):
+        parts.append(f"Without the gate: {'; '.join(filter(None, sentences))}.")
+        parts.append(_mildest(ungated))
+        parts.append(_difference(ungated, gated))
+    return " ".join(filter(None, parts))
+
+
+def _sentence(rows: Sequence[LadderRow]) -> str:
+    """Returns the losses of one method; "" if its AUC without a change is 0."""
+    known = {
+        row.rung.cause: row for row in rows if not math.isnan(row.kept.share)
+    }
+    together = known.pop(_ALL, None)
+    known.pop(_NONE, None)
+    parts = []
+    if known:
+        worst = min(known.values(), key=lambda row: row.kept.share)
+        parts.append(
+            f"keeps {_kept(worst)} whatever the cause"
+            if worst.kept.share >= _MUCH
+            else f"loses most by {_cause(worst)} ({worst.rung.strength}), which"
+            f" leaves {_kept(worst)}"
+        )
+    if together is not None:
+        parts.append(f"keeps {_kept(together)} under all causes together")
+    return f"{title(rows[0].method)} {', and '.join(parts)}" if parts else ""
+
+
+def _mildest(rows: Sequence[LadderRow]) -> str:
+    """Returns the causes that cost no method much."""
+    shares: dict[str, list[float]] = {}
+    for row in rows:
+        is_single = row.rung.cause not in (_NONE, _ALL)
+        if is_single and not math.isnan(row.kept.share):
+            shares.setdefault(_cause(row), []).append(row.kept.share)
+    least = {cause: min(values) for cause, values in shares.items()}
+    mild = [cause for cause, share in least.items() if share >= _MUCH]
+    much = f"{100.0 * _MUCH:.0f} % or more"
+    if not shares:
+        return ""
+    if not mild:
+        return f"No cause leaves {much} to every method."
+    return f"To every method {much} are left by {', '.join(mild)}."
+
+
+def _difference(
+    ungated: Sequence[LadderRow], gated: Sequence[LadderRow]
+) -> str:
+    """Returns the sentence on causes whose cost depends on the gate."""
+    before = {(row.rung.cause, row.method): row for row in ungated}
+    changed = [
+        f"{title(row.method)} under {_cause(row)} keeps"
+        f" {_percent(row.kept.share)} instead of {_percent(other.kept.share)}"
+        for row in gated
+        if (other := before.get((row.rung.cause, row.method))) is not None
+        and abs(row.kept.share - other.kept.share) >= _DIFFERENT
+    ]
+    much = f"{100.0 * _DIFFERENT:.0f} points"
+    if not changed:
+        return f"The gate changes nothing by {much} or more."
+    return (
+        f"With the gate, {'; '.join(changed)}; all else changes by less than"
+        f" {much}."
+    )
+
+
+def _strongest(rows: Sequence[LadderRow]) -> list[LadderRow]:
+    """Returns the row of the strongest level of each cause and method."""
+    found: dict[tuple[str, str], LadderRow] = {}
+    for row in rows:
+        key = row.rung.cause, row.method
+        if key not in found or found[key].rung.level < row.rung.level:
+            found[key] = row
+    return list(found.values())
+
+
+def _cause(row: LadderRow) -> str:
+    return row.rung.cause.replace("_", " ")
+
+
+def _kept(row: LadderRow) -> str:
+    low, high = row.kept.interval.low, row.kept.interval.high
+    text = _percent(row.kept.share)
+    if math.isnan(low):
+        return text
+    return f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
+    """Draws the share of the AUC without a change that each cause leaves.
+
+    A cell has a strip for each level, the weakest at its left; the number is
+    that of the strongest level [%]. Without a change it is AUC itself.
+
+    Args:
+        rows: of all maps.
+        stem: path to write, without ending.
+    """
+    maps = list(dict.fromkeys(row.rung.map_name for row in rows))
+    methods = in_table_order(row.method for row in rows)
+    causes = list(dict.fromkeys(row.rung.cause for row in rows))
+    size = (
+        _EDGES[0] + 2 * _CELL_WIDTH * len(methods),
+        len(maps) * (_EDGES[1] + _CELL_HEIGHT * len(causes)),
+    )
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(len(maps), 2, squeeze=False, sharey=True)
+    for name, line in zip(maps, panels, strict=True):
+        for axes, (is_gated, words) in zip(line, _TITLES.items(), strict=True):
+            shown = [
+                row
+                for row in rows
+                if row.rung.map_name == name and row.is_gated == is_gated
+            ]
+            _draw_panel(axes, shown, methods, causes)
+            axes.set_title(plain(f"{name}, {words}"), fontsize=_FONT_SIZE + 1)
+    bar = figure.colorbar(
+        ScalarMappable(_SHARES, _COLOURS),
+        ax=panels[:, 1],
+        shrink=0.8,
+        aspect=30,
+    )
+    bar.set_label("part of AUC that is kept", fontsize=_FONT_SIZE)
+    bar.ax.tick_params(labelsize=_FONT_SIZE)
+    save(figure, stem)
+
+
+def _draw_panel(
+    axes: Axes,
+    rows: Sequence[LadderRow],
+    methods: Sequence[str],
+    causes: Sequence[str],
+) -> None:
+    cells: dict[tuple[str, str], list[LadderRow]] = {}
+    for row in rows:
+        cells.setdefault((row.method, row.rung.cause), []).append(row)
+    for (method, cause), levels in cells.items():
+        x, y = methods.index(method), causes.index(cause)
+        levels.sort(key=lambda row: row.rung.level)
+        width = 1.0 / len(levels)
+        for k, row in enumerate(levels):
+            share = row.kept.share
+            colour = "lightgray" if math.isnan(share) else _COLOURS(share)
+            axes.add_patch(
+                Rectangle((x + k * width, y), width, 1.0, color=colour, lw=0)
+            )
+        strongest = levels[-1]
+        share = strongest.kept.share
+        is_light = math.isnan(share) or _LIGHT[0] < share < _LIGHT[1]
+        axes.text(
+            x + 0.5,
+            y + 0.5,
+            _label(strongest),
+            ha="center",
+            va="center",
+            color="black" if is_light else "white",
+            fontsize=_FONT_SIZE,
+        )
+    axes.set(xlim=(0, len(methods)), ylim=(len(causes), 0))
+    axes.set_xticks(
+        [k + 0.5 for k in range(len(methods))],
+        [plain(title(method)) for method in methods],
+        fontsize=_FONT_SIZE,
+    )
+    axes.set_yticks(
+        [k + 0.5 for k in range(len(causes))],
+        [plain(cause.replace("_", " ")) for cause in causes],
+        fontsize=_FONT_SIZE,
+    )
+    axes.tick_params(length=0)
+    for k in range(1, len(methods)):
+        axes.axvline(k, color="white", linewidth=2)
+    for k in range(1, len(causes)):
+        axes.axhline(k, color="white", linewidth=2)
+    axes.spines[:].set_visible(False)
+
+
+def _label(row: LadderRow) -> str:
+    if row.rung.level == 0:
+        return f"AUC {row.auc:.2f}"
+    share = row.kept.share
+    return "–" if math.isnan(share) else f"{100.0 * share:.0f}"

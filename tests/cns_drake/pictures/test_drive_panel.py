@@ -1,0 +1,91 @@
+"""The plots below the time line show the values that they are given."""
+
+import re
+
+import numpy as np
+from pydrake.math import RigidTransform
+import pytest
+
+from cns_drake.pictures.drive_page import (
+    DriveRecord,
+    Plot,
+    make_panel,
+    motion_plots,
+)
+
+
+def points(plot):
+    return np.array([one.split(",") for one in plot.points.split()], float)
+
+
+def test_curve_goes_from_left_to_right_and_up():
+    plot = Plot.of("Speed", "km/h", np.array([0, 20, 10]))
+    # Zero is at the bottom, the greatest value at the top.
+    np.testing.assert_allclose(points(plot), [[0, 20], [200, 0], [400, 10]])
+    assert plot.values == "0.0,20.0,10.0"
+
+
+def test_curve_of_both_signs_has_its_zero_line():
+    plot = Plot.of("IMU, left", "m/s²", np.array([-3.0, 0.0, 1.0]))
+    np.testing.assert_allclose(points(plot)[:, 1], [20.0, 5.0, 0.0])
+    assert plot.zero == "5.0"
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-9, -1e-9])
+def test_noise_is_not_stretched(value):
+    y = points(Plot.of("IMU, turn", "deg/s", np.array([0.0, value])))[:, 1]
+    assert abs(y[0] - y[1]) < 0.1
+
+
+def test_long_drive_has_few_samples_from_first_to_last():
+    plot = Plot.of("Speed", "km/h", np.arange(3001.0))
+    said = plot.values.split(",")
+    assert len(said) == len(points(plot)) == 400
+    assert (said[0], said[-1]) == ("0.0", "3000.0")
+
+
+def record(frames):
+    """The record of a drive with the same motion at each frame."""
+    return DriveRecord(
+        0.5,
+        [RigidTransform()] * frames,
+        speeds=[10.0] * frames,
+        specific_forces_I=[np.array([1.0, 2.0, 9.81])] * frames,
+        angular_velocities_I=[np.array([0.0, 0.0, np.pi])] * frames,
+    )
+
+
+def test_units_of_motion():
+    plots = motion_plots(record(2))
+    assert [(plot.name, plot.unit, plot.values) for plot in plots] == [
+        ("Speed", "km/h", "36.0,36.0"),
+        ("IMU, forward", "m/s²", "1.0,1.0"),
+        ("IMU, left", "m/s²", "2.0,2.0"),
+        ("IMU, turn", "deg/s", "180.0,180.0"),
+    ]
+
+
+def test_plots_stand_in_the_panel():
+    html = make_panel("a", record(2), set(), "b")
+    assert 'data-unit="km/h" data-values="36.0,36.0"' in html
+    assert (
+        re.findall(r'<polyline points="([^"]*)"', html)[0]
+        == "0.0,0.0 400.0,0.0"
+    )
+    assert 'class="stages"' not in html
+
+
+def test_stage_is_marked_among_all():
+    html = make_panel("a", record(2), set(), "b", "02", ("01", "02", "03"))
+    assert re.findall(r"<b([^>]*)>(\d\d)</b>", html) == [
+        ("", "01"),
+        (' class="now"', "02"),
+        ("", "03"),
+    ]
+    html = make_panel("a", record(2), set(), "b", "01", ("01",))
+    assert 'class="stages"' not in html
+
+
+def test_nothing_without_frames():
+    assert motion_plots(record(0)) == []
+    assert motion_plots(record(1)) == []
