@@ -127,11 +127,3 @@ PAPER_PROTOCOL = RetrievalProtocol()
 PROTOCOL_COLUMNS = tuple(
     one.name for one in fields(RetrievalProtocol) if one.name != "overlap"
 )
-
-
-def protocol_values(
-    protocol: RetrievalProtocol,
-) -> tuple[float | int | None, ...]:
-    """Returns the values of `PROTOCOL_COLUMNS`; the gate as 0 or 1."""
-    values = asdict(protocol) | {"gate": int(protocol.gate)}
-    return tuple(values[name] for name in PROTOCOL_COLUMNS)

@@ -28,7 +28,6 @@ from evaluation.recognition.metrics import (
 )
 from evaluation.recognition.place_recognition import RADII, RecognitionResult
 from evaluation.recognition.pose_errors import PoseErrors
-from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.report.tables import (
@@ -36,6 +35,7 @@ from evaluation.report.tables import (
     Table,
     in_table_order,
     keyed,
+    protocol_columns,
     ranked,
     title,
 )
@@ -81,15 +81,6 @@ _MOMENT = ("frame", "stamp_ns", "x", "y", "z", "qx", "qy", "qz", "qw")
 
 # Evidence for pairs of drives: (database, query) -> evidence.
 Evidence = Mapping[tuple[str, str], PairEvidence]
-
-
-def protocol_columns(path: str) -> Columns[Any]:
-    """Returns columns for the options of an item's protocol.
-
-    Args:
-        path: attributes that lead from the item to its protocol.
-    """
-    return {name: attrgetter(f"{path}.{name}") for name in PROTOCOL_COLUMNS}
 
 
 def _inner(columns: Columns[RecognitionResult]) -> Columns[Any]:

@@ -13,12 +13,12 @@ import numpy as np
 
 from evaluation.recognition.survival import Kept, Survival
 from evaluation.report.drawing import method_style, plain, save
-from evaluation.report.result_tables import protocol_columns
 from evaluation.report.tables import (
     MISSING,
     Columns,
     Table,
     in_table_order,
+    protocol_columns,
     title,
 )
 

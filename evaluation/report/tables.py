@@ -9,10 +9,13 @@ import html
 import io
 from itertools import groupby
 import math
+from operator import attrgetter
 import re
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+
+from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 
 _Item = TypeVar("_Item")
 _Key = TypeVar("_Key")
@@ -77,6 +80,8 @@ class Cell:
 class Table:
     """Rows under a header; numbers stay numbers until they are written.
 
+    A missing value is empty in CSV, elsewhere a dash; truth values are 0 or 1.
+
     Attributes:
         header: name of each column.
         rows: one value for each column: text, a number, a `Cell`, or None for
@@ -132,8 +137,7 @@ class Table:
     def to_csv(self) -> str:
         """Returns the table with all digits.
 
-        A missing value is empty, and a truth value is 0 or 1. A cell becomes
-        two columns; the second holds the paper's number.
+        A cell becomes two columns; the second holds the paper's number.
         """
         columns = list(zip(*self.rows, strict=True)) or [()] * len(self.header)
         expanded = []
@@ -246,6 +250,15 @@ def keyed(
     return {name: column(key) for name, key in keys.items()}
 
 
+def protocol_columns(path: str) -> Columns[Any]:
+    """Returns columns for the options of an item's protocol.
+
+    Args:
+        path: attributes that lead from the item to its protocol.
+    """
+    return {name: attrgetter(f"{path}.{name}") for name in PROTOCOL_COLUMNS}
+
+
 def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:
     """Returns rows of values, of which single ones stand in each row."""
     lists = [v.tolist() if isinstance(v, np.ndarray) else v for v in values]
@@ -293,6 +306,8 @@ def to_text(value: object) -> str:
     """Returns a value as tables show it."""
     if _is_missing(value):
         return MISSING
+    if isinstance(value, bool):
+        return str(int(value))
     return f"{value:.4f}" if isinstance(value, float) else str(value)
 
 

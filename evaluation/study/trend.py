@@ -7,8 +7,6 @@ or less. Each pair gives a TCR_sym and, for each method, an AUC.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-import csv
-import io
 import math
 from pathlib import Path
 
@@ -17,12 +15,14 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from cns_drake.base.files import completing, make_folder
-from evaluation.recognition.protocol import (
-    PROTOCOL_COLUMNS,
-    protocol_values,
-)
 from evaluation.report.drawing import method_entry, method_style, save
-from evaluation.report.tables import in_table_order
+from evaluation.report.tables import (
+    Columns,
+    Table,
+    in_table_order,
+    keyed,
+    protocol_columns,
+)
 from evaluation.study.trend_points import TrendPoint
 
 # Width of the kernel that smooths over TCR_sym, as part of its range. The band
@@ -55,24 +55,21 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
     """
     make_folder(folder)
     path = folder / "trend.csv"
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow([*_NUMBERS, *PROTOCOL_COLUMNS])
-    for point in points:
-        values = [getattr(point, name) for name in _NUMBERS]
-        table.writerow(
-            [*map(_to_csv, values), *protocol_values(point.protocol)]
-        )
+    numbers: Columns[TrendPoint] = keyed(
+        {name: name for name in _NUMBERS},
+        lambda point, name: _rounded(getattr(point, name)),
+    )
+    table = Table.of(points, {**numbers, **protocol_columns("protocol")})
     with completing(path) as part:
-        part.write_text(out.getvalue(), encoding="utf-8")
+        part.write_text(table.to_csv(), encoding="utf-8")
     draw_trend(points, folder / "trend")
     return path
 
 
-def _to_csv(value: object) -> object:
-    if not isinstance(value, float):
+def _rounded(value: object) -> object:
+    if not isinstance(value, float) or math.isnan(value):
         return value
-    return "" if math.isnan(value) else f"{value:.6f}"
+    return f"{value:.6f}"
 
 
 def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:

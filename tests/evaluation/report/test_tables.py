@@ -1,9 +1,10 @@
 import csv
 import io
 
+import numpy as np
 import pytest
 
-from evaluation.report.tables import Cell, Table, ranked
+from evaluation.report.tables import Cell, Table, keyed, ranked
 
 PLAIN = Table(
     ("name", "value", "count"),
@@ -26,6 +27,24 @@ def test_plain():
         "| name | value | count |\n| --- | --- | --- |\n"
         "| a | 0.1235 | 3 |\n| b | – | 4 |\n| c | – | 5 |\n"
     )
+
+
+def test_columns_of_items():
+    table = Table.of(
+        [(1, np.array([0.5, 0.25])), (2, np.array([]))],
+        {
+            "a": lambda item: item[0],
+            ("b", "c"): lambda item: item[1],
+            **keyed({"d": 2, "e": 3}, lambda item, k: item[1] * k > 1.0),
+        },
+        "A caption",
+    )
+    assert table.to_csv() == "a,b c,d,e\n1,0.5,0,1\n1,0.25,0,0\n"
+    assert table.to_markdown().endswith("| 1 | 0.2500 | 0 | 0 |\n")
+    assert table.groups == (("", 1), ("b", 1), ("", 2))
+    assert table.caption == "A caption"
+    single = Table.of("xy", {"letter": str, "number": ord})
+    assert single.rows == (("x", 120), ("y", 121))
 
 
 def test_a_column_without_values_can_go():
