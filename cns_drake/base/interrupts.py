@@ -118,4 +118,8 @@ def end_interrupted() -> NoReturn:
         sys.stdout.flush()
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.flush()
+    # Nothing of `multiprocessing` is left in the temporary folder.
+    if util := sys.modules.get("multiprocessing.util"):
+        with contextlib.suppress(Exception):
+            util._exit_function()
     os._exit(INTERRUPTED)

@@ -30,17 +30,6 @@ def world_file(scenario: Scenario) -> Path:
     return map_folder(scenario).stage(str(scenario.stage))
 
 
-def stage_group(scenario: Scenario) -> str | None:
-    """Returns the name of the drives that may share a loaded stage.
-
-    These are the drives of a map or world, where each stage serves several. A
-    city without some structures serves one.
-    """
-    if scenario.without:
-        return None
-    return str(map_folder(scenario).path.resolve())
-
-
 def check_files(scenario: Scenario, source: object = None) -> None:
     """Checks that the map and its stage, or the other files, exist.
 

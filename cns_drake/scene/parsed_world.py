@@ -27,7 +27,7 @@ class ParsedWorld:
 
     Attributes:
         scene_graph: holds the geometry.
-        plant: owns bodies and frames; finalized only if no more models come.
+        plant: owns bodies and frames; not finalized yet.
         parser: of the plant.
         names: of the geometries that a LiDAR can see.
         notes: for the user.

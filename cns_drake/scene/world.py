@@ -12,8 +12,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.scene.kept_worlds import take_world
-from cns_drake.scene.parsed_world import parse_models
+from cns_drake.scene.parsed_world import parse_models, parse_world
 from cns_drake.scene.perception_geometry import structure_name
 from cns_drake.scene.structure_table import (
     StructureTable,
@@ -91,18 +90,12 @@ def load_world(
 
         world = load_world(Path("my_world.sdf"))
     """
-    parsed = take_world(
-        sdf,
-        without=without,
-        model_paths=model_paths,
-        is_whole=vehicle is None,
-    )
+    parsed = parse_world(sdf, without=without, model_paths=model_paths)
     plant, notes = parsed.plant, parsed.notes
     vehicle_model = None
     if vehicle is not None:
         vehicle_model = parse_models(parsed.parser, vehicle)[0]
-    if not plant.is_finalized():
-        plant.Finalize()
+    plant.Finalize()
 
     table = structures or MapFolder(sdf.parent).structures
     found = set(map(structure_name, parsed.names))

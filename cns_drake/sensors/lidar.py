@@ -20,7 +20,7 @@ from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern
 from cns_drake.sensors.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.point_assembly import assemble_points, points_in_world
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
-from cns_drake.sensors.seen_geometry import BuiltScene, SeenGeometry, Sight
+from cns_drake.sensors.seen_geometry import SeenGeometry, Sight
 from cns_drake.sensors.turns import Turn, Turns
 
 
@@ -102,7 +102,6 @@ class Lidar(LeafSystem):
         structures: StructureTable | None = None,
         anchored_frames: Collection[FrameId] = (),
         num_threads: int = 1,
-        built: BuiltScene | None = None,
     ):
         """Constructs the LiDAR.
 
@@ -127,8 +126,6 @@ class Lidar(LeafSystem):
                 static geometry is built anew.
             num_threads: number of threads that share its rays; the measurement
                 does not depend on it.
-            built: a scene of geometry of the SceneGraph that never moves, built
-                before; a hint for speed.
         """
         super().__init__()
         self._parent_frame_id = parent_frame_id
@@ -143,7 +140,6 @@ class Lidar(LeafSystem):
             structures or StructureTable(()),
             frozenset(anchored_frames),
             num_threads,
-            built,
         )
         self._turns = Turns(pattern)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from copy import copy
 from operator import is_
 from typing import NamedTuple
 
@@ -35,18 +34,6 @@ from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
 from cns_drake.sensors.returns.materials import Materials, find_materials
 
 
-class BuiltScene(NamedTuple):
-    """A scene of a SceneGraph's geometry, with what has read it.
-
-    Attributes:
-        reader: of the geometry.
-        scene: of what it has read.
-    """
-
-    reader: GeometryReader
-    scene: RayCastingScene
-
-
 class Sight(NamedTuple):
     """The choice of geometry that a LiDAR sees.
 
@@ -59,9 +46,6 @@ class Sight(NamedTuple):
         anchored_frames: frames that never move, besides the world's; a hint for
             speed.
         num_threads: number of threads that share the rays of a cast.
-        built: a scene of geometry of the same SceneGraph that never moves; a
-            hint for speed. What it shares with the scene that is needed is not
-            built anew.
     """
 
     role: Role
@@ -70,7 +54,6 @@ class Sight(NamedTuple):
     structures: StructureTable
     anchored_frames: frozenset[FrameId]
     num_threads: int
-    built: BuiltScene | None = None
 
 
 class SeenGeometry:
@@ -90,11 +73,6 @@ class SeenGeometry:
     def __init__(self, sight: Sight):
         self._sight = sight
         self._reader = GeometryReader(sight.role)
-        self._previous: RayCastingScene | None = None
-        if sight.built is not None:
-            # Readers replace what they have read: the copy goes its own way.
-            self._reader = copy(sight.built.reader)
-            self._previous = sight.built.scene
         self._geometries: tuple[PerceptionGeometry, ...] = ()
         self._revision: int | None = None
         self._built: tuple[PerceptionGeometry, ...] = ()
@@ -209,7 +187,6 @@ class SeenGeometry:
             anchored,
             calc_X_WF,
             num_threads=self._sight.num_threads,
-            previous=self.scene or self._previous,
+            previous=self.scene,
         )
-        self._previous = None
         self._built = self._geometries

@@ -21,7 +21,7 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files, stage_group
+from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.sensor_making import (
     make_measurement,
     make_pattern,
@@ -29,13 +29,12 @@ from cns_drake.scenarios.sensor_making import (
 )
 from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar import Lidar
-from cns_drake.simulation.kept_scenes import keep_scene, take_scene
 from cns_drake.simulation.planned_drive import PlannedDrive
 from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,
     with_traffic,
 )
-from cns_drake.simulation.stage_loading import keep_stage, load_stage
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.still_world import make_still_world
 from cns_drake.simulation.structure_list import structure_list
 from cns_drake.traffic.traffic_adding import make_traffic
@@ -53,18 +52,6 @@ class DriveSimulation:
 
     def __call__(self) -> SimulatedDrive:
         return SimulatedDrive(self.scenario)
-
-    @property
-    def group(self) -> str | None:
-        return stage_group(self.scenario)
-
-    def load(self) -> None:
-        world = keep_stage(self.scenario, with_vehicle=False)
-        # Passing changes replace much of what such a scene would hold.
-        if self.scenario.transient.is_off:
-            keep_scene(world)
-        # Forked processes have the digests of its files as well.
-        self.identity()
 
     def identity(self) -> dict:
         """Returns the scenario, and digests of its files and of the code."""
@@ -101,7 +88,6 @@ class SimulatedDrive(PlannedDrive):
         self._is_random = measurement.is_random or returns is not None
         # No LiDAR sees the vehicle that carries it.
         world = load_stage(scenario, with_vehicle=False, trajectory=trajectory)
-        built = take_scene(world)
         traffic = None
         if not scenario.traffic.is_off:
             plan = plan_scenario_traffic(scenario, trajectory)
@@ -129,7 +115,6 @@ class SimulatedDrive(PlannedDrive):
             posed_frames=traffic.moving_frames if traffic else None,
             structures=world.structures,
             anchored_frames=world.anchored_frames(),
-            built=built,
         )
         self._diagram = make_still_world(world, self._lidar, traffic)
         self._context = self._diagram.CreateDefaultContext()

@@ -15,8 +15,6 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import vehicle_file
-from cns_drake.scene.kept_worlds import keep_world
-from cns_drake.scene.parsed_world import ParsedWorld
 from cns_drake.scene.world import World, load_world
 from cns_drake.traffic.lane_file import read_lanes
 from cns_drake.transient.changing import change_world
@@ -57,24 +55,6 @@ def load_stage(
     drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
     return change_world(
         world, scenario.transient, drive, _driven(scenario, drive)
-    )
-
-
-def keep_stage(scenario: Scenario, *, with_vehicle: bool = True) -> ParsedWorld:
-    """Parses the stage of a scenario for processes that are forked from here.
-
-    See `cns_drake.scene.kept_worlds`.
-
-    Args:
-        scenario: names the stage.
-        with_vehicle: whether a vehicle will come into it.
-
-    Raises:
-        InputError: the scenario's files cannot be used.
-    """
-    without = (*scenario.without, *_in_the_way(scenario))
-    return keep_world(
-        world_file(scenario), without=without, is_whole=not with_vehicle
     )
 
 

@@ -69,17 +69,6 @@ class _Picture(PartStep):
     def figures(self) -> tuple[Path, ...]:
         return (self.picture,)
 
-    @property
-    def group(self) -> str:
-        return str(self.folder.resolve())
-
-    def load(self) -> None:
-        with uninterrupted():
-            from cns_drake.scene.kept_worlds import keep_world
-
-        for world in self.worlds():
-            keep_world(world)
-
     @abc.abstractmethod
     def worlds(self) -> Sequence[Path]:
         """Returns the worlds that it shows."""
@@ -93,11 +82,6 @@ class DrawDrives(_Picture):
             one.name: [one.model_dump(mode="json"), digest_inputs(one)]
             for one in self._scenarios()
         }
-
-    def prepare(self) -> None:
-        super().prepare()
-        with uninterrupted():
-            import cns_drake.pictures.stage_pictures  # noqa: F401
 
     def make(self, reporter: Reporter) -> None:
         with uninterrupted():
@@ -124,11 +108,6 @@ class DrawStages(_Picture):
     def inputs(self) -> dict[str, object]:
         files = [*self.worlds(), MapFolder(self.folder).views]
         return {file.name: digest_file(file) for file in files}
-
-    def prepare(self) -> None:
-        super().prepare()
-        with uninterrupted():
-            import cns_drake.pictures.stage_pictures  # noqa: F401
 
     def make(self, reporter: Reporter) -> None:
         with uninterrupted():

@@ -19,11 +19,10 @@ from cns_drake.scenarios.planning import shown_beside
 from cns_drake.scenarios.provenance import (
     digest_file,
     digest_inputs,
-    recording_code,
     recording_fingerprint,
 )
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import stage_group, world_file
+from cns_drake.scenarios.scenario_files import world_file
 from evaluation.study.parts import is_current, write_part
 from evaluation.study.recording_survey import RecordingSurvey
 from evaluation.study.surveys import Survey
@@ -54,29 +53,6 @@ class Record(Step):
 
     def is_done(self) -> bool:
         return is_recorded(self.scenario, self.folder) and self._is_shown()
-
-    def prepare(self) -> None:
-        super().prepare()
-        recording_code()
-        if self.survey is not None:
-            self.survey.prepare()
-        with uninterrupted():
-            import cns_drake.simulation.simulation  # noqa: F401
-
-    @property
-    def group(self) -> str | None:
-        return stage_group(self.scenario)
-
-    def load(self) -> None:
-        with uninterrupted():
-            from cns_drake.simulation.stage_loading import keep_stage
-
-        scenarios = [self.scenario]
-        if self.page is not None:
-            beside, _ = shown_beside(self.scenario)
-            scenarios += [beside] if beside else []
-        for scenario in scenarios:
-            keep_stage(scenario)
 
     def run(self, reporter: Reporter) -> None:
         with uninterrupted():

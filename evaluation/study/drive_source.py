@@ -38,13 +38,6 @@ class DriveSource(Protocol):
             InputError: if there is no drive.
         """
 
-    @property
-    def group(self) -> str | None:
-        """The name of the drives that share what they load; see `Step`."""
-
-    def load(self) -> None:
-        """Loads what opening begins with; see `Step`."""
-
 
 @dataclass(frozen=True)
 class RecordedDrive:
@@ -60,13 +53,6 @@ class RecordedDrive:
 
     def __call__(self) -> Drive:
         return open_drive(self.path, self.lidar)
-
-    @property
-    def group(self) -> None:
-        return None
-
-    def load(self) -> None:
-        """Loads nothing: scans are read one by one."""
 
     def identity(self) -> list[list]:
         """Returns LiDAR, and name, size and time of change of each file.

@@ -60,14 +60,6 @@ class FindEvidence(PartStep):
     protocol: RetrievalProtocol
     part: Path
 
-    @property
-    def group(self) -> str | None:
-        return self.drives[0].group
-
-    def load(self) -> None:
-        for drive in self.drives:
-            drive.load()
-
     def inputs(self) -> dict[str, object]:
         return {
             "results": [

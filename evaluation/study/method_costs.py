@@ -40,13 +40,6 @@ class MeasureCosts(PartStep):
     protocol: RetrievalProtocol
     part: Path
 
-    @property
-    def group(self) -> str | None:
-        return self.source.group
-
-    def load(self) -> None:
-        self.source.load()
-
     def inputs(self) -> dict[str, object]:
         return {
             "drive": self.source.identity(),

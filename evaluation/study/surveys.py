@@ -44,13 +44,6 @@ class Survey(Step):
     def output(self) -> Path:
         return self.files.folder
 
-    @property
-    def group(self) -> str | None:
-        return self.source.group
-
-    def load(self) -> None:
-        self.source.load()
-
     def is_done(self) -> bool:
         return not any(self._missing())
 

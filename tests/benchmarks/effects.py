@@ -30,7 +30,7 @@ import time
 import numpy as np
 from processes import in_process
 
-from cns_drake.base.jobs.job_process import ALLOCATION
+from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import look_seldom
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.rates import frame_period

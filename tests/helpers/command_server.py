@@ -3,19 +3,14 @@
 A command takes seconds to import its modules, and often little else. In a
 folder like that of a virtual environment, `cns-drake` and `cns-eval` are small
 clients, which pass their words, folder, environment and standard streams to a
-server. The server forks, and the fork runs the program. The process that starts
-a program's jobs is a fork of the server, too.
+server. The server forks, and the fork runs the program.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-import functools
 import gc
 import importlib
 import json
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection
 import os
 from pathlib import Path
 import pkgutil
@@ -27,8 +22,7 @@ import sys
 import tempfile
 
 from cns_drake.base.compiled import start_compiler
-from cns_drake.base.jobs import job_server
-from cns_drake.base.jobs.job_process import ALLOCATION
+from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import look_seldom
 
 _CLIENT = """#!{python} -IS
@@ -118,67 +112,25 @@ def _serve(listener: socket.socket) -> None:
 
 
 def _answer(client: socket.socket) -> None:
-    """Runs a client's program or function, and sends its exit status."""
-    address = client.getsockname()
-    request, streams, _, _ = socket.recv_fds(client, _LONGEST, 4)
+    """Runs a client's program, and sends its exit status."""
+    request, streams, _, _ = socket.recv_fds(client, _LONGEST, 3)
     words, folder, environment = json.loads(request)
     process = os.fork()
     if process == 0:
         client.close()
-        for number, stream in enumerate(streams[:3]):
+        for number, stream in enumerate(streams):
             os.dup2(stream, number)
             os.close(stream)
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)
-        if connections := streams[3:]:
-            os.setsid()
-            module, function, *sys.path[:] = words
-            run = getattr(importlib.import_module(module), function)
-            sys.exit(run(*connections))
-        job_server.start_interpreter = functools.partial(_start, address)
         sys.argv = words
-        module = _PROGRAMS[Path(words[0]).name]
-        sys.exit(importlib.import_module(module).main())
+        program = importlib.import_module(_PROGRAMS[Path(words[0]).name])
+        # The processes of its jobs import it, as they do elsewhere.
+        sys.modules["__main__"] = program
+        sys.exit(program.main())
     status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
     client.send(bytes([status if status >= 0 else 128 - status]))
-
-
-class _Started:
-    """A process that the server has forked, as a program sees it."""
-
-    def __init__(self, server: socket.socket):
-        self._server = server
-        self._status: int | None = None
-
-    def wait(self, timeout: float | None = None, /) -> int:
-        """Returns its status; see `job_process.StartedProcess`."""
-        if self._status is None:
-            if not select.select([self._server], [], [], timeout)[0]:
-                raise subprocess.TimeoutExpired("function", timeout)
-            self._status = (self._server.recv(1) or b"\1")[0]
-        return self._status
-
-
-def _start(
-    address: str, function: Callable[[int], None]
-) -> tuple[Connection, _Started]:
-    """Has the server run a function, as `job_process.start_interpreter` does.
-
-    Args:
-        address: the server's.
-        function: a module's function; its argument is the number of the file
-            descriptor that is connected to this process.
-    """
-    ours, theirs = Pipe()
-    server = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    server.connect(address)
-    words = [function.__module__, function.__name__, *sys.path]
-    request = json.dumps([words, os.getcwd(), dict(os.environ)]).encode()
-    with theirs, open(os.devnull) as nothing:
-        streams = [nothing.fileno(), 2, 2, theirs.fileno()]
-        socket.send_fds(server, [request], streams)
-    return ours, _Started(server)
 
 
 if __name__ == "__main__":

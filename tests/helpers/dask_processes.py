@@ -69,8 +69,9 @@ class DaskProcesses:
         found = []
         for worker in self.workers:
             with contextlib.suppress(psutil.NoSuchProcess):
-                children = psutil.Process(worker.pid).children()
-                found += [(worker, child) for child in children]
+                # A job is forked from a child of its worker.
+                for child in psutil.Process(worker.pid).children():
+                    found += [(worker, job) for job in child.children()]
         return found
 
     def _start(self, module, *arguments, quiet=False):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import multiprocessing
 import os
 from pathlib import Path
 import select
@@ -62,12 +63,9 @@ def note_process(path, reporter):
     path.write_text(" ".join(map(str, numbers)))
 
 
-def kill_parent_once(tries, path, reporter):
-    """Kills the process that started this one, the first time."""
-    with tries.open("a") as stream:
-        stream.write("x")
-    if len(tries.read_text()) == 1:
-        os.kill(os.getppid(), signal.SIGKILL)
+def kill_parent(path, reporter):
+    """Kills the process from which this one was forked."""
+    os.kill(os.getppid(), signal.SIGKILL)
     path.write_text("at last")
 
 
@@ -131,7 +129,7 @@ def kill_worker(tries, reporter):
     """Ends its own process and the worker, and leaves a mark."""
     with tries.open("a") as stream:
         stream.write("x")
-    os.kill(os.getppid(), signal.SIGKILL)
+    os.kill(multiprocessing.parent_process().pid, signal.SIGKILL)
     threading.Event().wait()
 
 
@@ -150,34 +148,3 @@ def note_ports(path, reporter):
         for connection in process.net_connections("inet")
     ]
     path.write_text(f"processes {len(processes)}, ports {ports}")
-
-
-@dataclass(frozen=True)
-class Grouped(Step):
-    """Writes by which process it was started, and which ones have loaded."""
-
-    name: str
-    path: Path
-    is_deadly: bool = False
-
-    @property
-    def output(self):
-        return self.path
-
-    @property
-    def group(self):
-        return self.name
-
-    def is_done(self):
-        return self.path.is_file()
-
-    def load(self):
-        if self.is_deadly:
-            os.kill(os.getpid(), signal.SIGKILL)
-        _loaded.append(os.getpid())
-
-    def run(self, reporter):
-        self.path.write_text(" ".join(map(str, [os.getppid(), *_loaded])))
-
-
-_loaded: list[int] = []

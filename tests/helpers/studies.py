@@ -9,7 +9,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base.jobs.job_process import nothing_left
+from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.pictures.stage_scene import StageScene
 from evaluation.paper import reference_for

@@ -9,16 +9,18 @@ import asyncio
 from collections.abc import Iterator
 import contextlib
 import logging
+import multiprocessing
 from typing import TYPE_CHECKING
 import uuid
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.jobs.job_process import ProcessDiedError, run_process
-from cns_drake.base.jobs.workers import Listener
+from cns_drake.base.jobs.processes import ProcessDiedError, run_process
 
 if TYPE_CHECKING:
     from distributed import Client, Future
+
+    from cns_drake.base.jobs.cluster import Listener
 
 # How long a scheduler may take to answer [s].
 _ANSWER_TIMEOUT = 10.0
@@ -171,6 +173,9 @@ def work(name: str, job: bytes, topic: str) -> None:
             and task.state != "cancelled"
         )
 
+    # A worker of Dask is a daemon, which may not start processes. Those of jobs
+    # end with it nevertheless.
+    multiprocessing.current_process().daemon = False
     report("started")
     try:
         run_process(job, report, is_wanted)

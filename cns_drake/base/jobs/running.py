@@ -16,16 +16,15 @@ from cns_drake.base.errors import (
     InputError,
     one_line,
 )
-from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.cluster import Cluster, Workers
 from cns_drake.base.jobs.dask_workers import LostSchedulerError
-from cns_drake.base.jobs.job_process import (
+from cns_drake.base.jobs.processes import (
     PATIENCE,
     JobError,
     ProcessDiedError,
     nothing_left,
 )
 from cns_drake.base.jobs.step import Step
-from cns_drake.base.jobs.workers import Workers
 
 if TYPE_CHECKING:
     from cns_drake.base.jobs.job_progress import JobProgress

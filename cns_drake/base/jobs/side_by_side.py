@@ -12,17 +12,16 @@ import contextlib
 from functools import partial
 import gc
 from itertools import chain
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection
+import multiprocessing
+from multiprocessing.connection import Connection, Pipe
 import os
-import pickle
 import signal
 import sys
 import threading
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.jobs.job_process import end_with_parent
+from cns_drake.base.jobs.processes import end_with_parent
 from cns_drake.base.process import num_cores
 
 _Item = TypeVar("_Item")
@@ -32,7 +31,7 @@ _Result = TypeVar("_Result")
 _PARTS = 16
 # A call is handed out by its number, in this many bytes.
 _NUMBER = 4
-# What a call has given, or raised.
+# What a call has returned, or raised.
 _Outcome = tuple[Any, Exception | None]
 
 
@@ -44,35 +43,31 @@ def side_by_side(calls: Sequence[Callable[[], Any]]) -> list[Any]:
     other than Linux.
 
     Args:
-        calls: of which nothing but the result and written files remains, and
-            none needs another one; the longest should come first.
+        calls: functions of which nothing but the result and written files
+            remains, and none of which needs another one; the longest should
+            come first.
 
     Raises:
         Exception: what the first of the failing calls raises.
     """
     wanted = min(num_cores(), len(calls)) - 1 if _can_fork() else 0
-    found: dict[int, _Outcome] = {}
     with contextlib.ExitStack() as stack:
         numbers = _numbers(len(calls))
         stack.callback(os.close, numbers)
-        helpers: list[_Helper] = []
+        make = partial(_made, calls, numbers)
+        waits = []
         with contextlib.suppress(OSError):  # Perhaps there are too many.
             for _ in range(wanted):
-                helper = _Helper(calls, numbers, helpers)
-                stack.callback(helper.end)
-                helpers.append(helper)
-        found |= _made(calls, numbers)
-        for helper in helpers:
-            found |= helper.found()
-    results = []
-    for number, call in enumerate(calls):
-        if number not in found:  # Its process has died, for lack of memory.
-            found[number] = call(), None
-        result, error = found[number]
-        if error is not None:
-            raise error
-        results.append(result)
-    return results
+                waits.append(stack.enter_context(_helper(make)))
+        found = make()
+        for wait in waits:
+            made, _ = wait() or ({}, None)
+            found |= made
+    # A process that died, for lack of memory, left its calls to this one.
+    return [
+        _result(found[k]) if k in found else call()
+        for k, call in enumerate(calls)
+    ]
 
 
 @contextlib.contextmanager
@@ -83,31 +78,23 @@ def begun(call: Callable[[], _Result]) -> Iterator[Callable[[], _Result]]:
     or where no process can be forked, it makes the call when it waits.
 
     Args:
-        call: of which nothing but the result remains.
+        call: a function of which nothing but the result remains.
 
     Yields:
         What returns the result, or raises what the call raises; to be called
         once.
     """
     with contextlib.ExitStack() as stack:
-        helper: _Helper | None = None
+        wait: Callable[[], _Outcome | None] | None = None
         if _can_fork() and num_cores() > 1:
-            numbers = _numbers(1)
-            stack.callback(os.close, numbers)
             with contextlib.suppress(OSError):
-                helper = _Helper([call], numbers, [])
-                stack.callback(helper.end)
+                wait = stack.enter_context(_helper(call))
 
-        def wait() -> _Result:
-            found = {} if helper is None else helper.found()
-            if not found:
-                return call()
-            result, error = found[0]
-            if error is not None:
-                raise error
-            return result
+        def result() -> _Result:
+            outcome = None if wait is None else wait()
+            return call() if outcome is None else _result(outcome)
 
-        yield wait
+        yield result
 
 
 def mapped(
@@ -143,69 +130,69 @@ def _numbers(count: int) -> int:
 def _made(
     calls: Sequence[Callable[[], Any]], numbers: int
 ) -> dict[int, _Outcome]:
-    """Returns what the calls that are left for this process give."""
-    found: dict[int, _Outcome] = {}
+    """Returns the outcomes of the calls that are left for this process."""
+    found = {}
     while taken := os.read(numbers, _NUMBER):
         number = int.from_bytes(taken, "little")
-        try:
-            found[number] = calls[number](), None
-        except Exception as error:
-            found[number] = None, error
+        found[number] = _outcome(calls[number])
     return found
 
 
-class _Helper:
-    """A forked process that makes calls."""
-
-    def __init__(
-        self,
-        calls: Sequence[Callable[[], Any]],
-        numbers: int,
-        others: Sequence[_Helper],
-    ):
-        """Begins to make calls.
-
-        Args:
-            calls: of all processes.
-            numbers: the pipe from which it takes the numbers of its calls.
-            others: the helpers before it.
-        """
-        self._connection, theirs = Pipe()
-        # Here an interrupt would have both processes tidy up.
-        with theirs, uninterrupted():
-            self._process = os.fork()
-            if self._process == 0:
-                # Each pipe then ends with the first process.
-                for helper in (*others, self):
-                    helper._connection.close()
-                _help(calls, numbers, theirs)
-
-    def found(self) -> dict[int, _Outcome]:
-        """Waits for the results; without those of a process that has died."""
-        with contextlib.suppress(EOFError, ConnectionError):
-            return pickle.loads(self._connection.recv_bytes())
-        return {}
-
-    def end(self) -> None:
-        os.kill(self._process, signal.SIGKILL)
-        os.waitpid(self._process, 0)
-        self._connection.close()
-
-
-def _help(
-    calls: Sequence[Callable[[], Any]], numbers: int, connection: Connection
-) -> NoReturn:
-    """Makes calls; the whole forked process."""
+def _outcome(call: Callable[[], Any]) -> _Outcome:
     try:
-        # The parent ends this process, and Ctrl-C does not.
-        os.setsid()
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        threading.Thread(
-            target=end_with_parent, args=(connection,), daemon=True
-        ).start()
-        # Garbage collection would write to memory that the processes share.
-        gc.freeze()
-        connection.send_bytes(pickle.dumps(_made(calls, numbers)))
-    finally:
-        # Nothing of the parent's is to be closed or removed here.
-        os._exit(0)
+        return call(), None
+    except Exception as error:
+        return None, error
+
+
+def _result(outcome: _Outcome) -> Any:
+    """Returns what a call returned, or raises what it raised."""
+    result, error = outcome
+    if error is not None:
+        raise error
+    return result
+
+
+@contextlib.contextmanager
+def _helper(
+    call: Callable[[], Any],
+) -> Iterator[Callable[[], _Outcome | None]]:
+    """Has a forked process make a call; ends the process at last.
+
+    Yields:
+        What waits for the outcome; it returns None if the process has died.
+    """
+    ours, theirs = Pipe(duplex=False)
+    process = multiprocessing.get_context("fork").Process(
+        target=_help, args=(call, theirs)
+    )
+
+    def wait() -> _Outcome | None:
+        with contextlib.suppress(EOFError, ConnectionError):
+            return ours.recv()
+        return None
+
+    with ours:
+        # An interrupt here would have both processes tidy up.
+        with theirs, uninterrupted():
+            process.start()
+        try:
+            yield wait
+        finally:
+            process.kill()
+            process.join()
+
+
+def _help(call: Callable[[], Any], connection: Connection) -> None:
+    """Makes a call; the whole forked process."""
+    # The parent ends this process, and Ctrl-C does not.
+    os.setsid()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    # Garbage collection would write to memory that the processes share.
+    gc.freeze()
+    outcome = _outcome(call)
+    # Nothing of the parent's is to be closed or removed here.
+    with contextlib.suppress(Exception):
+        connection.send(outcome)
+    os._exit(0)

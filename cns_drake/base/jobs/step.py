@@ -87,32 +87,6 @@ class Step(abc.ABC):
             InputError: it cannot be done.
         """
 
-    def prepare(self) -> None:
-        """Does what the runs of all steps of its kind begin with.
-
-        Processes that are forked from one in which it was called share what
-        was imported then, and the digests of code.
-        """
-        code_digest(type(self).__module__)
-
-    @property
-    def group(self) -> str | None:
-        """The name of the steps that share what they `load`, if any do.
-
-        Their processes are forked from one that has loaded what each of them
-        needs.
-        """
-        return None
-
-    def load(self) -> None:  # noqa: B027  # Most steps load nothing.
-        """Loads what the run begins with, for the steps of its group.
-
-        It starts no thread, since forked processes lack them.
-
-        Raises:
-            InputError: it cannot be loaded; the run raises it again.
-        """
-
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
         """Returns inputs with the digest of the code of this step."""
         return {**inputs, "code": code_digest(type(self).__module__)}
@@ -136,19 +110,6 @@ class Steps(Step):
 
     def is_done(self) -> bool:
         return all(step.is_done() for step in self.steps)
-
-    def prepare(self) -> None:
-        for step in self.steps:
-            step.prepare()
-
-    @property
-    def group(self) -> str | None:
-        return next((s.group for s in self.steps if s.group), None)
-
-    def load(self) -> None:
-        for step in self.steps:
-            if step.group == self.group:
-                step.load()
 
     def run(self, reporter: Reporter) -> None:
         for step in self.steps:

@@ -9,10 +9,8 @@ import pytest
 
 from evaluation.methods import known_methods
 from evaluation.recognition import costs
-from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import find_recordings
-from evaluation.study.method_costs import MeasureCosts
 from evaluation.study.parts import read_part
 from evaluation.study.plan import plan_study
 from evaluation.study.study_layout import StudyFiles
@@ -51,25 +49,3 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
         assert int(row["places"]) == len(places)
     for name in ("report.html", "report.md"):
         assert "What the methods cost" in path.with_name(name).read_text()
-
-
-class Loading:
-    """A drive that is loaded before it is opened."""
-
-    group = "a city"
-
-    def __init__(self):
-        self.num_loads = 0
-
-    def load(self):
-        self.num_loads += 1
-
-
-def test_the_drive_is_loaded_by_the_process_of_its_group(tmp_path):
-    source = Loading()
-    files = StudyFiles(tmp_path)
-    surveys = files.survey("a"), files.survey("b")
-    step = MeasureCosts(source, surveys, (), PAPER_PROTOCOL, files.costs)
-    assert step.group == source.group
-    step.load()
-    assert source.num_loads == 1

@@ -17,13 +17,11 @@ from cns_drake.base.errors import FailedJobsError, InputError
 from cns_drake.base.files import exclusive
 from cns_drake.base.jobs.cluster import Cluster, choose_cluster
 from cns_drake.base.jobs.dask_workers import DaskWorkers, LostSchedulerError
-from cns_drake.base.jobs.job_process import (
+from cns_drake.base.jobs.processes import (
     JobError,
     ProcessDiedError,
     run_process,
-    start_anew,
 )
-from cns_drake.base.jobs.job_server import JobServer
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.process import num_cores
@@ -274,18 +272,7 @@ def test_names_differ():
         run_jobs(jobs, Cluster())
 
 
-@pytest.fixture(params=["anew", "forked"])
-def start(request):
-    """Starts the process of a job, in either way."""
-    if request.param == "anew":
-        yield start_anew
-        return
-    server = JobServer()
-    yield server.start
-    server.stop()
-
-
-def test_a_job_that_is_not_wanted_ends(tmp_path, start):
+def test_a_job_that_is_not_wanted_ends(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reports = []
@@ -301,15 +288,11 @@ def test_a_job_that_is_not_wanted_ends(tmp_path, start):
             pickle.dumps(Call(job_functions.hold, (pipe,))),
             lambda *message: None,
             is_wanted,
-            start,
         )
     assert not psutil.pid_exists(reports[0])
 
 
-@pytest.mark.parametrize(
-    "start", ["job_process.start_anew", "job_server.JobServer().start"]
-)
-def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path, start):
+def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     parent = subprocess.Popen(
@@ -319,11 +302,10 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path, start):
             "import pickle, sys\n"
             "from pathlib import Path\n"
             "from helpers import job_functions\n"
-            "from cns_drake.base.jobs import job_process, job_server\n"
+            "from cns_drake.base.jobs.processes import run_process\n"
             "job = job_functions.Call("
             "job_functions.hold, (Path(sys.argv[1]),))\n"
-            "job_process.run_process("
-            f"pickle.dumps(job), print, lambda: True, {start})\n",
+            "run_process(pickle.dumps(job), print, lambda: True)\n",
             pipe,
         ],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -334,13 +316,13 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path, start):
     assert psutil.wait_procs([process], timeout=600)[1] == []
 
 
-def test_a_function_that_cannot_be_imported_is_a_fault(start):
+def test_a_function_that_cannot_be_imported_is_a_fault():
     missing = b"cno_such_module\nfunction\n."  # A pickle, by hand.
     with pytest.raises(JobError, match=r"^ModuleNotFoundError: "):
-        run_process(missing, lambda *message: None, lambda: True, start)
+        run_process(missing, lambda *message: None, lambda: True)
 
 
-def test_forked_jobs_leave_nothing_to_each_other(tmp_path):
+def test_jobs_leave_nothing_to_each_other(tmp_path):
     jobs = [
         job(name, job_functions.leave_a_trace, tmp_path / name)
         for name in "abc"
@@ -349,80 +331,39 @@ def test_forked_jobs_leave_nothing_to_each_other(tmp_path):
     assert [(tmp_path / name).read_text() for name in "abc"] == ["nothing"] * 3
 
 
-def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path, capsys):
-    """The job's end cannot be found out then, so it starts elsewhere."""
-    tries, path = tmp_path / "tries", tmp_path / "path"
+def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path):
+    """So do the jobs after it, which are forked from another one."""
+    paths = [tmp_path / name for name in "ab"]
     run_jobs(
-        [job("survives", job_functions.kill_parent_once, tries, path)],
+        [job(path.name, job_functions.kill_parent, path) for path in paths],
         Cluster(num_workers=1),
     )
-    assert path.read_text() == "at last"
-    assert tries.read_text() == "xx"
-    assert "it starts again" in capsys.readouterr().err
+    assert [path.read_text() for path in paths] == ["at last"] * 2
 
 
-def test_jobs_of_a_group_are_forked_from_one_that_has_loaded(tmp_path):
-    paths = {name: tmp_path / name for name in ("a1", "b1", "a2")}
-    run_jobs(
-        [
-            Job(name, job_functions.Grouped(name[0], path))
-            for name, path in paths.items()
-        ],
-        Cluster(num_workers=1),
+def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(tmp_path):
+    script = (
+        "import pickle, sys\n"
+        "from pathlib import Path\n"
+        "from helpers import job_functions\n"
+        "from cns_drake.base.jobs.processes import run_process\n"
+        "name, path = sys.argv[1], Path(sys.argv[2])\n"
+        "step = job_functions.Call(job_functions.note_variable, (name, path))\n"
+        "run_process(pickle.dumps(step), print, lambda: True)\n"
     )
-    found = {
-        name: list(map(int, path.read_text().split()))
-        for name, path in paths.items()
-    }
-    first, other = found["a1"][0], found["b1"][0]
-    assert first != other
-    assert found["a1"] == [first] * 2
-    assert found["b1"] == [other] * 2
-    assert found["a2"] == [first] * 3
-
-
-def test_few_groups_load(tmp_path, monkeypatch):
-    monkeypatch.setattr("cns_drake.base.jobs.job_server._MOST_GROUPS", 1)
-    paths = {name: tmp_path / name for name in "ab"}
-    run_jobs(
-        [
-            Job(name, job_functions.Grouped(name, path))
-            for name, path in paths.items()
-        ],
-        Cluster(num_workers=1),
-    )
-    loaders = [len(path.read_text().split()) - 1 for path in paths.values()]
-    assert loaders == [1, 0]
-
-
-def test_a_process_that_dies_while_it_loads_harms_its_group_alone(tmp_path):
-    jobs = [
-        Job("dies", job_functions.Grouped("a", tmp_path / "a", True)),
-        Job("lives", job_functions.Grouped("b", tmp_path / "b")),
-        job("alone", job_functions.leave_a_trace, tmp_path / "c"),
-    ]
-    with pytest.raises(
-        FailedJobsError,
-        match=r"^dies: the process that starts jobs ended with status -9$",
-    ):
-        run_jobs(jobs, Cluster(num_workers=1))
-    assert {path.name for path in tmp_path.iterdir()} == {"b", "c"}
-
-
-def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(
-    tmp_path, monkeypatch
-):
     for name, expected in (
         ("MALLOC_TRIM_THRESHOLD_", str(2**28)),
-        ("HOME", "/x"),
+        ("CNS_DRAKE_TEST", "/x"),
     ):
-        monkeypatch.setenv(name, "/x")
         output = tmp_path / name
-        function = job_functions.note_variable
-        run_process(
-            pickle.dumps(Call(function, (name, output))),
-            lambda *message: None,
-            lambda: True,
+        subprocess.run(
+            [sys.executable, "-c", script, name, output],
+            env={
+                **os.environ,
+                name: "/x",
+                "PYTHONPATH": os.pathsep.join(sys.path),
+            },
+            check=True,
         )
         assert output.read_text() == repr(expected)
 

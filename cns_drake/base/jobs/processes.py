@@ -2,23 +2,26 @@
 
 Each job has a process with its own interpreter. Its memory is freed with the
 process (Python systems in a Drake diagram are not freed otherwise), and a crash
-does not reach the other jobs.
+does not reach the other jobs. On Linux the processes are forked from one of
+`multiprocessing` that has imported what its parent had imported, which takes
+seconds. On other systems the libraries do not support forks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 import contextlib
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection
+import gc
+import importlib
+import multiprocessing
+from multiprocessing.connection import Connection, Pipe
+from multiprocessing.process import BaseProcess
 import os
 import pickle
 import signal
-import subprocess
 import sys
 import threading
 import traceback
-from typing import Protocol
 
 from cns_drake.base.errors import InputError, missing_library, one_line
 from cns_drake.base.files import exclusive
@@ -28,15 +31,20 @@ from cns_drake.base.interrupts import (
     interrupt_on_termination,
     uninterrupted,
 )
+from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base.own_packages import leave_out_folder
 from cns_drake.base.process import look_seldom
 
 # How long a process may take to close its files after SIGTERM [s].
 PATIENCE = 30.0
-# The file descriptor to which a job prints, whatever replaces it in here.
-_STDERR = 2
+# File descriptors: a job prints to that of errors, whatever replaces it in
+# here.
+_STDOUT, _STDERR = 1, 2
 # How often a parent checks whether its job was cancelled [s].
 _LOOK_INTERVAL = 0.2
+# Environment variable with the names of the modules to import beforehand.
+_MODULES_VARIABLE = "CNS_DRAKE_JOB_MODULES"
 
 # A job takes and frees the same arrays thousands of times. The C library would
 # return their memory each time: Dask's workers set it so, and its own guess may
@@ -52,6 +60,13 @@ _ONE_CORE = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1"
 )
 
+if sys.platform == "linux":
+    _context = multiprocessing.get_context("forkserver")
+else:
+    _context = multiprocessing.get_context("spawn")
+# One thread at a time changes the environment.
+_starting = threading.Lock()
+
 
 class JobError(Exception):
     """A job cannot be done; the message gives the reason in one line."""
@@ -61,75 +76,10 @@ class ProcessDiedError(Exception):
     """The process of a job was killed, crashed or was terminated."""
 
 
-class StartedProcess(Protocol):
-    """A process that has begun; `subprocess.Popen` is one."""
-
-    def terminate(self) -> None:
-        """Terminates the process; it may close its files."""
-
-    def kill(self) -> None:
-        """Kills the process."""
-
-    def wait(self, timeout: float | None = None, /) -> int:
-        """Returns its status, that of a signal as a negative number.
-
-        Raises:
-            subprocess.TimeoutExpired: it takes longer [s].
-        """
-
-
-# Starts the process of a pickled job; returns it and what leads to it.
-Start = Callable[[bytes], tuple[Connection, StartedProcess]]
-
-
-def start_interpreter(
-    function: Callable[[int], None],
-) -> tuple[Connection, subprocess.Popen]:
-    """Starts an interpreter that runs a function.
-
-    Args:
-        function: a module's function; its argument is the number of the file
-            descriptor that is connected to this process.
-
-    Returns:
-        The connection to it, and the process. The process has its own session,
-        which Ctrl-C does not reach: the interrupted parent ends its jobs in
-        good order.
-    """
-    # The search path is the parent's, not that of the current folder.
-    code = (
-        "import sys; number, *sys.path[:] = sys.argv[1:]; "
-        f"from {function.__module__} import {function.__name__} as run; "
-        "run(int(number))"
-    )
-    ours, theirs = Pipe()
-    with theirs:  # The pipe then ends with the process.
-        number = theirs.fileno()
-        process = subprocess.Popen(
-            [sys.executable, "-c", code, str(number), *sys.path],
-            env={**_ONE_CORE, **os.environ, **ALLOCATION},
-            pass_fds=[number],
-            stdin=subprocess.DEVNULL,
-            stdout=_STDERR,
-            start_new_session=True,
-        )
-    return ours, process
-
-
-def start_anew(job: bytes) -> tuple[Connection, StartedProcess]:
-    """Starts a job in an interpreter that imports everything anew."""
-    connection, process = start_interpreter(main)
-    # If the process has died already, waiting for its end shows it.
-    with contextlib.suppress(ConnectionError):
-        connection.send_bytes(job)
-    return connection, process
-
-
 def run_process(
     job: bytes,
     on_message: Callable[..., None],
     is_wanted: Callable[[], bool],
-    start: Start = start_anew,
 ) -> None:
     """Runs a job in a process of its own and waits for its end.
 
@@ -137,14 +87,15 @@ def run_process(
         job: a pickled `Step`.
         on_message: takes the job's messages; see `Reporter`.
         is_wanted: called often; the process is ended when it returns False.
-        start: starts the process.
 
     Raises:
         JobError: the job cannot be done.
         ProcessDiedError: its process ended before it was done.
     """
-    ours, process = start(job)
+    ours, theirs = Pipe()
     with ours:
+        with theirs:  # The pipe then ends with the process.
+            process = _start(theirs, job)
         try:
             kind, text = _listen(ours, on_message, is_wanted)
         finally:
@@ -153,6 +104,47 @@ def run_process(
         raise JobError(text)
     if kind != "done":
         raise ProcessDiedError(text or _describe(status))
+
+
+def _start(connection: Connection, job: bytes) -> BaseProcess:
+    """Starts the process of a job.
+
+    Raises:
+        ProcessDiedError: the process that forks has died.
+    """
+    process = _context.Process(target=_work, args=(connection, job))
+    try:
+        with _starting, _environment_of_jobs():
+            process.start()
+    except (EOFError, OSError) as error:
+        raise ProcessDiedError("the process that starts jobs died") from error
+    return process
+
+
+@contextlib.contextmanager
+def _environment_of_jobs() -> Iterator[None]:
+    """Sets what a new interpreter finds in its environment."""
+    modules = [
+        name
+        for name in list(sys.modules)
+        if name.startswith(("cns_drake.", "evaluation."))
+    ]
+    changed = {
+        **{k: os.environ.get(k, v) for k, v in _ONE_CORE.items()},
+        **ALLOCATION,
+        _MODULES_VARIABLE: " ".join(modules),
+    }
+    before = {name: os.environ.get(name) for name in changed}
+    os.environ.update(changed)
+    multiprocessing.set_forkserver_preload([__name__])
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _listen(
@@ -171,14 +163,15 @@ def _listen(
     return "", ""
 
 
-def _end(process: StartedProcess) -> int:
+def _end(process: BaseProcess) -> int:
     """Ends a process and returns its status."""
     process.terminate()
-    try:
-        return process.wait(PATIENCE)
-    except subprocess.TimeoutExpired:
+    process.join(PATIENCE)
+    if process.exitcode is None:
         process.kill()
-        return process.wait()
+        process.join()
+    assert process.exitcode is not None  # It has ended.
+    return process.exitcode
 
 
 def _describe(status: int) -> str:
@@ -193,26 +186,18 @@ def _describe(status: int) -> str:
     )
 
 
-def main(number: int) -> None:
-    """Runs the job that a parent sends; its whole process.
-
-    Args:
-        number: of the file descriptor that leads to the parent.
-    """
-    look_seldom()
-    connection = Connection(number)
-    with contextlib.suppress(EOFError, ConnectionError):
-        work(connection, connection.recv_bytes())
-
-
-def work(connection: Connection, job: bytes) -> None:
-    """Runs a job; the rest of its process.
+def _work(connection: Connection, job: bytes) -> None:
+    """Runs a job; its whole process.
 
     Args:
         connection: leads to the parent.
         job: a pickled `Step`.
     """
     interrupt_on_termination(once=True)
+    # In its own session, which Ctrl-C does not reach: the interrupted parent
+    # ends its jobs in good order.
+    os.setsid()
+    os.dup2(_STDERR, _STDOUT)
 
     def send(*message: object) -> None:
         # If the parent has gone, no process reads the message.
@@ -220,9 +205,7 @@ def work(connection: Connection, job: bytes) -> None:
             connection.send(message)
 
     try:
-        threading.Thread(
-            target=end_with_parent, args=(connection,), daemon=True
-        ).start()
+        threading.Thread(target=end_with_parent, daemon=True).start()
         last = _run(job, Reporter(send))
     except KeyboardInterrupt:
         end_interrupted()
@@ -270,11 +253,33 @@ def nothing_left(step: Step) -> bool:
         return False
 
 
-def end_with_parent(connection: Connection) -> None:
+def end_with_parent() -> None:
     """Ends this process when its parent has ended, even if killed."""
-    # The parent sends nothing more: the next read returns at its end.
-    with contextlib.suppress(OSError):
-        connection.poll(None)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
     os.kill(os.getpid(), signal.SIGTERM)
     threading.Event().wait(PATIENCE)
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _prepare(modules: Iterable[str]) -> None:
+    """Imports modules in the process from which those of jobs are forked."""
+    # Python looks for modules in the current folder first.
+    leave_out_folder(sys.path)
+    look_seldom()
+    os.setsid()
+    for name in modules:
+        # The process of a job reports what fails.
+        with contextlib.suppress(Exception):
+            importlib.import_module(name)
+    with contextlib.suppress(Exception):
+        code_digest(*modules)
+    if compiling := sys.modules.get("cns_drake.base.compiled"):
+        compiling.start_compiler()
+    # Garbage collection would write to memory that the processes share.
+    gc.freeze()
+
+
+if names := os.environ.pop(_MODULES_VARIABLE, None):
+    _prepare(names.split())
