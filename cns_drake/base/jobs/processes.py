@@ -21,6 +21,7 @@ import pickle
 import signal
 import sys
 import threading
+import time
 import traceback
 
 from cns_drake.base.errors import InputError, missing_library, one_line
@@ -43,6 +44,8 @@ PATIENCE = 30.0
 _STDOUT, _STDERR = 1, 2
 # How often a parent checks whether its job was cancelled [s].
 _LOOK_INTERVAL = 0.2
+# How long a killed process may take to disappear [s].
+_DEATH_TIME = 1.0
 # Environment variable with the names of the modules to import beforehand.
 _MODULES_VARIABLE = "CNS_DRAKE_JOB_MODULES"
 
@@ -117,6 +120,8 @@ def _start(connection: Connection, job: bytes) -> BaseProcess:
         with _starting, _environment_of_jobs():
             process.start()
     except (EOFError, OSError) as error:
+        # A new one starts only when the dead one has gone.
+        time.sleep(_DEATH_TIME)
         raise ProcessDiedError("the process that starts jobs died") from error
     return process
 
