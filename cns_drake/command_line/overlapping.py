@@ -9,7 +9,7 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.interrupts import uninterrupted
-from evaluation.command_line.protocol_options import (
+from evaluation.command_line.options import (
     MaxRange,
     PlaceSpacing,
     QuerySpacing,

@@ -10,7 +10,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
 from cns_drake.command_line.options import Jobs, Maps, Output, Scheduler
-from evaluation.command_line.protocol_options import (
+from evaluation.command_line.options import (
     Costs,
     Settings,
     with_protocol,

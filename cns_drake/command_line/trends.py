@@ -16,7 +16,7 @@ from cns_drake.command_line.options import (
     Scheduler,
 )
 from cns_drake.command_line.simulating import family_members
-from evaluation.command_line.protocol_options import Settings, with_protocol
+from evaluation.command_line.options import Settings, with_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
 
 if TYPE_CHECKING:

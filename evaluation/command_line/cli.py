@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
-from evaluation.command_line.changing import tcr
-from evaluation.command_line.ranking_agreement import ranking
-from evaluation.command_line.recognising import pr, scores
+from evaluation.command_line.measuring import pr, ranking, scores, tcr
 from evaluation.command_line.reporting import report, trend
 
 app = terminal.make_program(

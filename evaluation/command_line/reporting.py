@@ -9,13 +9,11 @@ import typer
 
 from cns_drake.base import terminal
 from evaluation.command_line.options import (
+    Costs,
     Jobs,
     LidarName,
     OwnMethods,
     Scheduler,
-)
-from evaluation.command_line.protocol_options import (
-    Costs,
     Settings,
     with_protocol,
 )
