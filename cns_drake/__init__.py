@@ -21,35 +21,33 @@ if TYPE_CHECKING:
     from cns_drake.recording.recorded_topics import recording_topics
     from cns_drake.scenarios.planning import plan_drive
     from cns_drake.scenarios.scenario import Scenario
-    from cns_drake.scenarios.scenario_loading import (
+    from cns_drake.scenarios.scenario_files import (
         load_scenario,
         make_scenario,
     )
     from cns_drake.scene.world import World, load_world
-    from cns_drake.sensors.beam_pattern import BeamPattern
-    from cns_drake.sensors.free_patterns import (
-        DirectionPattern,
-        make_flash_pattern,
-    )
-    from cns_drake.sensors.imu import Imu, add_imu
-    from cns_drake.sensors.imu_noise import ImuNoise
-    from cns_drake.sensors.lidar import Lidar
-    from cns_drake.sensors.lidar_adding import add_lidar
-    from cns_drake.sensors.lidar_presets import LIDAR_PRESETS, make_beam_pattern
-    from cns_drake.sensors.lidar_view import add_lidar_view
-    from cns_drake.sensors.livox_patterns import (
+    from cns_drake.sensors.imu.imu import Imu, add_imu
+    from cns_drake.sensors.imu.noise import ImuNoise
+    from cns_drake.sensors.lidar.adding import add_lidar, add_lidar_view
+    from cns_drake.sensors.lidar.lidar import Lidar
+    from cns_drake.sensors.lidar.livox_patterns import (
         NoddingPattern,
         RosettePattern,
     )
-    from cns_drake.sensors.measurement import MeasurementModel
-    from cns_drake.sensors.odometry import Odometry, add_odometry
+    from cns_drake.sensors.lidar.measurement import MeasurementModel
+    from cns_drake.sensors.lidar.patterns import (
+        BeamPattern,
+        DirectionPattern,
+        SpinningPattern,
+        make_flash_pattern,
+    )
+    from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
+    from cns_drake.sensors.odometry.odometry import Odometry, add_odometry
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
     from cns_drake.sensors.returns.weather import Weather
-    from cns_drake.sensors.spinning_pattern import SpinningPattern
-    from cns_drake.simulation.run_progress import Run
-    from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
+    from cns_drake.simulation.loaded_drive import plan_scenario_traffic
     from cns_drake.simulation.sensor_recording import add_mcap_recorder
-    from cns_drake.simulation.simulation import simulate
+    from cns_drake.simulation.simulation import Run, simulate
     from cns_drake.simulation.station import make_station
     from cns_drake.traffic.traffic_adding import add_traffic
 
@@ -99,7 +97,7 @@ __all__ = [
 # Module -> the public names it defines.
 _HOMES = {
     "cns_drake.base.errors": ("InputError",),
-    "cns_drake.command_line.drive_script": ("run_script", "run_drive"),
+    "cns_drake.command_line.drive_script": ("run_drive", "run_script"),
     "cns_drake.motion.vehicle_motion": ("VehicleMotion",),
     "cns_drake.pictures.static_page": ("save_meshcat_page",),
     "cns_drake.recording.bag_writer": ("BagWriter",),
@@ -107,29 +105,30 @@ _HOMES = {
     "cns_drake.recording.recorded_topics": ("recording_topics",),
     "cns_drake.scenarios.planning": ("plan_drive",),
     "cns_drake.scenarios.scenario": ("Scenario",),
-    "cns_drake.scenarios.scenario_loading": ("load_scenario", "make_scenario"),
-    "cns_drake.scene.world": ("World", "load_world"),
-    "cns_drake.sensors.beam_pattern": ("BeamPattern",),
-    "cns_drake.sensors.free_patterns": (
+    "cns_drake.scenarios.scenario_files": ("load_scenario", "make_scenario"),
+    "cns_drake.scene.world": ("load_world", "World"),
+    "cns_drake.sensors.imu.imu": ("add_imu", "Imu"),
+    "cns_drake.sensors.imu.noise": ("ImuNoise",),
+    "cns_drake.sensors.lidar.adding": ("add_lidar", "add_lidar_view"),
+    "cns_drake.sensors.lidar.lidar": ("Lidar",),
+    "cns_drake.sensors.lidar.livox_patterns": (
+        "NoddingPattern",
+        "RosettePattern",
+    ),
+    "cns_drake.sensors.lidar.measurement": ("MeasurementModel",),
+    "cns_drake.sensors.lidar.patterns": (
+        "BeamPattern",
         "DirectionPattern",
         "make_flash_pattern",
+        "SpinningPattern",
     ),
-    "cns_drake.sensors.imu": ("Imu", "add_imu"),
-    "cns_drake.sensors.imu_noise": ("ImuNoise",),
-    "cns_drake.sensors.lidar": ("Lidar",),
-    "cns_drake.sensors.lidar_adding": ("add_lidar",),
-    "cns_drake.sensors.lidar_presets": ("LIDAR_PRESETS", "make_beam_pattern"),
-    "cns_drake.sensors.lidar_view": ("add_lidar_view",),
-    "cns_drake.sensors.livox_patterns": ("NoddingPattern", "RosettePattern"),
-    "cns_drake.sensors.measurement": ("MeasurementModel",),
-    "cns_drake.sensors.odometry": ("Odometry", "add_odometry"),
+    "cns_drake.sensors.lidar.presets": ("LIDAR_PRESETS", "make_beam_pattern"),
+    "cns_drake.sensors.odometry.odometry": ("add_odometry", "Odometry"),
     "cns_drake.sensors.returns.calibrated": ("CalibratedReturns",),
     "cns_drake.sensors.returns.weather": ("Weather",),
-    "cns_drake.sensors.spinning_pattern": ("SpinningPattern",),
+    "cns_drake.simulation.loaded_drive": ("plan_scenario_traffic",),
     "cns_drake.simulation.sensor_recording": ("add_mcap_recorder",),
-    "cns_drake.simulation.run_progress": ("Run",),
-    "cns_drake.simulation.simulation": ("simulate",),
-    "cns_drake.simulation.scenario_traffic": ("plan_scenario_traffic",),
+    "cns_drake.simulation.simulation": ("Run", "simulate"),
     "cns_drake.simulation.station": ("make_station",),
     "cns_drake.traffic.traffic_adding": ("add_traffic",),
 }

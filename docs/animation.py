@@ -23,8 +23,7 @@ from cns_drake.base.terminal import track
 from cns_drake.pictures.stage_scene import StageScene, View
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import world_file
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario, world_file
 from cns_drake.simulation.simulation import simulate
 from evaluation import open_drive
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import welch
 
 from cns_drake.motion.road_profile import RoadProfile
-from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
+from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 
 # Kalibr's example of an ADIS16448, for three hours.
 _NOISE = ImuNoise(

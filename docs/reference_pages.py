@@ -25,14 +25,15 @@ from cns_drake.motion.speeds import Speeds
 from cns_drake.roads import road_schema
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.scenarios import variation
-from cns_drake.scenarios.imu_config import ImuConfig
-from cns_drake.scenarios.lidar_config import LidarConfig
-from cns_drake.scenarios.odometry_config import OdometryConfig
-from cns_drake.scenarios.ride_config import RideConfig
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.traffic_config import TrafficConfig
-from cns_drake.scenarios.transient_config import TransientConfig
-from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.scenarios.scenario import (
+    RideConfig,
+    Scenario,
+    TrafficConfig,
+    TransientConfig,
+)
+from cns_drake.sensors.imu.config import ImuConfig
+from cns_drake.sensors.lidar.config import LidarConfig, WeatherConfig
+from cns_drake.sensors.odometry.config import OdometryConfig
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from cns_drake import Scenario, load_scenario, make_station
-from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.sensors.lidar.config import WeatherConfig
 
 WEATHER = {
     "clear": WeatherConfig(),

@@ -81,7 +81,7 @@ def short_recording(small_map, tmp_path_factory):
     """Folder of a recording of 40 frames with the default LiDAR."""
     from helpers.small_map import scenario_values
 
-    from cns_drake.scenarios.scenario_loading import make_scenario
+    from cns_drake.scenarios.scenario_files import make_scenario
     from cns_drake.simulation.simulation import simulate
 
     output = tmp_path_factory.mktemp("recordings")

@@ -94,7 +94,7 @@ def _calibrate(
 ) -> None:
     with uninterrupted():  # Only --calibrate needs the evaluation.
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.scenarios.scenario_loading import load_scenario
+        from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.studies.knob_effects import effect_lines, knob_effects
 
     first, last = (

@@ -48,8 +48,8 @@ def frame_progress(
 
 
 if TYPE_CHECKING:
-    from cns_drake.scenarios.weather_config import WeatherConfig
-    from cns_drake.simulation.run_progress import Run
+    from cns_drake.sensors.lidar.config import WeatherConfig
+    from cns_drake.simulation.simulation import Run
 
 
 def run_drive(
@@ -94,8 +94,7 @@ def run_drive(
     """
     with uninterrupted():  # Slow to import, not needed for `--help`.
         from cns_drake.base.process import num_cores
-        from cns_drake.scenarios.rates import frame_period
-        from cns_drake.scenarios.scenario_loading import load_scenario
+        from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.simulation import simulate
 
     scenario = load_scenario(name_or_file)
@@ -111,7 +110,7 @@ def run_drive(
         scenario = scenario.model_copy(update={"frames": frames})
     with show_progress() as progress:
         task = progress.add_task(scenario.name, total=None, note="loading")
-        on_frame = frame_progress(progress, task, frame_period(scenario.lidars))
+        on_frame = frame_progress(progress, task, scenario.frame_period)
         run = simulate(
             scenario,
             output,

@@ -37,7 +37,7 @@ def overlap(
     """
     with uninterrupted():
         from cns_drake.base.files import make_folder
-        from cns_drake.scenarios.scenario_loading import load_scenario
+        from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.simulated_drive import DriveSimulation
         from cns_drake.studies.exact_overlap import exact_overlaps
         from evaluation.recognition.overlap_truth import (

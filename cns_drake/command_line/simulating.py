@@ -69,7 +69,7 @@ def family_members(
 
 
 if TYPE_CHECKING:
-    from cns_drake.scenarios.weather_config import WeatherConfig
+    from cns_drake.sensors.lidar.config import WeatherConfig
 
 
 class ReturnsName(str, Enum):
@@ -109,7 +109,7 @@ def choose_returns(
         return None if returns is None else _KINDS[returns], None
     from pydantic import ValidationError
 
-    from cns_drake.scenarios.weather_config import WeatherConfig
+    from cns_drake.sensors.lidar.config import WeatherConfig
 
     if returns is ReturnsName.IDEAL:
         raise InputError("--returns ideal: weather needs calibrated returns")
@@ -238,11 +238,14 @@ def scan(
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
 
-        from cns_drake.scenarios.lidar_config import make_lidar_config
-        from cns_drake.scenarios.sensor_making import make_pattern, make_returns
-        from cns_drake.scenarios.weather_config import WeatherConfig
         from cns_drake.scene.surfaces import LARGEST_SIZE
         from cns_drake.scene.world import load_world
+        from cns_drake.sensors.lidar.config import (
+            WeatherConfig,
+            make_lidar_config,
+            make_pattern,
+            make_returns,
+        )
         from cns_drake.simulation.scanning import (
             check_ending,
             save_scan,
@@ -299,7 +302,7 @@ def generate(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.scenarios.scenario_loading import load_scenario
+        from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.scenarios.shipped import recordable_drives
         from cns_drake.studies.recording_jobs import record_all
 

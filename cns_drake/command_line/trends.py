@@ -55,7 +55,7 @@ def trend(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.scenarios.scenario_loading import load_scenario
+        from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.simulated_drive import DriveSimulation
         from evaluation.study.chosen_methods import choose_methods
         from evaluation.study.trend import write_trend

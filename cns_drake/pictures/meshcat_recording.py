@@ -12,7 +12,6 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
     Context,
     EventStatus,
-    InputPort,
     LeafSystem,
 )
 
@@ -22,7 +21,6 @@ from cns_drake.pictures.drive_page import (
     make_drive_page,
     moving_frames,
 )
-from cns_drake.ray_casting.moving_groups import NOTHING_KNOWN, KnownPoses
 from cns_drake.scene.world import World
 
 # Together they keep the page of any drive below 25 MB.
@@ -45,7 +43,6 @@ class MeshcatRecorder(LeafSystem):
         - specific_force
         - angular_velocity
         - <lidar>_scan (one for each LiDAR)
-        - frame_poses (see `take_poses`)
 
     Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is
     an `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I
@@ -111,8 +108,6 @@ class MeshcatRecorder(LeafSystem):
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
             for name in self._X_BSs
         }
-        self._rows: Mapping[FrameId, int] = {}
-        self._frame_poses: InputPort | None = None
         self.DeclarePeriodicPublishEvent(
             period_sec=period, offset_sec=0.0, publish=self._publish
         )
@@ -129,20 +124,6 @@ class MeshcatRecorder(LeafSystem):
         self.drive.X_WFs[leading] = []
         self.drive.names[leading] = name
         self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
-
-    def take_poses(self, rows: Mapping[FrameId, int]) -> None:
-        """Declares the port `frame_poses`, that of a `FramePoses`.
-
-        Poses come from there then: the SceneGraph would compute those of all
-        geometry.
-
-        Args:
-            rows: frame -> its row in the port's (M, 4, 4) array.
-        """
-        self._rows = rows
-        self._frame_poses = self.DeclareAbstractInputPort(
-            "frame_poses", Value(np.zeros((0, 4, 4)))
-        )
 
     def save(self, path: Path, *, title: str = "cns-drake") -> None:
         """Writes the page of the drive up to now.
@@ -170,11 +151,8 @@ class MeshcatRecorder(LeafSystem):
         if len(self.drive.X_WBs) == self._num_frames:
             return EventStatus.DidNothing()
         query_object = self._geometry_query.Eval(context)
-        known = NOTHING_KNOWN
-        if self._frame_poses is not None:
-            known = KnownPoses(self._rows, self._frame_poses.Eval(context))
         for frame_id, X_WFs in self.drive.X_WFs.items():
-            X_WF = known.find(frame_id, query_object.GetPoseInWorld)
+            X_WF = query_object.GetPoseInWorld(frame_id)
             # Copies: the values of the ports may be overwritten at the next
             # step.
             X_WFs.append(RigidTransform(X_WF))

@@ -22,7 +22,7 @@ from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 # As many pixels as a panel has: width and height of a view, and the side of a
 # picture from above.

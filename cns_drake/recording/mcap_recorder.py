@@ -14,8 +14,6 @@ from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.imu_ports import ImuPorts, ImuSamplesPort
-from cns_drake.recording.motion_ports import MotionPorts
 from cns_drake.recording.recorded_topics import (
     IMU_TOPIC,
     ODOMETRY_TOPIC,
@@ -24,13 +22,18 @@ from cns_drake.recording.recorded_topics import (
     recording_topics,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.recording.scene_ports import (
+from cns_drake.recording.schedule import Schedule, make_schedule
+from cns_drake.recording.sensor_ports import (
     CameraPorts,
+    ImuPorts,
+    ImuSamplesPort,
+    MotionPorts,
     ObjectsPort,
     RecordedCamera,
+    RecordedSensor,
     ScanPort,
+    SensorPort,
 )
-from cns_drake.recording.schedule import Schedule, make_schedule
 
 # Events of a periodic schedule come at multiples of the period. Their times
 # differ from a tick's only by rounding, at most this [ticks].
@@ -55,6 +58,7 @@ class McapRecorder(LeafSystem):
         - <camera>_depth
         - <camera>_label
         - <camera>_pose
+        - <sensor> (one for each further sensor)
 
     Frames: map W, vehicle B (`base_link`), imu I, LiDAR S, camera C.
 
@@ -97,6 +101,7 @@ class McapRecorder(LeafSystem):
         cameras: Mapping[str, RecordedCamera] | None = None,
         period: float | None = None,
         schedule: Schedule | None = None,
+        further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
         imu_variances: tuple[float, float] = (0.0, 0.0),
         with_imu_samples: bool = False,
@@ -114,6 +119,7 @@ class McapRecorder(LeafSystem):
             cameras: camera name -> camera.
             period: time between frames [s], if all sensors share it.
             schedule: the ticks of each topic, by name, if they do not.
+            further: name -> further sensor.
             layouts: LiDAR name -> layout of its points (see
                 `point_layouts`), `cns` unless given.
             imu_variances: of specific force [m^2/s^4] and angular velocity
@@ -131,6 +137,8 @@ class McapRecorder(LeafSystem):
         if X_BI is not None:
             self._X_BCs[messages.IMU_FRAME] = X_BI
         self._X_BI = X_BI
+        further = further or {}
+        self._X_BCs |= {name: sensor.X_BC for name, sensor in further.items()}
         cameras = cameras or {}
         layouts = layouts or {}
         self._start_ns = start_ns
@@ -140,7 +148,10 @@ class McapRecorder(LeafSystem):
             raise ValueError("a recorder needs either a period or a schedule")
         if period is not None:
             topics = recording_topics(
-                X_BSs, camera_names=cameras, layouts=layouts
+                X_BSs,
+                camera_names=cameras,
+                layouts=layouts,
+                further=[sensor.topic for sensor in further.values()],
             )
             schedule = make_schedule({topic.name: period for topic in topics})
         assert schedule is not None
@@ -154,7 +165,9 @@ class McapRecorder(LeafSystem):
             self._imu_samples = ImuSamplesPort(self, imu_variances)
         else:
             self._imu = ImuPorts(self, imu_variances)
-        self._scenery: list[ScanPort | CameraPorts | ObjectsPort] = []
+        self._scenery: list[
+            ScanPort | CameraPorts | ObjectsPort | SensorPort
+        ] = []
         if with_objects:
             self._scenery.append(ObjectsPort(self))
         for name in X_BSs:
@@ -166,6 +179,8 @@ class McapRecorder(LeafSystem):
         for name, camera in cameras.items():
             self._scenery.append(CameraPorts(self, name, camera))
             self._motion.add(self, name, camera.X_BC)
+        for name, sensor in further.items():
+            self._scenery.append(SensorPort(self, name, sensor))
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
         self._declare_events()
         self.DeclareForcedPublishEvent(self._publish)

@@ -29,16 +29,18 @@ def recording_topics(
     with_odometry: bool = True,
     layouts: Mapping[str, str] | None = None,
     with_objects: bool = False,
+    further: Iterable[Topic] = (),
 ) -> tuple[Topic, ...]:
     """Returns the topics of a recording.
 
     Args:
-        lidar_names: of its LiDARs.
-        camera_names: of its cameras.
+        lidar_names: names of its LiDARs.
+        camera_names: names of its cameras.
         with_imu: whether it has an IMU.
         with_odometry: whether it has odometry.
         layouts: LiDAR name -> layout of its points, if not `cns`.
         with_objects: whether it has boxes of moving objects.
+        further: topics of further sensors.
 
     Example:
         from cns_drake import recording_topics
@@ -56,6 +58,7 @@ def recording_topics(
     topics += [IMU_TOPIC] if with_imu else []
     topics += [ODOMETRY_TOPIC] if with_odometry else []
     topics += OBJECT_TOPICS if with_objects else []
+    topics += further
     return (*topics, TF_TOPIC, TF_STATIC_TOPIC)
 
 

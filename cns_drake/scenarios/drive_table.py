@@ -12,6 +12,7 @@ import csv
 from dataclasses import astuple, dataclass, fields
 import io
 from pathlib import Path
+from typing import Any
 import zlib
 
 from cns_drake.base.csv_files import read_records
@@ -22,13 +23,17 @@ from cns_drake.base.files import (
     write_part,
 )
 from cns_drake.base.map_folder import MapFolder, drive_name
+from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
     map_folder,
+    read_scenario_file,
     world_file,
 )
-from cns_drake.scenarios.scenario_loading import read_scenario_file
+
+# Types of columns, by the names that dataclasses give them.
+_TYPES: dict[Any, Callable] = {"str": str, "int": int, "float": float}
 
 
 @dataclass(frozen=True)
@@ -141,22 +146,11 @@ def _read(path: Path) -> list[DriveRow]:
 
     The rows of a bad table are measured anew.
     """
-    names = [field.name for field in fields(DriveRow)]
+    columns = fields(DriveRow)
     try:
         return [
-            DriveRow(
-                sequence=row["sequence"],
-                map=row["map"],
-                stage=row["stage"],
-                title=row["title"],
-                checksum=row["checksum"],
-                length=float(row["length"]),
-                duration=float(row["duration"]),
-                frames=int(row["frames"]),
-                structures=int(row["structures"]),
-                triangles=int(row["triangles"]),
-            )
-            for _, row in read_records(path, names)
+            DriveRow(**{f.name: _TYPES[f.type](row[f.name]) for f in columns})
+            for _, row in read_records(path, [f.name for f in columns])
         ]
     except (InputError, ValueError):
         return []
@@ -166,10 +160,11 @@ def _measure(
     scenario: Scenario, checksum: str, size: tuple[int, int] | None
 ) -> DriveRow:
     # Slow to import, and rarely needed.
-    from cns_drake.scenarios.drive_facts import drive_facts
+    from cns_drake.scenarios.planning import plan_drive
 
     check_files(scenario)
-    facts = drive_facts(scenario)
+    trajectory = plan_drive(scenario)
+    frames = frames_within(trajectory.duration, scenario.frame_period)
     structures, triangles = size or _size(scenario)
     return DriveRow(
         sequence=scenario.name,
@@ -177,9 +172,9 @@ def _measure(
         stage=str(scenario.stage),
         title=scenario.title,
         checksum=checksum,
-        length=round(facts.length, 1),
-        duration=round(facts.duration, 2),
-        frames=facts.frames,
+        length=round(trajectory.length, 1),
+        duration=round(trajectory.duration, 2),
+        frames=min(frames, scenario.frames or frames),
         structures=structures,
         triangles=triangles,
     )

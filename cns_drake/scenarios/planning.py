@@ -16,7 +16,6 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
-from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
@@ -85,9 +84,7 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
     Raises:
         InputError: `frames` is greater than the drive has.
     """
-    available = frames_within(
-        trajectory.duration, frame_period(scenario.lidars)
-    )
+    available = frames_within(trajectory.duration, scenario.frame_period)
     if scenario.frames is not None and scenario.frames > available:
         raise InputError(
             f"{scenario.source}: frames: {scenario.frames} is too many: the "

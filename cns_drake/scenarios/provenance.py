@@ -11,11 +11,11 @@ import platform
 from cns_drake.base.files import user_errors
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__, installed_versions
-from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 from cns_drake.scene.referenced_files import FileWatch, referenced_files
+from cns_drake.sensors.imu.config import KALIBR_FILE
 
 # Packages that can influence a message's bytes.
 _PACKAGES = (
@@ -95,7 +95,7 @@ def digest_inputs(
     }
     if watch and scenario.imu.kalibr is not None:
         watch.take_down(str(scenario.imu.kalibr))
-    kalibr = describe_kalibr(scenario)
+    kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
     if kalibr is not None:
         text = json.dumps(kalibr).encode()
         digests["kalibr"] = hashlib.sha256(text).hexdigest()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import operator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
     PrivateAttr,
+    StringConstraints,
     ValidationError,
     ValidationInfo,
     field_validator,
@@ -15,26 +17,146 @@ from pydantic import (
 )
 
 from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.motion.speeds import Speeds
 from cns_drake.roads.route import Route
-from cns_drake.scenarios.alternatives import (
-    given_instead_of,
-    given_with,
-    never_given_with,
-)
-from cns_drake.scenarios.imu_config import ImuConfig
-from cns_drake.scenarios.lidar_config import LidarConfig
-from cns_drake.scenarios.odometry_config import OdometryConfig
-from cns_drake.scenarios.rates import check_rate, fastest_rate
-from cns_drake.scenarios.ride_config import RideConfig
-from cns_drake.scenarios.section import Name, Section, field_off_by_default
-from cns_drake.scenarios.traffic_config import TrafficConfig
-from cns_drake.scenarios.transient_config import TransientConfig
-from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.sensors.imu.config import ImuConfig
+from cns_drake.sensors.lidar.config import LidarConfig, WeatherConfig
+from cns_drake.sensors.odometry.config import OdometryConfig
 from cns_drake.sensors.returns.echo_choice import Echoes
+from cns_drake.sensors.sensor_config import (
+    Section,
+    SensorConfig,
+    check_rate,
+    field_off_by_default,
+)
 
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 # Defaults are checked as well: another field may require one.
 _Optional = Field(default=None, validate_default=True)
+# More vehicles or walkers than any map can hold.
+_MOST_TRAFFIC = 2000
+
+
+def _not_both(one: bool, other: bool) -> bool:
+    return not (one and other)
+
+
+# Field -> earlier fields, whether the two fit by what is given, and the fault
+# if they do not.
+_ALTERNATIVES: dict[str, tuple[tuple[str, Any, str], ...]] = {
+    "stage": (("map", operator.eq, "give a map and its stage together"),),
+    "world": (
+        ("map", operator.ne, "give either a map and its stage, or a world"),
+    ),
+    "route": (
+        ("world", _not_both, "a world has no roads, give waypoints instead"),
+    ),
+    "waypoints": (
+        ("route", operator.ne, "give either a route or waypoints"),
+        (
+            "aside",
+            _not_both,
+            "aside is for a route only; with waypoints, move these instead",
+        ),
+    ),
+    "u_turns": (
+        (
+            "route",
+            _not_both,
+            "is for waypoints only; a route turns round where the next leg "
+            "leads back on its road",
+        ),
+    ),
+}
+
+
+class RideConfig(Section):
+    """The motion of the vehicle's body against its path.
+
+    Attributes:
+        roughness: class of the road after ISO 8608, from `A` (new) to `E` (very
+            poor).
+        seed: seed of the road's profile.
+    """
+
+    roughness: Literal["none", RoughnessClass] = "none"
+    seed: int = Field(default=1, ge=0)
+
+    def profile(self) -> RoadProfile | None:
+        """Returns the road's profile; None if the vehicle is rigid."""
+        if self.roughness == "none":
+            return None
+        return RoadProfile(self.roughness, self.seed)
+
+
+class TrafficConfig(Section):
+    """Vehicles and walkers that move while a drive is recorded.
+
+    Attributes:
+        vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
+            that drive along the map's roads.
+        walkers: number of people that walk on its sidewalks and crossings.
+        seed: seed of their kinds, starts and ways.
+        fcd: a trace of SUMO (floating-car data) to play instead; then nothing
+            else moves.
+    """
+
+    vehicles: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
+    walkers: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
+    seed: int = Field(default=1, ge=0)
+    fcd: str | None = field_off_by_default(None)
+
+    @model_validator(mode="after")
+    def _check_fcd(self) -> TrafficConfig:
+        if self.fcd is not None and (self.vehicles or self.walkers):
+            raise ValueError(
+                "fcd: the trace replaces other traffic; leave out vehicles "
+                "and walkers"
+            )
+        return self
+
+    @property
+    def is_off(self) -> bool:
+        """Whether there is no traffic."""
+        return self.fcd is None and self.vehicles == self.walkers == 0
+
+
+class TransientConfig(Section):
+    """Changes of a city that no building plan lists.
+
+    The effect of each switch depends on the seed and on the names of
+    structures, not on the other switches.
+
+    Attributes:
+        seed: seed of all draws.
+        parked_cars: part of the parked cars that have left (three in ten of
+            them), stand elsewhere in their bay (two), or have another in their
+            place.
+        leaves: part of the leaves that is left on crowns, needles included;
+            wood stays; a shrub without wood keeps a tenth, as twigs.
+        snow: depth of the snow on surfaces that face the sky within 120 m of
+            the drive; roads are cleared, with banks along their kerbs [m].
+        scaffolds: part of the fronts within 30 m of the drive that stand behind
+            a scaffold, four in ten of them with a net.
+        works: part of the stretches of kerb within 30 m of the drive with
+            fences, skips or diggers beside the road, and a new kerb stone 0.3 m
+            into it.
+        furniture: part of poles, lamps and signs that were replaced within 2 m.
+    """
+
+    seed: int = Field(default=1, ge=0)
+    parked_cars: float = Field(default=0.0, ge=0.0, le=1.0)
+    leaves: float = Field(default=1.0, ge=0.0, le=1.0)
+    snow: float = Field(default=0.0, ge=0.0, le=1.0)
+    scaffolds: float = Field(default=0.0, ge=0.0, le=1.0)
+    works: float = Field(default=0.0, ge=0.0, le=1.0)
+    furniture: float = Field(default=0.0, ge=0.0, le=1.0)
+
+    @property
+    def is_off(self) -> bool:
+        """Whether nothing changes."""
+        return self == TransientConfig(seed=self.seed)
 
 
 class Scenario(Section):
@@ -79,38 +201,14 @@ class Scenario(Section):
 
     name: Name
     map: str | None = None
-    stage: Annotated[
-        Name | None, given_with("map", "give a map and its stage together")
-    ] = _Optional
-    world: Annotated[
-        str | None,
-        given_instead_of("map", "give either a map and its stage, or a world"),
-    ] = _Optional
+    stage: Name | None = _Optional
+    world: str | None = _Optional
     without: tuple[str, ...] = ()
     title: str = ""
-    route: Annotated[
-        Route | None,
-        never_given_with(
-            "world", "a world has no roads, give waypoints instead"
-        ),
-    ] = None
+    route: Route | None = None
     aside: float = Field(default=0.0, ge=-3.0, le=3.0)
-    waypoints: Annotated[
-        str | None,
-        given_instead_of("route", "give either a route or waypoints"),
-        never_given_with(
-            "aside",
-            "aside is for a route only; with waypoints, move these instead",
-        ),
-    ] = _Optional
-    u_turns: Annotated[
-        bool,
-        never_given_with(
-            "route",
-            "is for waypoints only; a route turns round where the next leg "
-            "leads back on its road",
-        ),
-    ] = False
+    waypoints: str | None = _Optional
+    u_turns: bool = False
     speeds: Speeds
     ride: RideConfig = field_off_by_default(RideConfig())
     traffic: TrafficConfig = field_off_by_default(TrafficConfig())
@@ -129,6 +227,17 @@ class Scenario(Section):
     # The file of the scenario.
     _file: Path | None = PrivateAttr(None)
 
+    @field_validator(*_ALTERNATIVES)
+    @classmethod
+    def _check_alternatives(cls, value: Any, info: ValidationInfo) -> Any:
+        for other, fits, fault in _ALTERNATIVES[str(info.field_name)]:
+            # An invalid earlier field has its own error.
+            if other in info.data and not fits(
+                _is_given(value), _is_given(info.data[other])
+            ):
+                raise ValueError(fault)
+        return value
+
     @field_validator("lidars")
     @classmethod
     def _check_frames_differ(cls, lidars: dict) -> dict:
@@ -141,7 +250,7 @@ class Scenario(Section):
     @classmethod
     def _check_imu_rate(cls, imu: ImuConfig, info: ValidationInfo) -> ImuConfig:
         if imu.rate is not None and "lidars" in info.data:
-            check_rate(imu.rate, fastest_rate(info.data["lidars"]))
+            check_rate(imu.rate, _fastest(info.data["lidars"]))
         return imu
 
     @field_validator("odometry")
@@ -151,9 +260,18 @@ class Scenario(Section):
     ) -> OdometryConfig:
         if odometry.rate is not None and "lidars" in info.data:
             # Every scan needs its own pose.
-            fastest = fastest_rate(info.data["lidars"])
+            fastest = _fastest(info.data["lidars"])
             check_rate(odometry.rate, fastest, multiple_of=fastest)
         return odometry
+
+    @model_validator(mode="after")
+    def _check_further_sensors(self) -> Scenario:
+        for name, sensor in self.further_sensors.items():
+            if name in self.lidars:
+                raise ValueError(f"'{name}' is the name of another frame")
+            if sensor.rate is not None:
+                check_rate(sensor.rate, self.fastest_rate)
+        return self
 
     @model_validator(mode="after")
     def _check_weather(self) -> Scenario:
@@ -175,6 +293,24 @@ class Scenario(Section):
     def source(self) -> str:
         """The beginning of errors: the scenario's file, or else its name."""
         return str(self._file or self.name)
+
+    @property
+    def fastest_rate(self) -> int:
+        """Turns per second of the fastest LiDAR."""
+        return _fastest(self.lidars)
+
+    @property
+    def frame_period(self) -> float:
+        """Time between frames, the scans of the first LiDAR [s]."""
+        return 1.0 / next(iter(self.lidars.values())).rate
+
+    @property
+    def further_sensors(self) -> dict[str, SensorConfig]:
+        """Sensors besides LiDARs, IMU and odometry, by the field's name."""
+        values = (
+            (name, getattr(self, name)) for name in type(self).model_fields
+        )
+        return {n: one for n, one in values if isinstance(one, SensorConfig)}
 
     def with_returns(
         self,
@@ -243,3 +379,12 @@ class Scenario(Section):
             for name, config in self.lidars.items()
         }
         return self.model_copy(update={"lidars": lidars})
+
+
+def _fastest(lidars: dict[str, LidarConfig]) -> int:
+    return max(config.rate for config in lidars.values())
+
+
+def _is_given(value: object) -> bool:
+    """Returns whether a value is neither None, False nor zero."""
+    return value is not None and value != 0

@@ -1,12 +1,17 @@
-"""The places of the shipped worlds."""
+"""The places of the shipped worlds, which a wheel contains as one archive."""
 
 from __future__ import annotations
 
 import functools
+import hashlib
 from pathlib import Path
+import shutil
+import tarfile
+import tempfile
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import cache_folder
 from cns_drake.base.map_folder import MapFolder, drive_name
-from cns_drake.scenarios.worlds_archive import unpacked
 
 
 @functools.cache
@@ -59,3 +64,48 @@ def recordable_drives() -> dict[str, Path]:
         for folder in shipped_maps().values()
         for path in MapFolder(folder).recordable_drives()
     }
+
+
+def unpacked(archive: Path) -> Path:
+    """Returns a folder with the files of an archive; it is unpacked once.
+
+    The folder is in the user's cache. Its name has a digest of the archive, so
+    that each release has its own. Processes may call this side by side.
+
+    Args:
+        archive: a tar file, compressed in any way.
+
+    Raises:
+        InputError: if the cache cannot be written.
+    """
+    digest = hashlib.sha256(archive.read_bytes()).hexdigest()[:16]
+    folder = cache_folder() / f"{archive.name.partition('.')[0]}-{digest}"
+    if not folder.is_dir():
+        try:
+            _unpack(archive, folder)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: {error.strerror or error}; the shipped worlds are "
+                "unpacked there: name another folder in XDG_CACHE_HOME"
+            ) from error
+    return folder
+
+
+def _unpack(archive: Path, folder: Path) -> None:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
+    try:
+        with tarfile.open(archive) as tar:
+            # Python 3.11.2, which Debian 12 has, lacks filters.
+            tar.extraction_filter = getattr(
+                tarfile, "data_filter", lambda member, _: member
+            )
+            tar.extractall(part)
+        part.chmod(0o755)
+        try:
+            part.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # Else another process was faster.
+                raise
+    finally:
+        shutil.rmtree(part, ignore_errors=True)

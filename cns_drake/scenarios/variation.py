@@ -42,19 +42,18 @@ from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route
 from cns_drake.roads.route_drawing import draw_route
-from cns_drake.scenarios.imu_config import ImuConfig
-from cns_drake.scenarios.lidar_config import LidarConfig
-from cns_drake.scenarios.ride_config import RideConfig
-from cns_drake.scenarios.scattered_loss import draw_losses, is_on_a_lot
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario import RideConfig, Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
+    find_files,
+    load_scenario,
     map_folder,
     world_file,
 )
-from cns_drake.scenarios.scenario_loading import find_files, load_scenario
 from cns_drake.scenarios.shipped import shipped_drives
 from cns_drake.scene.world import load_world, structures_in
+from cns_drake.sensors.imu.config import ImuConfig
+from cns_drake.sensors.lidar.config import LidarConfig
 
 # Tags of structures that can be missing; streets, ground and furniture stay.
 _REMOVABLE = ("building", "vegetation")
@@ -408,3 +407,41 @@ def _decay_order(
     low, high = xy.min(axis=0), xy.max(axis=0)
     distance = np.linalg.norm(xy - rng.uniform(low, high), axis=1)
     return [rows[k]["name"] for k in np.argsort(distance, kind="stable")]
+
+
+def is_on_a_lot(row: Mapping[str, str]) -> bool:
+    """Returns whether a structure occupies a lot only until it is built on."""
+    tags = (row.get("tags") or "").split()
+    return "_lot_" in row["name"] and "lot" in tags
+
+
+def draw_losses(
+    table: Path, parts: Mapping[str, float], seed: int, source: object
+) -> frozenset[str]:
+    """Draws the missing structures, each class independently.
+
+    A greater part includes all structures of a smaller one.
+
+    Args:
+        table: of all structures.
+        parts: class -> missing part of its structures, 0 to 1.
+        seed: of the draw.
+        source: the file that errors name.
+
+    Raises:
+        InputError: the table cannot be read or has no structure of a class.
+    """
+    rows = [
+        row
+        for _, row in read_records(table, ("name", "class"))
+        if not is_on_a_lot(row)
+    ]
+    missing: set[str] = set()
+    for kind, part in parts.items():
+        names = sorted(row["name"] for row in rows if row["class"] == kind)
+        if not names:
+            raise InputError(f"{source}: scattered: no {kind!r} in {table}")
+        rng = np.random.default_rng([seed, *kind.encode()])
+        order = rng.permutation(len(names))
+        missing.update(names[k] for k in order[: round(part * len(names))])
+    return frozenset(missing)

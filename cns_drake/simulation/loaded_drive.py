@@ -1,33 +1,51 @@
-"""A scenario, loaded and ready for simulation."""
+"""A scenario with all that its simulation needs: plan, stage, traffic."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
+import numpy as np
 from pydrake.math import RigidTransform
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.recording.schedule import frames_within
+from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
+from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import (
     digest_inputs,
     recording_fingerprint,
 )
-from cns_drake.scenarios.rates import frame_period
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario import Scenario, TrafficConfig
 from cns_drake.scenarios.scenario_files import (
     check_files,
+    map_folder,
+    world_file,
 )
-from cns_drake.scenarios.sensor_making import sensor_pose
+from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.referenced_files import FileWatch
-from cns_drake.scene.world import World
-from cns_drake.simulation.scenario_traffic import (
-    plan_scenario_traffic,
-    with_traffic,
-)
-from cns_drake.simulation.stage_loading import load_stage
-from cns_drake.traffic.traffic_plan import TrafficPlan
+from cns_drake.scene.world import World, load_world
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
+from cns_drake.traffic.lane_file import LaneFile, read_lanes
+from cns_drake.traffic.lane_graph import LaneGraph, Walkway
+from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
+from cns_drake.traffic.streets import EgoBox
+from cns_drake.traffic.traffic_adding import traffic_structures
+from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
+from cns_drake.traffic.vehicles import room_for_vehicles
+from cns_drake.traffic.walkers import room_for_walkers
+from cns_drake.transient.changing import change_world
+
+# Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
+EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
+# Distance from the car's middle line to its sides, with a margin [m].
+_HALF_WIDTH = 1.3
 
 
 @dataclass(frozen=True)
@@ -72,17 +90,13 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     trajectory = plan_drive(scenario)
     num_frames = count_frames(scenario, trajectory)
     scenario = scenario.model_copy(update={"frames": num_frames})
-    world = load_stage(scenario, trajectory=trajectory)
-    traffic = None
-    if not scenario.traffic.is_off:
-        traffic = plan_scenario_traffic(scenario, trajectory)
-        world = with_traffic(world, traffic)
+    world, traffic = load_stage_and_traffic(scenario, trajectory)
     changed = watch.changed()
     if changed is not None:
         raise InputError(f"{changed}: changed while it was being read")
     # `frames` is set for the whole drive as well, so that both are the same.
     whole = num_frames == frames_within(
-        trajectory.duration, frame_period(scenario.lidars)
+        trajectory.duration, scenario.frame_period
     )
     lines = [
         recording_fingerprint(scenario.model_copy(update=update), inputs)
@@ -97,3 +111,207 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
         num_frames,
         traffic,
     )
+
+
+def load_stage_and_traffic(
+    scenario: Scenario, trajectory: Trajectory
+) -> tuple[World, TrafficPlan | None]:
+    """Loads the stage of a scenario, and plans the traffic in it, if any.
+
+    Args:
+        scenario: names the stage.
+        trajectory: motion of its vehicle.
+
+    Raises:
+        InputError: the scenario cannot be run.
+    """
+    world = load_stage(scenario, trajectory=trajectory)
+    if scenario.traffic.is_off:
+        return world, None
+    traffic = plan_scenario_traffic(scenario, trajectory)
+    return with_traffic(world, traffic), traffic
+
+
+def load_stage(
+    scenario: Scenario,
+    *,
+    with_vehicle: bool = True,
+    trajectory: Trajectory | None = None,
+) -> World:
+    """Loads the stage of a scenario, with the vehicle in it.
+
+    Args:
+        scenario: names the stage and the passing changes.
+        with_vehicle: whether the vehicle is there.
+        trajectory: the drive, if already planned.
+
+    Raises:
+        InputError: the scenario's files cannot be used.
+    """
+    in_the_way = _in_the_way(scenario)
+    world = load_world(
+        world_file(scenario),
+        vehicle=vehicle_file() if with_vehicle else None,
+        without=(*scenario.without, *in_the_way),
+    )
+    if in_the_way:
+        note = f"traffic: {len(in_the_way)} things in its lanes left out"
+        world = replace(world, notes=(*world.notes, note))
+    if scenario.transient.is_off:
+        return world
+    trajectory = trajectory or plan_drive(scenario)
+    times = np.arange(0.0, trajectory.duration, 0.1)
+    drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
+    return change_world(
+        world, scenario.transient, drive, _driven(scenario, drive)
+    )
+
+
+def _in_the_way(scenario: Scenario) -> Sequence[str]:
+    """Returns the names of what stands where the traffic drives."""
+    if scenario.traffic.is_off or scenario.map is None:
+        return ()
+    folder = map_folder(scenario)
+    if folder.roads.is_file() or not folder.lanes.is_file():
+        return ()
+    return read_lanes(folder.lanes).in_the_way
+
+
+def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
+    """Returns the area where vehicles drive, seen from above [m]."""
+    driven = drive.buffer(_HALF_WIDTH)
+    roads = map_folder(scenario).roads
+    if scenario.map is None or not roads.is_file():
+        return driven
+    return driven.union(load_road_network(roads).lane_area())
+
+
+def plan_scenario_traffic(
+    scenario: Scenario, trajectory: Trajectory
+) -> TrafficPlan:
+    """Plans the traffic of a scenario.
+
+    Args:
+        scenario: with traffic.
+        trajectory: of its vehicle.
+
+    Raises:
+        InputError: the map has no roads or sidewalks, or no room for that many;
+            or the trace cannot be played here.
+
+    Example:
+        from cns_drake import load_scenario, plan_drive, plan_scenario_traffic
+
+        scenario = load_scenario("metropolis_04").with_traffic(60)
+        plan = plan_scenario_traffic(scenario, plan_drive(scenario))
+    """
+    wanted = scenario.traffic
+    where = f"{scenario.source}: traffic"
+    check_files(scenario)
+    graph, walkways, _ = load_ways(map_folder(scenario))
+
+    def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
+        return p_WB[:, :2], np.unwrap(np.arctan2(R_WB[:, 1, 0], R_WB[:, 0, 0]))
+
+    if wanted.fcd is not None:
+        trace = Path(wanted.fcd)
+        num_frames = count_frames(scenario, trajectory)
+        return play_trace(
+            read_fcd(trace),
+            trace,
+            graph,
+            walkways,
+            seed=wanted.seed,
+            duration=(num_frames - 1) * scenario.frame_period,
+            ego=ego,
+            ego_box=EGO_BOX,
+        )
+    _check_room(wanted, where, graph, walkways)
+    plan = plan_traffic(
+        graph,
+        walkways,
+        vehicles=wanted.vehicles,
+        walkers=wanted.walkers,
+        seed=wanted.seed,
+        # Traffic is planned for the whole drive, not only for its frames.
+        duration=trajectory.duration + FRAME_PERIOD,
+        ego=ego,
+        ego_box=EGO_BOX,
+    )
+    if wanted.vehicles and not plan.kinds:
+        raise InputError(f"{where}: the car leaves no room for vehicles")
+    return plan
+
+
+def load_ways(folder: MapFolder) -> LaneFile:
+    """Returns what vehicles and walkers follow on a map.
+
+    Raises:
+        InputError: the map has neither roads nor lanes.
+    """
+    if not folder.roads.is_file():
+        return read_lanes(folder.lanes)
+    network = load_road_network(folder.roads)
+    graph = make_lane_graph(network)
+    return LaneFile(graph, make_walkways(network, graph))
+
+
+def _check_room(
+    wanted: TrafficConfig,
+    where: str,
+    graph: LaneGraph,
+    walkways: Sequence[Walkway],
+) -> None:
+    """Checks that roads and sidewalks have room for the traffic.
+
+    Raises:
+        InputError: they do not.
+    """
+    room = room_for_vehicles(graph)
+    if wanted.vehicles > room:
+        raise InputError(
+            f"{where}: vehicles: {wanted.vehicles} are too many; the roads "
+            f"hold {room}"
+        )
+    room = room_for_walkers(walkways)
+    if wanted.walkers and not room:
+        raise InputError(
+            f"{where}: walkers: the map has no sidewalks; leave walkers out"
+        )
+    if wanted.walkers > room:
+        raise InputError(
+            f"{where}: walkers: {wanted.walkers} are too many; the sidewalks "
+            f"hold {room}"
+        )
+
+
+def with_traffic(world: World, plan: TrafficPlan) -> World:
+    """Returns a world with the traffic in its table and notes.
+
+    Raises:
+        InputError: there are more structures than ids.
+    """
+    table = world.structures
+    entries = traffic_structures(plan, table.last_instance + 1)
+    notes = world.notes
+    if plan.left_out:
+        notes += (
+            f"traffic: {plan.left_out} left out: they would have met others "
+            "or the car",
+        )
+    return replace(world, structures=table.joined(entries), notes=notes)
+
+
+def structure_list(world: World) -> list[dict]:
+    """Returns an entry for each structure of a world, ready for JSON."""
+    return [
+        {
+            "instance": entry.instance,
+            "name": entry.name,
+            "class": entry.semantic_class,
+            "label": entry.label,
+            **({"causes": list(entry.causes)} if entry.causes else {}),
+        }
+        for entry in world.structures
+    ]

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import (
@@ -20,10 +23,10 @@ from cns_drake.base.points import (
     to_xyzi,
 )
 from cns_drake.scene.world import World
-from cns_drake.sensors.beam_pattern import BeamPattern
-from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
-from cns_drake.simulation.still_world import make_still_world
 
 
 def scan_world(
@@ -51,7 +54,7 @@ def scan_world(
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
     )
-    context = make_still_world(world, lidar).CreateDefaultContext()
+    context = _make_still_world(world, lidar).CreateDefaultContext()
     return lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
 
 
@@ -92,3 +95,28 @@ def _encode_npy(scan: np.ndarray) -> bytes:
 
 
 _ENCODERS = {".bin": encode_bin, ".npy": _encode_npy, ".pcd": encode_pcd}
+
+
+def _make_still_world(world: World, lidar: Lidar) -> Diagram:
+    """Makes the Diagram of a world whose models keep their initial state.
+
+    Args:
+        world: the stage; its SceneGraph passes to the Diagram.
+        lidar: scans the world.
+    """
+    plant = world.plant
+    builder = DiagramBuilder()
+    scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
+    positions = plant.GetPositions(plant.CreateDefaultContext())
+    source = builder.AddNamedSystem("position", ConstantVectorSource(positions))
+    to_pose = builder.AddNamedSystem(
+        "geometry_pose", MultibodyPositionToGeometryPose(plant)
+    )
+    builder.AddNamedSystem("lidar", lidar)
+    builder.Connect(source.get_output_port(), to_pose.get_input_port())
+    builder.Connect(
+        to_pose.get_output_port(),
+        scene_graph.get_source_pose_port(plant.get_source_id()),
+    )
+    connect_lidar(builder, scene_graph, lidar)
+    return builder.Build()

@@ -17,11 +17,11 @@ from cns_drake.recording.recorded_topics import (
     recording_topics,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.recording.scene_ports import RecordedCamera
 from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.sensors.imu import Imu
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.odometry import OdometrySensor
+from cns_drake.recording.sensor_ports import RecordedCamera
+from cns_drake.sensors.imu.imu import Imu
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.odometry.odometry import OdometrySensor
 
 
 def add_mcap_recorder(

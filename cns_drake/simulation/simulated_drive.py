@@ -11,33 +11,140 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, FixedInputPortValue
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
 
-from cns_drake.base.drives.drive import index_instances
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive, index_instances
 from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.motion.sweep import Sweep
+from cns_drake.motion.trajectory import Trajectory, pose_at
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.recording.messages import MAP_FRAME, to_quat_xyzw
+from cns_drake.recording.schedule import frame_stamp_ns
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scenarios.sensor_making import (
-    make_measurement,
-    make_pattern,
-    make_returns,
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    describe_scenario,
 )
-from cns_drake.sensors.beam_pattern import BeamPattern
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.simulation.planned_drive import PlannedDrive
-from cns_drake.simulation.scenario_traffic import (
-    plan_scenario_traffic,
-    with_traffic,
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.sensors.lidar.patterns import BeamPattern
+from cns_drake.simulation.loaded_drive import (
+    LoadedDrive,
+    load_stage_and_traffic,
+    structure_list,
 )
-from cns_drake.simulation.stage_loading import load_stage
-from cns_drake.simulation.still_world import make_still_world
-from cns_drake.simulation.structure_list import structure_list
-from cns_drake.traffic.traffic_adding import make_traffic
+from cns_drake.simulation.recording_schedule import (
+    drive_schedule,
+    first_points_topic,
+)
+from cns_drake.simulation.station import make_station
+
+
+class PlannedDrive(Drive):
+    """The contents of a scenario's recording, except its scans.
+
+    Attributes:
+        trajectory: motion of the vehicle.
+        period: time between frames [s].
+        X_BS: pose of the first LiDAR in base_link.
+    """
+
+    def __init__(
+        self, scenario: Scenario, trajectory: Trajectory, num_frames: int
+    ):
+        self.name = scenario.name
+        self.world_frame = MAP_FRAME
+        self.trajectory = trajectory
+        self.period = scenario.frame_period
+        self.X_BS = sensor_pose(next(iter(scenario.lidars.values())))
+        self._scenario = scenario
+        self._num_frames = num_frames
+
+    def __len__(self) -> int:
+        return self._num_frames
+
+    @cached_property
+    def stamps_ns(self) -> np.ndarray:
+        stamps = [
+            frame_stamp_ns(frame, period=self.period)
+            for frame in range(len(self))
+        ]
+        return np.array(stamps, np.int64)
+
+    @cached_property
+    def X_WS(self) -> np.ndarray:
+        quat_xyzw = [to_quat_xyzw(X_WB.rotation()) for X_WB in self.X_WBs]
+        X_WB = poses.make_pose(
+            poses.rotation_from_quaternion(np.array(quat_xyzw)),
+            np.array([X_WB.translation() for X_WB in self.X_WBs]),
+        )
+        return X_WB @ self.X_BS.GetAsMatrix4()
+
+    @cached_property
+    def X_WBs(self) -> list[RigidTransform]:
+        """Pose of base_link at each frame."""
+        times = self.period * np.arange(len(self))
+        moments = self.trajectory.at(times)
+        found = [pose_at(moments, frame) for frame in range(len(self))]
+        # Rotations pass through quaternions, as in a plant and a recording: the
+        # last bit can decide on a voxel or a plane.
+        return [
+            RigidTransform(
+                RotationMatrix(X_WB.rotation().ToQuaternion()),
+                X_WB.translation(),
+            )
+            for X_WB in found
+        ]
+
+    @property
+    def scenario(self) -> Mapping:
+        return describe_scenario(self._scenario)
+
+
+class DriveInProgress(PlannedDrive):
+    """The scans of the first LiDAR, at the time of their recording.
+
+    Reading a scan advances the simulation to its frame.
+    """
+
+    def __init__(self, drive: LoadedDrive, simulator: Simulator):
+        """Takes the station of a drive before its first frame."""
+        super().__init__(drive.scenario, drive.trajectory, drive.num_frames)
+        self._simulator = simulator
+        self._lidar = next(iter(drive.scenario.lidars))
+        schedule = drive_schedule(drive.scenario)
+        steps = schedule.steps[first_points_topic(drive.scenario)]
+        self._frame_period = float(schedule.tick * steps)
+        self._fault: BaseException | None = None
+
+    def raise_fault(self) -> None:
+        """Raises the simulation's exception, even if the reader caught it."""
+        if self._fault is not None:
+            raise self._fault
+
+    def scan(self, index: int) -> np.ndarray:
+        """Advances to a frame and returns its scan.
+
+        Raises:
+            ValueError: the simulation is beyond the frame, or the vehicle is
+                not at its planned place.
+        """
+        simulator = self._simulator
+        try:
+            simulator.AdvanceTo(index * self._frame_period)
+        except BaseException as error:
+            self._fault = error
+            raise
+        context, diagram = simulator.get_context(), simulator.get_system()
+        X_WB = diagram.GetOutputPort("odometry").Eval(context).X_WB
+        if not X_WB.IsExactlyEqualTo(self.X_WBs[index]):
+            raise ValueError(
+                f"frame {index}: the vehicle is not at its planned place"
+            )
+        return diagram.GetOutputPort(f"{self._lidar}_scan").Eval(context)
 
 
 @dataclass(frozen=True)
@@ -78,48 +185,14 @@ class SimulatedDrive(PlannedDrive):
         trajectory = plan_drive(scenario)
         num_frames = count_frames(scenario, trajectory)
         super().__init__(scenario, trajectory, num_frames)
-        name, config = next(iter(scenario.lidars.items()))
-        pattern = make_pattern(config)
-        self._column_t = None
-        if config.motion_distortion:
-            self._column_t = pattern.column_t_ns * 1e-9
-        measurement = make_measurement(config, name, scenario.seed)
-        returns = make_returns(config, scenario.weather, name, scenario.seed)
-        self._is_random = measurement.is_random or returns is not None
-        # No LiDAR sees the vehicle that carries it.
-        world = load_stage(scenario, with_vehicle=False, trajectory=trajectory)
-        traffic = None
-        if not scenario.traffic.is_off:
-            plan = plan_scenario_traffic(scenario, trajectory)
-            world = with_traffic(world, plan)
-            traffic = make_traffic(
-                world.scene_graph,
-                plan,
-                seed=scenario.traffic.seed,
-                structures=world.structures,
-                turn=self.period,
-            )
+        world, traffic = load_stage_and_traffic(scenario, trajectory)
         self._instances = index_instances(structure_list(world), self.name)
-        self._has_traffic = traffic is not None
-        distorts = self._column_t is not None
-        self._lidar = Lidar(
-            world.scene_graph.world_frame_id(),
-            RigidTransform(),
-            pattern,
-            measurement=measurement,
-            returns=returns,
-            with_sweep=True,
-            moving_bodies=(
-                traffic.moving_frames if traffic and distorts else None
-            ),
-            posed_frames=traffic.moving_frames if traffic else None,
-            structures=world.structures,
-            anchored_frames=world.anchored_frames(),
+        self._diagram = make_station(
+            scenario, world=world, trajectory=trajectory, traffic=traffic
         )
-        self._diagram = make_still_world(world, self._lidar, traffic)
         self._context = self._diagram.CreateDefaultContext()
-        self._lidar_context = self._lidar.GetMyMutableContextFromRoot(
-            self._context
+        self._lidar = self._diagram.GetSubsystemByName(
+            next(iter(scenario.lidars))
         )
 
     @property
@@ -131,8 +204,7 @@ class SimulatedDrive(PlannedDrive):
         return self._lidar.pattern
 
     def scan(self, index: int) -> np.ndarray:
-        context = self._place_lidar(index)
-        return self._lidar.GetOutputPort("scan").Eval(context)
+        return self._lidar.GetOutputPort("scan").Eval(self._at(index))
 
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
         """Returns what a scan's sensor sees, and its pose X_WS at the stamp.
@@ -140,31 +212,12 @@ class SimulatedDrive(PlannedDrive):
         The scene casts any rays, until the next scan or look moves it.
 
         Args:
-            index: of the scan.
+            index: number of the scan.
         """
-        scene = self._lidar.EvalScene(self._place_lidar(index))
+        scene = self._lidar.EvalScene(self._at(index))
         return scene, self.X_WBs[index] @ self.X_BS
 
-    def _place_lidar(self, index: int) -> Context:
-        """Moves the LiDAR to a scan; returns its Context."""
-        if self._is_random or self._has_traffic:
-            # The time is set only for noise and traffic, which depend on it:
-            # the SceneGraph computes everything anew at a new time.
-            self._context.SetTime(index * self.period)
-        # Unlike a new fixed value, it does not hold a copy.
-        self._fixed_sweep.GetMutableData().set_value(self._sweep(index))
-        return self._lidar_context
-
-    @cached_property
-    def _fixed_sweep(self) -> FixedInputPortValue:
-        """The value of the LiDAR's port; notes each change."""
-        port = self._lidar.GetInputPort("sweep")
-        return port.FixValue(self._lidar_context, self._sweep(0))
-
-    def _sweep(self, index: int) -> Sweep:
-        """Returns the poses of the sensor during a frame."""
-        if self._column_t is not None:
-            times = index * self.period + self._column_t
-            return Sweep(*self.trajectory.poses(times)).of_frame(self.X_BS)
-        X_WS = self.X_WBs[index].multiply(self.X_BS)
-        return Sweep(X_WS.rotation().matrix()[None], X_WS.translation()[None])
+    def _at(self, index: int) -> Context:
+        """Returns the LiDAR's Context at the time of a scan."""
+        self._context.SetTime(index * self.period)
+        return self._lidar.GetMyContextFromRoot(self._context)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 import math
 from pathlib import Path
 import time
@@ -11,36 +12,78 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.files import (
-    check_writable,
-    complete_part,
-    write_part,
-)
+from cns_drake.base.files import check_writable, complete_part, write_part
 from cns_drake.base.interrupts import interrupts_wait
+from cns_drake.base.version import __version__
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
+from cns_drake.recording.bag_writer import BagWriter, take_over_frames
+from cns_drake.recording.recorded_topics import make_calibration
 from cns_drake.recording.recording_folder import RecordingFolder
+from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.planning import shown_beside
-from cns_drake.scenarios.rates import frame_period
-from cns_drake.scenarios.recording_schedule import (
-    drive_schedule,
-    first_points_topic,
+from cns_drake.scenarios.provenance import (
+    INPUTS_KEY,
+    combined_digest,
+    dependency_versions,
 )
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder
-from cns_drake.simulation.drive_in_progress import DriveInProgress
-from cns_drake.simulation.drive_recording import make_bag, resume_recording
+from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.sensors.imu.config import KALIBR_FILE
 from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
     load_drive,
+    load_stage,
+    structure_list,
 )
-from cns_drake.simulation.run_progress import (
-    NoteCallback,
-    ProgressCallback,
-    Run,
+from cns_drake.simulation.recording_schedule import (
+    drive_schedule,
+    first_points_topic,
+    scenario_topics,
 )
-from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.simulation.simulated_drive import DriveInProgress
 from cns_drake.simulation.station import make_station
+
+# Reports how many frames of how many are done.
+ProgressCallback = Callable[[int, int], None]
+# Receives a message for the user.
+NoteCallback = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """The result of a simulation.
+
+    Attributes:
+        name: of the drive.
+        folder: the recording.
+        num_frames: frames in the recording.
+        resumed_frames: number of them that an interrupted run had recorded.
+        simulated_s: simulated time from the first frame simulated to the
+            last [s].
+        wall_s: wall time of the simulation, without loading [s].
+        loading_s: time to load the stage and plan the drive [s].
+
+    Example:
+        from cns_drake import load_scenario, simulate
+
+        run = simulate(load_scenario("downtown_01"), output)
+        print(run.folder, run.real_time_factor)
+    """
+
+    name: str
+    folder: Path
+    num_frames: int
+    resumed_frames: int
+    simulated_s: float
+    wall_s: float
+    loading_s: float
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated seconds per second."""
+        return self.simulated_s / self.wall_s if self.wall_s > 0 else math.inf
 
 
 def simulate(
@@ -102,9 +145,9 @@ def simulate(
         strike()
         page = None if page_file is None else _make_page(drive)
         resumed_frames = 0
-        with make_bag(drive, folder, overwrite=overwrite) as bag:
+        with _make_bag(drive, folder, overwrite=overwrite) as bag:
             if page is None:
-                resumed_frames = resume_recording(bag, drive, on_frame, on_note)
+                resumed_frames = _resume(bag, drive, on_frame, on_note)
 
             def report_frames(done: int) -> None:
                 strike()
@@ -154,6 +197,84 @@ def _check_output(
     RecordingFolder(folder).check(overwrite)
 
 
+def _make_bag(
+    drive: LoadedDrive, folder: Path, *, overwrite: bool = False
+) -> BagWriter:
+    """Makes the recording of a drive, so far without messages.
+
+    Args:
+        drive: the drive to record.
+        folder: to write.
+        overwrite: whether it may replace an existing recording.
+    """
+    scenario, inputs = drive.scenario, drive.inputs
+    described = describe_scenario(scenario)
+    kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
+    imu_files = {} if kalibr is None else {KALIBR_FILE: kalibr}
+    return BagWriter(
+        folder,
+        scenario_topics(scenario),
+        start_ns=START_NS,
+        attachments={
+            "scenario.json": described,
+            "structures.json": structure_list(drive.world),
+            "calibration.json": make_calibration(
+                drive.X_BSs
+                | {
+                    name: sensor_pose(sensor)
+                    for name, sensor in scenario.further_sensors.items()
+                },
+                sensor_pose(scenario.imu),
+            ),
+            "provenance.json": {
+                "versions": dependency_versions(),
+                "inputs_sha256": inputs,
+            },
+            **imu_files,
+        },
+        # The drive can be simulated again while its files stay in place.
+        scenario=describe_scenario(scenario, folder),
+        beside=imu_files,
+        custom_data={
+            "cns_drake_version": __version__,
+            INPUTS_KEY: combined_digest(inputs),
+            **{
+                key: str(described[key])
+                for key in ("map", "stage", "world", "seed")
+                if key in described
+            },
+        },
+        fingerprint=drive.fingerprint,
+        overwrite=overwrite,
+    )
+
+
+def _resume(
+    bag: BagWriter,
+    drive: LoadedDrive,
+    on_frame: ProgressCallback,
+    on_note: NoteCallback,
+) -> int:
+    """Keeps the frames of an interrupted run; returns their number."""
+    if not bag.follows_interruption():
+        return 0
+    name, num_frames = drive.scenario.name, drive.num_frames
+    on_note(f"{name}: found an interrupted run, reading it")
+    frames = take_over_frames(
+        bag,
+        scenario_topics(drive.scenario),
+        drive_schedule(drive.scenario),
+        first_points_topic(drive.scenario),
+    )
+    on_note(
+        f"{name}: {frames} of {num_frames} frames are there; going on with "
+        "the next one"
+    )
+    if frames > 0:
+        on_frame(frames, num_frames)
+    return frames
+
+
 def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     other, other_name = shown_beside(drive.scenario)
     stage = drive.scenario.stage
@@ -161,7 +282,7 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     return MeshcatRecorder(
         drive.world,
         X_BSs=drive.X_BSs,
-        period=frame_period(drive.scenario.lidars),
+        period=drive.scenario.frame_period,
         num_frames=drive.num_frames,
         other_stage=None if other is None else load_stage(other),
         other_name=other_name,
@@ -201,7 +322,7 @@ def _advance(
     if first >= drive.num_frames:
         return 0.0
     scenario = drive.scenario
-    period = frame_period(scenario.lidars)
+    period = scenario.frame_period
     schedule = drive_schedule(scenario)
 
     def monitor(context: Context) -> None:

@@ -14,26 +14,24 @@ from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder
 from cns_drake.recording.schedule import START_NS
-from cns_drake.scenarios.imu_making import imu_rate, make_imu_noise
+from cns_drake.recording.sensor_ports import RecordedSensor
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.rates import frame_period
-from cns_drake.scenarios.recording_schedule import (
-    drive_schedule,
-    point_layouts,
-)
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scene.world import World
-from cns_drake.sensors.frame_poses import FramePoses
-from cns_drake.sensors.odometry import add_odometry
-from cns_drake.simulation.imu_applying import apply_imu_config
-from cns_drake.simulation.lidar_applying import apply_lidar_config
-from cns_drake.simulation.scenario_traffic import (
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.sensors.imu.imu import apply_imu_config
+from cns_drake.sensors.lidar.adding import apply_lidar_config
+from cns_drake.sensors.odometry.odometry import add_odometry
+from cns_drake.simulation.loaded_drive import (
+    load_stage,
     plan_scenario_traffic,
     with_traffic,
 )
-from cns_drake.simulation.stage_loading import load_stage
-from cns_drake.traffic.traffic_adding import add_traffic
+from cns_drake.simulation.recording_schedule import (
+    drive_schedule,
+    point_layouts,
+)
+from cns_drake.traffic.traffic_adding import add_traffic, connect_traffic
 from cns_drake.traffic.traffic_plan import TrafficPlan
 
 
@@ -51,24 +49,24 @@ def make_station(
 
     Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
     prescribes the vehicle's pose, `geometry_pose` passes it on to the
-    SceneGraph; `traffic` moves other objects, and `frame_poses` has the poses
-    of all frames; a `Lidar` for each entry of `scenario.lidars` under its name
-    (with a `<lidar>_sweep` if it moves while it turns), an accelerometer and a
-    gyroscope (or `imu`, if the IMU has a rate or errors of its own), and
-    `odometry` measure; `mcap_recorder` and `meshcat_recorder` record the
-    measurements.
+    SceneGraph; `traffic` moves other objects; a `Lidar` for each entry of
+    `scenario.lidars` under its name (with a `<lidar>_sweep` if it moves while
+    it turns), an accelerometer and a gyroscope (or `imu`, if the IMU has a rate
+    or errors of its own), and `odometry` measure; `mcap_recorder` and
+    `meshcat_recorder` record the measurements.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry`, `geometry_query`; `imu_samples` of such
-    an IMU; and with traffic `objects`.
+    an IMU; with traffic `objects`; and the port of each further sensor under
+    its name.
 
     Args:
         scenario: the scenario to build.
         world: the stage with the vehicle, if already loaded; its SceneGraph
             passes to the Diagram.
         trajectory: the drive, if already planned.
-        traffic: of the scenario, if already planned; the world's structures
-            then include it (see `with_traffic`).
+        traffic: the scenario's traffic, if already planned; the structures of
+            the world then include it (see `with_traffic`).
         bag: an open recording of the scenario's topics.
         page: a recorder of the same world for a web page.
         num_threads: number of threads that cast the rays of a LiDAR.
@@ -88,8 +86,6 @@ def make_station(
     if traffic is None and not scenario.traffic.is_off:
         traffic = plan_scenario_traffic(scenario, trajectory)
         world = with_traffic(world, traffic)
-    X_BSs = {name: sensor_pose(one) for name, one in scenario.lidars.items()}
-    X_BI = sensor_pose(scenario.imu)
     plant = world.plant
     base = plant.GetBodyByName("base_link", world.vehicle)
 
@@ -101,7 +97,7 @@ def make_station(
             plant,
             world.vehicle,
             trajectory,
-            period=frame_period(scenario.lidars),
+            period=scenario.frame_period,
         ),
     )
     to_pose = builder.AddNamedSystem(
@@ -121,44 +117,59 @@ def make_station(
             traffic,
             seed=scenario.traffic.seed,
             structures=world.structures,
-            turn=frame_period(scenario.lidars),
-        )
-    poses = builder.AddNamedSystem(
-        "frame_poses",
-        FramePoses(plant, None if moving is None else moving.moving_frames),
-    )
-    builder.Connect(
-        motion.GetOutputPort("body_poses"), poses.GetInputPort("body_poses")
-    )
-    if moving is not None:
-        builder.Connect(
-            moving.GetOutputPort("frame_poses"),
-            poses.GetInputPort("more_poses"),
+            turn=scenario.frame_period,
         )
     # Measurements by name, which is also the name of the exported port.
     measured = {"geometry_query": scene_graph.get_query_output_port()}
     for name, config in scenario.lidars.items():
+        moving_bodies = None
+        if moving is not None and config.motion_distortion:
+            # They keep moving during a turn.
+            moving_bodies = moving.moving_frames
         lidar = apply_lidar_config(
             config,
             builder,
-            world,
-            trajectory,
-            poses,
+            scene_graph,
+            base,
             name=name,
-            weather=scenario.weather,
-            traffic=moving,
             seed=scenario.seed,
+            weather=scenario.weather,
+            trajectory=trajectory,
+            unseen=[
+                plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)
+            ],
+            moving_bodies=moving_bodies,
+            structures=world.structures,
+            anchored_frames=world.anchored_frames(),
             num_threads=num_threads,
         )
+        if moving is not None:
+            connect_traffic(builder, moving, lidar, config.motion_distortion)
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
-    measured |= apply_imu_config(scenario, builder, base, trajectory, motion)
+    measured |= apply_imu_config(
+        scenario.imu,
+        builder,
+        base,
+        trajectory=trajectory,
+        motion=motion,
+        scan_rate=scenario.fastest_rate,
+        seed=scenario.seed,
+    )
     odometry = add_odometry(builder, base, motion=motion)
     measured["odometry"] = odometry.GetOutputPort("odometry")
+    for name, sensor in scenario.further_sensors.items():
+        measured[name] = sensor.add(
+            builder,
+            scene_graph,
+            base,
+            motion=motion,
+            name=name,
+            seed=scenario.seed,
+        )
 
     if moving is not None:
         measured["objects"] = moving.GetOutputPort("objects")
     if page is not None:
-        page.take_poses(poses.rows)
         for body in () if moving is None else moving.bodies:
             page.show_too(body.name, body.frames)
 
@@ -166,21 +177,26 @@ def make_station(
     if bag is not None:
         recorders["mcap_recorder"] = McapRecorder(
             bag,
-            X_BSs=X_BSs,
-            X_BI=X_BI,
+            X_BSs={n: sensor_pose(one) for n, one in scenario.lidars.items()},
+            X_BI=sensor_pose(scenario.imu),
+            further={
+                name: RecordedSensor(
+                    sensor.topic(name), sensor_pose(sensor), sensor.make_message
+                )
+                for name, sensor in scenario.further_sensors.items()
+            },
             schedule=drive_schedule(scenario),
             layouts=point_layouts(scenario),
-            imu_variances=make_imu_noise(scenario).variances(
-                imu_rate(scenario)
+            imu_variances=scenario.imu.noise(scenario.seed).variances(
+                scenario.imu.sample_rate(scenario.fastest_rate)
             ),
             with_objects=moving is not None,
             with_imu_samples="imu_samples" in measured,
             start_ns=START_NS,
         )
-    recorded = measured | {"frame_poses": poses.GetOutputPort("frame_poses")}
     for name, recorder in recorders.items():
         if recorder is not None:
-            _connect(builder, name, recorder, recorded)
+            _connect(builder, name, recorder, measured)
     for name, port in measured.items():
         builder.ExportOutput(port, name)
     diagram = builder.Build()

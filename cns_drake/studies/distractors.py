@@ -11,9 +11,8 @@ import numpy as np
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.studies.redrawing import redraw_cities
 from evaluation.drives.sampling import sample_frames
@@ -60,9 +59,7 @@ def distracting_drives(
 def _num_places(scenario: Scenario, spacing: float) -> int:
     trajectory = plan_drive(scenario)
     frames = count_frames(scenario, trajectory)
-    _, p_WB = trajectory.poses(
-        frame_period(scenario.lidars) * np.arange(frames)
-    )
+    _, p_WB = trajectory.poses(scenario.frame_period * np.arange(frames))
     return len(sample_frames(p_WB, spacing))
 
 

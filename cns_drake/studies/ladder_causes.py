@@ -13,10 +13,8 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
-from cns_drake.scenarios.ride_config import RideConfig
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.traffic_config import TrafficConfig
-from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.scenarios.scenario import RideConfig, Scenario, TrafficConfig
+from cns_drake.sensors.lidar.config import WeatherConfig
 
 # The unchanged world, and all causes together.
 NONE = "none"

@@ -9,7 +9,7 @@ from typing import Any
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
-from cns_drake.simulation.scenario_traffic import load_ways
+from cns_drake.simulation.loaded_drive import load_ways
 from cns_drake.studies.ladder_causes import (
     ALL,
     APART,

@@ -15,7 +15,7 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.studies.ladder_causes import ALL, NONE, STRENGTHS
 from cns_drake.studies.ladder_rungs import Extent, plan_rungs

@@ -13,8 +13,7 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import world_file
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario, world_file
 from evaluation.study.parts import PartStep
 
 # Expected time to draw a stage [s].

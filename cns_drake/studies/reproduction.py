@@ -13,8 +13,11 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import (
+    describe_scenario,
+    load_scenario,
+    map_folder,
+)
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures

@@ -163,18 +163,13 @@ def connect_traffic(
     Args:
         builder: of the diagram.
         traffic: the traffic.
-        lidar: labels moving bodies as moving; made with the `moving_frames` of
-            `traffic` as `posed_frames`, unless its port `frame_poses` is
-            connected already.
-        goes_on: whether traffic moves during its turn; then it was made with
-            them as `moving_bodies`, too.
+        lidar: labels moving bodies as moving.
+        goes_on: whether traffic moves during its turn; the LiDAR then has the
+            `moving_frames` of `traffic` as `moving_bodies`.
     """
-    wanted = ["moving_instances"]
-    wanted += ["frame_poses"] if lidar.HasInputPort("frame_poses") else []
-    wanted += ["body_spatial_velocities"] if goes_on else []
-    for name in wanted:
-        port = lidar.GetInputPort(name)
-        if not builder.IsConnectedOrExported(port):
+    for name in ("moving_instances", "frame_poses", "body_spatial_velocities"):
+        if goes_on or name != "body_spatial_velocities":
+            port = lidar.GetInputPort(name)
             builder.Connect(traffic.GetOutputPort(name), port)
 
 

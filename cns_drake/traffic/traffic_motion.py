@@ -13,6 +13,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from scipy.spatial.transform import Rotation
 
+from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
@@ -180,8 +181,8 @@ class TrafficMotion(LeafSystem):
         - objects
 
     `geometry_pose` is for the SceneGraph with which the bodies are
-    registered. `frame_poses` is abstract, the same poses as one (M, 4, 4)
-    array over all limbs: X_WL. `body_spatial_velocities` is abstract, a list
+    registered. `frame_poses` is abstract, `KnownPoses`: the same poses X_WL
+    as one array over all limbs. `body_spatial_velocities` is abstract, a list
     over all limbs of V_WL, expressed in the world: they take a limb to its
     place a turn later, for a LiDAR that keeps turning meanwhile.
     `moving_instances` is abstract, the (N,) instance ids of bodies faster than
@@ -208,6 +209,11 @@ class TrafficMotion(LeafSystem):
         self._plan = plan
         self._bodies = tuple(bodies)
         self._limbs = LimbTable([body.limbs for body in bodies])
+        frames = (frame for body in self._bodies for frame in body.frames)
+        # Limb's frame -> its row in the ports of all limbs.
+        self.moving_frames: dict[FrameId, int] = {
+            frame: row for row, frame in enumerate(frames)
+        }
         self._turn = turn
         self._instances = np.array([b.instance for b in bodies], np.uint16)
         self._sizes = np.array(
@@ -226,7 +232,7 @@ class TrafficMotion(LeafSystem):
             prerequisites_of_calc=now,
         )
         for name, model, calc in (
-            ("frame_poses", Value(np.zeros((0, 4, 4))), self._calc_frame_poses),
+            ("frame_poses", Value(object()), self._calc_frame_poses),
             ("geometry_pose", Value(FramePoseVector()), self._calc_pose),
             ("moving_instances", Value(np.zeros(0, int)), self._calc_moving),
             ("objects", Value(()), self._calc_objects),
@@ -243,16 +249,11 @@ class TrafficMotion(LeafSystem):
         """The vehicles, then the walkers."""
         return self._bodies
 
-    @property
-    def moving_frames(self) -> dict[FrameId, int]:
-        """Limb's frame -> its row in the ports of all limbs."""
-        frames = (frame for body in self._bodies for frame in body.frames)
-        return {frame: k for k, frame in enumerate(frames)}
-
     def _calc_frame_poses(
         self, context: Context, output: AbstractValue
     ) -> None:
-        output.set_value(self._limbs.poses(self._states.Eval(context)))
+        X_WLs = self._limbs.poses(self._states.Eval(context))
+        output.set_value(KnownPoses(self.moving_frames, X_WLs))
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
         poses = FramePoseVector()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.scenarios.transient_config import TransientConfig
+from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import World
 from cns_drake.transient.bays_refilled import change_parked_cars, make_bays
 from cns_drake.transient.furniture import move_furniture

@@ -33,10 +33,9 @@ from processes import in_process
 from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import look_seldom
 from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
-from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
+from cns_drake.sensors.lidar.config import WeatherConfig
 from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.simulation import simulate
 
@@ -122,8 +121,8 @@ def record(
             after it [s].
     """
     scenario = varied(load_scenario(drive), name)
-    normal = frame_period(load_scenario(drive).lidars)
-    step = round(segment * normal / frame_period(scenario.lidars))
+    normal = load_scenario(drive).frame_period
+    step = round(segment * normal / scenario.frame_period)
     frames = (rounds + 1) * step
     # Ends of turns, each reported once.
     ends = iter(range(step, frames + 1, step))

@@ -32,10 +32,10 @@ from stages import (
 )
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import TriangleSurface
-from cns_drake.sensors.spinning_pattern import SpinningPattern
+from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.simulation.simulation import simulate
 
 POSES = 8

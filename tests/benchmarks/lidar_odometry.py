@@ -41,7 +41,7 @@ from cns_drake.base import poses
 from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
+from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
 from cns_drake.simulation.simulation import simulate
 
 _TURNS = 10

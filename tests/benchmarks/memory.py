@@ -28,7 +28,7 @@ SPEED = 20.0
 
 def print_peak(drive: str, frames: int | None) -> None:
     """Prints the peak of memory of recording a drive."""
-    from cns_drake.scenarios.scenario_loading import load_scenario
+    from cns_drake.scenarios.scenario_files import load_scenario
 
     scenario = load_scenario(drive)
     _record(scenario.model_copy(update={"frames": frames}), lambda done: None)
@@ -42,8 +42,7 @@ def print_growth(drive: str, frames: int) -> None:
     from cns_drake.recording.schedule import FRAME_PERIOD
     from cns_drake.roads.network import load_road_network
     from cns_drake.roads.route_drawing import draw_route
-    from cns_drake.scenarios.scenario_files import map_folder
-    from cns_drake.scenarios.scenario_loading import load_scenario
+    from cns_drake.scenarios.scenario_files import load_scenario, map_folder
 
     scenario = load_scenario(drive)
     route = draw_route(

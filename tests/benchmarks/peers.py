@@ -49,7 +49,7 @@ from stages import interleaved, read_stage, sensor_poses, still
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import TriangleSurface
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 REACH = 120.0
 # Errors beyond this are counted [m].

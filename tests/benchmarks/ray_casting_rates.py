@@ -40,7 +40,7 @@ from cns_drake.ray_casting.embree_primitives import (
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 DRIVES = ("metropolis_04", "downtown_04")
 POSES = 16

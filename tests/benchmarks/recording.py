@@ -40,10 +40,11 @@ from cns_drake.recording.recording_folder import PartFile
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.odometry import OdometrySensor
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.sensors.lidar.config import make_pattern
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.odometry.odometry import OdometrySensor
 from cns_drake.simulation.simulation import simulate
 
 DRIVES = ("metropolis_04", "downtown_04")

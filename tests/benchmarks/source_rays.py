@@ -21,7 +21,7 @@ import shapely
 from shapely.geometry import Polygon
 import yaml
 
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 
 _BUILDING = 50

@@ -17,8 +17,7 @@ from cns_drake.ray_casting.open3d_scene import Open3dScene
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import world_file
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario, world_file
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     read_perception_geometry,

@@ -4,9 +4,9 @@ from helpers import documents
 import numpy as np
 import yaml
 
-from cns_drake.scenarios.imu_config import ImuConfig
-from cns_drake.scenarios.lidar_config import LidarConfig
-from cns_drake.scenarios.sensor_making import sensor_pose
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.sensors.imu.config import ImuConfig
+from cns_drake.sensors.lidar.config import LidarConfig
 
 
 def test_extrinsics_are_those_of_the_default_places():

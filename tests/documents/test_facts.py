@@ -10,7 +10,7 @@ import yaml
 
 from cns_drake.command_line import cli
 from cns_drake.scenarios.variation import Family
-from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
+from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.drives import open_drive
 

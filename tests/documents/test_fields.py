@@ -6,7 +6,7 @@ import pytest
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
+from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from docs import reference_pages
 from docs.reference_pages import CITY, FAMILY, METHODS, SCENARIO
 

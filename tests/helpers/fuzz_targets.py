@@ -27,12 +27,12 @@ from cns_drake.roads.route import Route, make_lane_path
 from cns_drake.scenarios.drive_table import drive_rows
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.scenarios.sensor_making import make_pattern
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.config import make_pattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import save_scan, scan_world
 from cns_drake.simulation.simulation import simulate
 from evaluation import drives

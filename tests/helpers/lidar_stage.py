@@ -12,10 +12,10 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import DiagramBuilder
 
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.lidar_adding import connect_lidar
-from cns_drake.sensors.lidar_presets import make_beam_pattern
-from cns_drake.sensors.spinning_pattern import SpinningPattern
+from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.patterns import SpinningPattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 X_WS = RigidTransform(RollPitchYaw(0.11, -0.07, 2.3), [1.5, -0.8, 0.4])
 # Rear, left, ahead, right.

@@ -10,9 +10,9 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
-from cns_drake.sensors.free_patterns import DirectionPattern
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.lidar_adding import connect_lidar
+from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.patterns import DirectionPattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 

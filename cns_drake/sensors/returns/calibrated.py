@@ -11,7 +11,7 @@ from cns_drake.ray_casting.ray_casting_scene import (
     RayCastingScene,
     RayHits,
 )
-from cns_drake.sensors.beam_pattern import BeamPattern, Beams
+from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
 from cns_drake.sensors.returns.counter_random import frame_key
 from cns_drake.sensors.returns.echo_choice import Echoes
 from cns_drake.sensors.returns.echoes import (

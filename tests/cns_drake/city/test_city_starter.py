@@ -14,7 +14,7 @@ from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow

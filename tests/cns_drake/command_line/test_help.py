@@ -8,7 +8,7 @@ import typer
 
 import cns_drake
 from cns_drake.command_line import cli
-from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
+from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from evaluation.command_line import cli as evaluation_cli
 
 PROGRAMS = {

@@ -19,7 +19,7 @@ from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.options import ImportOptions, Undated
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives import open_drive
 

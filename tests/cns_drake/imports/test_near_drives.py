@@ -11,7 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 
 # The map's origin is the middle of the town of blocks.
 MIDDLE = 72.0

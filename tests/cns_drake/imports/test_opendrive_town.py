@@ -33,7 +33,7 @@ from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.options import ImportFaults
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from evaluation.drives import open_drive
 
 ARM = 12.0

@@ -13,13 +13,13 @@ from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
 from cns_drake.imports.options import DriveOn
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.perception_geometry import structure_name
-from cns_drake.simulation.scenario_traffic import (
+from cns_drake.simulation.loaded_drive import (
     EGO_BOX,
+    load_stage,
     plan_scenario_traffic,
 )
-from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic.lane_file import read_lanes
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
 

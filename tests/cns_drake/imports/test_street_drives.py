@@ -21,7 +21,7 @@ from cns_drake.motion.control_points import POINT_SPACING
 from cns_drake.motion.path_geometry import SmoothPath
 from cns_drake.roads.waypoints import make_waypoint_path
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 
 STEP = 90.0
 WIDTH = 8.0

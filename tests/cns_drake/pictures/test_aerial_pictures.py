@@ -10,7 +10,7 @@ from cns_drake.pictures.stage_pictures import (
     draw_drives,
     view_from_above,
 )
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_drives
 
 pytestmark = pytest.mark.slow

@@ -22,7 +22,7 @@ from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scene.world import load_world
-from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.simulation.loaded_drive import load_stage
 
 PERIOD = 0.5
 NUM_FRAMES = 21

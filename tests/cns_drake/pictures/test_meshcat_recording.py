@@ -21,7 +21,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.beam_pattern import POINT_DTYPE
+from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 
 PERIOD = 0.05
 NUM_FRAMES = 101

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 from evaluation import drives
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
-from cns_drake.sensors.beam_pattern import POINT_DTYPE
+from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 
 STAMP_NS = 1_700_000_000_150_000_001
 

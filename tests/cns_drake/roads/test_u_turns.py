@@ -22,7 +22,7 @@ from cns_drake.roads.u_turn import (
 )
 from cns_drake.roads.waypoints import load_waypoint_path, make_waypoint_path
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import vehicle_file
 
 

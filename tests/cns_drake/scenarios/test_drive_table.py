@@ -9,12 +9,12 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.scenarios.drive_facts import drive_facts
 from cns_drake.scenarios.drive_table import (
     drive_rows,
     write_table,
 )
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
 
 # A box has twelve triangles.
@@ -45,12 +45,13 @@ def measured(folder):
 def test_figures_are_those_of_the_drive_and_the_stage(folder):
     rows, _ = measured(folder)
     assert [row.sequence for row in rows] == ["boxes_01", "boxes_04"]
-    facts = drive_facts(load_scenario(folder / "sequence_04.yaml"))
+    scenario = load_scenario(folder / "sequence_04.yaml")
+    planned = plan_drive(scenario)
     assert rows[1].map == "boxes"
     assert rows[1].stage == "04"
-    assert rows[1].frames == facts.frames
-    assert rows[1].length == pytest.approx(facts.length, abs=0.05)
-    assert rows[1].duration == pytest.approx(facts.duration, abs=0.005)
+    assert rows[1].frames == count_frames(scenario, planned)
+    assert rows[1].length == pytest.approx(planned.length, abs=0.05)
+    assert rows[1].duration == pytest.approx(planned.duration, abs=0.005)
     assert (rows[0].structures, rows[1].structures) == (20, 41)
     assert (rows[0].triangles, rows[1].triangles) == (20 * BOX, 41 * BOX)
 

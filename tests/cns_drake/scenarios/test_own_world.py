@@ -11,8 +11,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import world_file
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario, world_file
 from cns_drake.simulation.simulation import simulate
 
 SPEEDS = {

@@ -7,19 +7,23 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.scenarios.lidar_config import LidarConfig
-from cns_drake.scenarios.mount import Mount
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario_files import (
     describe_scenario,
+    load_scenario,
+    make_scenario,
     map_folder,
     world_file,
 )
-from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
-from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
 from cns_drake.scenarios.shipped import recordable_drives
-from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.sensors.lidar.config import (
+    LidarConfig,
+    WeatherConfig,
+    make_pattern,
+)
+from cns_drake.sensors.sensor_config import Mount
 
 
 def test_shipped_drives_load():

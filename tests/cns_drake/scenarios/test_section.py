@@ -1,6 +1,6 @@
 """The text of sections of a scenario."""
 
-from cns_drake.scenarios.section import Section, field_off_by_default
+from cns_drake.sensors.sensor_config import Section, field_off_by_default
 
 
 class Weather(Section):

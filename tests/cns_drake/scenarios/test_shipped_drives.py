@@ -9,10 +9,8 @@ from shapely import contains, distance, linestrings, points, polygons, prepare
 from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.road_surface import RoadSurface
-from cns_drake.scenarios.drive_facts import drive_facts
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import map_folder
-from cns_drake.scenarios.scenario_loading import make_scenario
+from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.scenario_files import make_scenario, map_folder
 from cns_drake.scenarios.shipped import shipped_drives
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.protocol import PAPER_PROTOCOL
@@ -182,15 +180,16 @@ def test_plans_are_the_drives(drives):
 
 def test_facts_are_those_of_the_drive(drives):
     scenario, _, trajectory = drives["suburbia_02"]
-    facts = drive_facts(scenario)
-    assert facts.length == trajectory.length
-    assert facts.duration == trajectory.duration
-    assert facts.frames == frames_within(trajectory.duration)
+    planned = plan_drive(scenario)
+    assert planned.length == trajectory.length
+    assert planned.duration == trajectory.duration
+    frames = count_frames(scenario, planned)
+    assert frames == frames_within(trajectory.duration)
     # The last frame is within the drive, one more would not be.
-    assert (facts.frames - 1) * FRAME_PERIOD <= facts.duration
-    assert facts.frames * FRAME_PERIOD > facts.duration
+    assert (frames - 1) * FRAME_PERIOD <= planned.duration
+    assert frames * FRAME_PERIOD > planned.duration
     values = scenario.model_dump() | {"frames": 30}
-    assert drive_facts(make_scenario(values, "test")).frames == 30
+    assert count_frames(make_scenario(values, "test"), planned) == 30
 
 
 @pytest.fixture(scope="module")

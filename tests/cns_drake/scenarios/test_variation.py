@@ -11,13 +11,16 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.trends import family_controls
-from cns_drake.scenarios.kalibr import KalibrImu
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import map_folder, world_file
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import (
+    load_scenario,
+    map_folder,
+    world_file,
+)
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.world import load_world, structures_in
+from cns_drake.sensors.imu.config import KalibrImu
 
 
 def family(tmp_path, redraw=None, **values):

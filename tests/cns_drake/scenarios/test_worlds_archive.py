@@ -6,7 +6,7 @@ import tarfile
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scenarios.worlds_archive import unpacked
+from cns_drake.scenarios.shipped import unpacked
 from hatch_build import pack
 
 FILES = {"package.xml": "<package/>\n", "town/meshes/a.obj": "v 0 0 0\n"}

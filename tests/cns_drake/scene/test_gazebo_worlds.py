@@ -8,7 +8,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.spinning_pattern import SpinningPattern
+from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.simulation.scanning import scan_world
 
 AROUND = SpinningPattern((0.0, -0.5), 4, 0.05, 90.0, 0.1)

@@ -12,7 +12,7 @@ from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.structure_table import StructureEntry
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
 
 MESH = "<mesh><uri>{}</uri></mesh>"

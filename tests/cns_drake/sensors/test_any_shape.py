@@ -43,9 +43,9 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.lidar_adding import connect_lidar
-from cns_drake.sensors.spinning_pattern import SpinningPattern
+from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.patterns import SpinningPattern
 
 X_WG = RigidTransform(RollPitchYaw(0.4, -0.3, 1.9), [-4.0, 2.5, 0.8])
 PATTERN = SpinningPattern(

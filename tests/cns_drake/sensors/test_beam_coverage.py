@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.sensors.beam_coverage import BeamCoverage
+from cns_drake.sensors.lidar.patterns import BeamCoverage
 
 
 def direction(azimuth_deg, elevation_deg):

@@ -7,12 +7,12 @@ from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 import pytest
 
-from cns_drake.sensors.free_patterns import (
+from cns_drake.sensors.lidar.patterns import (
     DirectionPattern,
+    SpinningPattern,
     make_flash_pattern,
 )
-from cns_drake.sensors.lidar_presets import LIDAR_PRESETS, make_beam_pattern
-from cns_drake.sensors.spinning_pattern import SpinningPattern
+from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
 
 LIVOX = ("mid-70", "avia", "mid-360")
 

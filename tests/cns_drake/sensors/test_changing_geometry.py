@@ -24,8 +24,8 @@ import pytest
 
 from cns_drake.ray_casting import embree_hierarchy
 from cns_drake.scene.geometry_revision import geometry_revision_port
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 PATTERN = make_beam_pattern("vlp-16", 0.05, num_columns=60, min_range=0.0)
 

@@ -11,14 +11,13 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import SpatialInertia
+from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
-import pytest
 
-from cns_drake.sensors.frame_poses import FramePoses
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.lidar_adding import connect_lidar
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.ray_casting.moving_groups import KnownPoses
+from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 INERTIA = SpatialInertia.SolidSphereWithMass(1.0, 1.0)
 X_PS = RigidTransform(RollPitchYaw(0.1, -0.2, 0.4), [0.3, 0.1, 0.2])
@@ -61,30 +60,16 @@ class Scanned:
             for name in NAMES
         }
         free = other.GetBodyByName("free")
-        self.poses = FramePoses(
-            plant, {other.GetBodyFrameIdOrThrow(free.index()): 0}
-        )
         self.lidar = builder.AddSystem(
             Lidar(
                 ids["carrier"],
                 X_PS,
                 make_beam_pattern("vlp-16", 0.1),
-                posed_frames=self.poses.rows if is_posed else None,
                 anchored_frames=[ids["anchor"]],
             )
         )
         connect_lidar(builder, scene_graph, self.lidar)
-        if is_posed:
-            builder.AddSystem(self.poses)
-            builder.Connect(
-                plant.get_body_poses_output_port(),
-                self.poses.GetInputPort("body_poses"),
-            )
-            builder.Connect(
-                self.poses.get_output_port(),
-                self.lidar.GetInputPort("frame_poses"),
-            )
-        else:
+        if not is_posed:
             for one in plants:
                 builder.Connect(
                     one.get_geometry_pose_output_port(),
@@ -105,11 +90,16 @@ class Scanned:
                 plant.GetMyMutableContextFromRoot(self.context), body, X
             )
         if self.is_posed:
-            own = self.other.GetMyContextFromRoot(self.context)
-            X_WF = self.other.EvalBodyPoseInWorld(own, self.free)
-            self.poses.GetInputPort("more_poses").FixValue(
-                self.poses.GetMyMutableContextFromRoot(self.context),
-                Value(X_WF.GetAsMatrix4()[None]),
+            frames, X_WFs = {}, []
+            for plant in (self.plant, self.other):
+                context = plant.GetMyContextFromRoot(self.context)
+                for k in map(BodyIndex, range(1, plant.num_bodies())):
+                    frames[plant.GetBodyFrameIdOrThrow(k)] = len(X_WFs)
+                    X_WB = plant.EvalBodyPoseInWorld(context, plant.get_body(k))
+                    X_WFs.append(X_WB.GetAsMatrix4())
+            self.lidar.GetInputPort("frame_poses").FixValue(
+                self.lidar.GetMyMutableContextFromRoot(self.context),
+                Value(KnownPoses(frames, np.array(X_WFs))),
             )
         return self.lidar.GetOutputPort("scan").Eval(
             self.lidar.GetMyContextFromRoot(self.context)
@@ -133,12 +123,3 @@ def test_scans_are_those_with_the_scene_graph_s_poses():
         assert scan.tobytes() == asking.scan(*poses).tobytes()
         seen |= set(scan["instance"].tolist())
     assert len(seen) == 3
-
-
-def test_rows_are_those_of_the_bodies_and_then_of_other_frames():
-    scanned = Scanned(True)
-    assert sorted(scanned.poses.rows.values()) == list(range(5))
-    with pytest.raises(RuntimeError, match="more_poses"):
-        scanned.poses.get_output_port().Eval(
-            scanned.poses.GetMyContextFromRoot(scanned.context)
-        )

@@ -25,8 +25,8 @@ from cns_drake.scene.structure_table import (
     StructureEntry,
     StructureTable,
 )
-from cns_drake.sensors.beam_pattern import POINT_DTYPE
-from cns_drake.sensors.measurement import MeasurementModel
+from cns_drake.sensors.lidar.measurement import MeasurementModel
+from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 
 
 def test_box_room():
@@ -223,7 +223,7 @@ def test_a_cloned_context_sees_for_itself():
 def test_a_cloned_context_has_poses_of_its_own():
     stage = Stage()
     stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
-    stage.finish(X_PS=RigidTransform(), pattern=FORWARD, with_sweep=True)
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
 
     def ahead_from(x):
         sweep = Sweep(np.eye(3)[None], np.array([[x, 0.0, 0.0]]))

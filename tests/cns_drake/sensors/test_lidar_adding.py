@@ -20,8 +20,8 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource
 import pytest
 
-from cns_drake.sensors.lidar_adding import add_lidar
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.adding import add_lidar
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 INERTIA = SpatialInertia.SolidBoxWithDensity(1000.0, 1.0, 1.0, 1.0)
 

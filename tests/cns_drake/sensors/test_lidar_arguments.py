@@ -9,8 +9,8 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.sensors.lidar_adding import add_lidar
-from cns_drake.sensors.measurement import MeasurementModel
+from cns_drake.sensors.lidar.adding import add_lidar
+from cns_drake.sensors.lidar.measurement import MeasurementModel
 
 X_PS = RigidTransform([0.0, 0.0, 1.0])
 

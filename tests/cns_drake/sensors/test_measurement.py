@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.sensors.measurement import IDEAL, MeasurementModel
+from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 
 NUM_BEAMS = 200_000
 LIMITS = (0.8, 120.0)

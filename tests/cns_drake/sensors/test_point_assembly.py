@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cns_drake.sensors.beam_pattern import POINT_DTYPE
-from cns_drake.sensors.lidar_presets import make_beam_pattern
-from cns_drake.sensors.point_assembly import BeamTable, assemble_points
+from cns_drake.sensors.lidar.lidar import BeamTable, assemble_points
+from cns_drake.sensors.lidar.patterns import POINT_DTYPE
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 
 @pytest.mark.parametrize("step", [0.0, 2.0**-10, 0.003])

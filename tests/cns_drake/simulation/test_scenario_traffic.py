@@ -9,10 +9,9 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.scenarios.traffic_config import TrafficConfig
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
+from cns_drake.scenarios.scenario import TrafficConfig
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.simulation.loaded_drive import load_drive, plan_scenario_traffic
 
 
 @pytest.fixture

@@ -8,14 +8,14 @@ from scipy.special import lambertw
 
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_loading import make_scenario
-from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
-from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.sensors.lidar.config import WeatherConfig, make_pattern
 from cns_drake.sensors.returns.link_budget import HOPELESS_SNR
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
+from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.simulation import simulate
-from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.station import make_station
 from evaluation.drives import open_drive
 from evaluation.drives.deskewing import deskew

@@ -14,8 +14,7 @@ from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 from cns_drake.export.exporting import export_drive
 from cns_drake.recording.schedule import START_NS
-from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import check_files, load_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies.recording_step import is_recorded
 

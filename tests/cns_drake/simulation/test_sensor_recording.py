@@ -25,11 +25,10 @@ import pytest
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
-from cns_drake.sensors.imu import add_imu
-from cns_drake.sensors.lidar_adding import add_lidar
-from cns_drake.sensors.lidar_presets import make_beam_pattern
-from cns_drake.sensors.lidar_view import add_lidar_view
-from cns_drake.sensors.odometry import add_odometry
+from cns_drake.sensors.imu.imu import add_imu
+from cns_drake.sensors.lidar.adding import add_lidar, add_lidar_view
+from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation.sensor_recording import add_mcap_recorder
 from evaluation.drives import open_drive
 

@@ -11,11 +11,11 @@ from pydrake.systems.framework import DiagramBuilder
 import pytest
 
 from cns_drake.base.drives.mcap_drive import McapDrive
-from cns_drake.sensors.imu import add_imu
-from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
-from cns_drake.sensors.lidar_adding import add_lidar
-from cns_drake.sensors.lidar_presets import make_beam_pattern
-from cns_drake.sensors.odometry import add_odometry
+from cns_drake.sensors.imu.imu import add_imu
+from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
+from cns_drake.sensors.lidar.adding import add_lidar
+from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation.sensor_recording import add_mcap_recorder
 
 NOISE = ImuNoise(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
 from evaluation.drives import open_drive

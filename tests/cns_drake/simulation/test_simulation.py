@@ -8,10 +8,13 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.scenarios.scenario_files import world_file
-from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
+from cns_drake.scenarios.scenario_files import (
+    load_scenario,
+    make_scenario,
+    world_file,
+)
+from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.simulation import simulate
-from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.studies.recording_jobs import record_all
 from cns_drake.studies.recording_step import is_recorded
 

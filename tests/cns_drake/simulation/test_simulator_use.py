@@ -10,8 +10,8 @@ from pydrake.systems.framework import DiagramBuilder, EventStatus
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.sensors.lidar_adding import add_lidar
-from cns_drake.sensors.odometry import add_odometry
+from cns_drake.sensors.lidar.adding import add_lidar
+from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation.sensor_recording import add_mcap_recorder
 from evaluation.drives import open_drive
 

@@ -14,11 +14,10 @@ from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 from cns_drake.export.marked_drive import MarkedDrive
 from cns_drake.scenarios.provenance import digest_inputs
-from cns_drake.scenarios.scenario_files import describe_scenario
-from cns_drake.scenarios.scenario_loading import make_scenario
+from cns_drake.scenarios.scenario_files import describe_scenario, make_scenario
+from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
-from cns_drake.simulation.stage_loading import load_stage
 from evaluation.change.tcr import temporal_change
 
 

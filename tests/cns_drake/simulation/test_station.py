@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.scenarios.scenario_loading import make_scenario
-from cns_drake.scenarios.sensor_making import sensor_pose
-from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.scenarios.scenario_files import make_scenario
+from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.station import make_station
 
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
@@ -33,7 +33,6 @@ def test_systems_and_ports_have_their_names(scenario):
         "scene_graph",
         "vehicle_motion",
         "geometry_pose",
-        "frame_poses",
         "lidar",
         "imu_accelerometer",
         "imu_gyroscope",

@@ -5,8 +5,8 @@ from helpers.small_map import scenario_values
 import numpy as np
 import pytest
 
-from cns_drake.scenarios.scenario_loading import make_scenario
-from cns_drake.scenarios.sensor_making import sensor_pose
+from cns_drake.scenarios.scenario_files import make_scenario
+from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.station import make_station
 

@@ -12,7 +12,7 @@ import pytest
 
 from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.exact_overlap import exact_overlaps
 from evaluation.recognition.overlap_truth import overlap_matrix, read_overlaps

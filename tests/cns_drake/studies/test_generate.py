@@ -23,7 +23,7 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies.recording_jobs import record_all
 from cns_drake.studies.recording_step import is_recorded

@@ -11,9 +11,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.scenarios.scenario_files import map_folder
-from cns_drake.scenarios.scenario_loading import load_scenario
-from cns_drake.simulation.scenario_traffic import load_ways
+from cns_drake.scenarios.scenario_files import load_scenario, map_folder
+from cns_drake.simulation.loaded_drive import load_ways
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies import distractors, ladder
 from cns_drake.studies.distractors import distracting_drives

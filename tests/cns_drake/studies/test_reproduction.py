@@ -9,7 +9,7 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction

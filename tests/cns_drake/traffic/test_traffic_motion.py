@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.sensors.lidar_adding import connect_lidar
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_adding import (
     connect_traffic,
@@ -65,12 +65,19 @@ def make_diagram(plan, goes_on, is_posed=True):
             make_beam_pattern("os1-128", 0.05),
             structures=structures,
             moving_bodies=traffic.moving_frames if goes_on else None,
-            posed_frames=traffic.moving_frames if is_posed else None,
         ),
     )
     place_traffic(builder, scene_graph, traffic)
     connect_lidar(builder, scene_graph, lidar)
-    connect_traffic(builder, traffic, lidar, goes_on)
+    if is_posed:
+        connect_traffic(builder, traffic, lidar, goes_on)
+    else:
+        names = ["moving_instances"]
+        names += ["body_spatial_velocities"] if goes_on else []
+        for name in names:
+            builder.Connect(
+                traffic.GetOutputPort(name), lidar.GetInputPort(name)
+            )
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     context.SetTime(T)
@@ -221,13 +228,13 @@ def test_poses_as_one_array_are_those_of_the_scene_graph(scanned):
     query_object = scene_graph.get_query_output_port().Eval(
         scene_graph.GetMyContextFromRoot(context)
     )
-    X_WLs = traffic.GetOutputPort("frame_poses").Eval(
+    known = traffic.GetOutputPort("frame_poses").Eval(
         traffic.GetMyContextFromRoot(context)
     )
-    for frame, row in traffic.moving_frames.items():
+    for frame, row in known.rows.items():
         np.testing.assert_allclose(
             query_object.GetPoseInWorld(frame).GetAsMatrix4(),
-            X_WLs[row],
+            known.X_WFs[row],
             atol=1e-13,
         )
     other, *_ = make_diagram(make_plan(), goes_on, is_posed=False)

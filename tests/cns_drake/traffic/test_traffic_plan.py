@@ -8,7 +8,7 @@ import shapely
 
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.traffic import traffic_plan
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways

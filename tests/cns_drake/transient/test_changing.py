@@ -6,9 +6,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 import shapely
 
-from cns_drake.scenarios.transient_config import TransientConfig
+from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.transient.bays_refilled import make_bays
 from cns_drake.transient.changing import change_world

@@ -181,8 +181,8 @@ def test_of_our_own_code_the_right_modules_count(packages):
             ignore=shutil.ignore_patterns("__pycache__"),
         )
     for path, counts, module in (
-        ("cns_drake/sensors/lidar_presets.py", True, SIMULATION),
-        ("cns_drake/sensors/lidar_presets.py", False, SURVEY),
+        ("cns_drake/sensors/lidar/presets.py", True, SIMULATION),
+        ("cns_drake/sensors/lidar/presets.py", False, SURVEY),
         ("evaluation/methods/btc.py", True, SURVEY),
         ("evaluation/methods/btc.py", False, SIMULATION),
         ("evaluation/report/page_template/page.css", False, SURVEY),

@@ -7,7 +7,7 @@ import pytest
 from scipy.special import lambertw
 
 from cns_drake.scene.semantics import CLASS_IDS
-from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
+from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from cns_drake.sensors.returns.link_budget import (
     SheetRow,
     detection_probability,

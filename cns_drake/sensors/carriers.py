@@ -1,0 +1,51 @@
+"""The place of a sensor on its carrier, and the carrier's motion."""
+
+from __future__ import annotations
+
+import math
+
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.tree import Frame, RigidBody
+from pydrake.systems.framework import DiagramBuilder, InputPort, System
+
+from cns_drake.sensors.sensor_config import Mount
+
+
+def sensor_pose(mount: Mount) -> RigidTransform:
+    """Returns the pose X_BS of a sensor in base_link."""
+    roll, pitch, yaw = map(math.radians, mount.rpy_deg)
+    return RigidTransform(RollPitchYaw(roll, pitch, yaw), mount.xyz)
+
+
+def body_and_pose(
+    place: RigidBody | Frame, X_PS: RigidTransform
+) -> tuple[RigidBody, RigidTransform]:
+    """Returns the body B of a place P, and X_BS.
+
+    Args:
+        place: P, a body or a frame fixed on one.
+        X_PS: pose of a sensor in P.
+    """
+    if isinstance(place, Frame):
+        return place.body(), place.GetFixedPoseInBodyFrame() @ X_PS
+    return place, X_PS
+
+
+def connect_motion(
+    builder: DiagramBuilder,
+    motion: System | None,
+    body: RigidBody,
+    inputs: dict[str, InputPort],
+) -> None:
+    """Connects inputs to the source of the bodies' motion.
+
+    Args:
+        builder: holds the source and the inputs.
+        motion: a system with the kinematic output ports of a MultibodyPlant;
+            None for the body's plant itself.
+        body: a body of the plant.
+        inputs: name of an output port -> the input to connect.
+    """
+    source = body.GetParentPlant() if motion is None else motion
+    for name, port in inputs.items():
+        builder.Connect(source.GetOutputPort(name), port)

@@ -1,0 +1,1 @@
+"""The IMU: its description, its errors, and its systems."""

@@ -1,0 +1,156 @@
+"""The description of an IMU, and the file of its noise."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from pydantic import Field, ValidationError
+
+from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.sensors.imu.noise import ImuNoise
+from cns_drake.sensors.sensor_config import (
+    Mount,
+    Section,
+    Triple,
+    check_rate,
+    field_off_by_default,
+)
+
+# The name of the noise's file in a recording.
+KALIBR_FILE = "imu.yaml"
+
+
+class ImuConfig(Mount):
+    """An IMU, ideal and with one sample a scan unless a field says otherwise.
+
+    Attributes:
+        xyz: position in `base_link` [m].
+        rpy_deg: roll, pitch, yaw in `base_link` [deg].
+        rate: samples per second, from the rate of the scans to 1000; it divides
+            1,000,000,000 ns, as 100, 200, 250, 400 and 500 do.
+        kalibr: a file of Kalibr's with the four noise densities.
+        accelerometer_turn_on_bias: standard deviation of the accelerometer's
+            bias at the start, drawn for each axis [m/s^2].
+        gyroscope_turn_on_bias: likewise of the gyroscope [rad/s].
+        accelerometer_range: the most that an axis of the accelerometer
+            measures, either way [m/s^2].
+        gyroscope_range: likewise of the gyroscope [rad/s].
+    """
+
+    xyz: Triple = (-1.0, 0.0, 1.6)
+    rate: int | None = field_off_by_default(None)
+    kalibr: str | None = field_off_by_default(None)
+    accelerometer_turn_on_bias: float = field_off_by_default(0.0, ge=0.0)
+    gyroscope_turn_on_bias: float = field_off_by_default(0.0, ge=0.0)
+    accelerometer_range: float | None = field_off_by_default(None, gt=0.0)
+    gyroscope_range: float | None = field_off_by_default(None, gt=0.0)
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether it measures exactly, once a scan."""
+        return self == ImuConfig(xyz=self.xyz, rpy_deg=self.rpy_deg)
+
+    def sample_rate(self, scan_rate: int) -> int:
+        """Returns the samples per second.
+
+        By default it is the rate in Kalibr's file, or else one sample a scan.
+
+        Args:
+            scan_rate: scans per second of the fastest LiDAR.
+
+        Raises:
+            InputError: Kalibr's file cannot be used.
+        """
+        if self.rate is not None:
+            return self.rate
+        kalibr = self._read_kalibr()
+        if kalibr is None or kalibr.update_rate is None:
+            return scan_rate
+        try:
+            check_rate(kalibr.update_rate, scan_rate)
+        except ValueError as error:
+            raise InputError(f"{self.kalibr}: update_{error}") from error
+        return round(kalibr.update_rate)
+
+    def noise(self, seed: int) -> ImuNoise:
+        """Returns the errors, all zero if the IMU is ideal.
+
+        Args:
+            seed: seed of the random numbers.
+
+        Raises:
+            InputError: Kalibr's file cannot be used.
+        """
+        densities = {}
+        kalibr = self._read_kalibr()
+        if kalibr is not None:
+            densities = kalibr.model_dump(exclude={"rostopic", "update_rate"})
+        return ImuNoise(
+            **densities,
+            accelerometer_turn_on_bias=self.accelerometer_turn_on_bias,
+            gyroscope_turn_on_bias=self.gyroscope_turn_on_bias,
+            accelerometer_range=self.accelerometer_range or math.inf,
+            gyroscope_range=self.gyroscope_range or math.inf,
+            seed=seed,
+        )
+
+    def describe_kalibr(self, scan_rate: int) -> dict | None:
+        """Returns the fields of Kalibr's file for the IMU as it is simulated.
+
+        Args:
+            scan_rate: scans per second of the fastest LiDAR.
+
+        Returns:
+            None if there is no such file.
+
+        Raises:
+            InputError: the file cannot be used.
+        """
+        kalibr = self._read_kalibr()
+        if kalibr is None:
+            return None
+        rate = float(self.sample_rate(scan_rate))
+        update = {"rostopic": "/imu/data", "update_rate": rate}
+        return kalibr.model_copy(update=update).model_dump()
+
+    def _read_kalibr(self) -> KalibrImu | None:
+        return None if self.kalibr is None else read_kalibr(Path(self.kalibr))
+
+
+class KalibrImu(Section):
+    """The fields of Kalibr's `imu.yaml`.
+
+    Attributes:
+        accelerometer_noise_density: white noise [m/s^2/sqrt(Hz)].
+        accelerometer_random_walk: walk of the bias [m/s^3/sqrt(Hz)].
+        gyroscope_noise_density: white noise [rad/s/sqrt(Hz)].
+        gyroscope_random_walk: walk of the bias [rad/s^2/sqrt(Hz)].
+        rostopic: topic of its messages; not used.
+        update_rate: samples per second.
+    """
+
+    accelerometer_noise_density: float = Field(ge=0.0)
+    accelerometer_random_walk: float = Field(ge=0.0)
+    gyroscope_noise_density: float = Field(ge=0.0)
+    gyroscope_random_walk: float = Field(ge=0.0)
+    rostopic: str | None = None
+    update_rate: float | None = Field(default=None, gt=0.0)
+
+
+def read_kalibr(path: Path) -> KalibrImu:
+    """Reads the noise of an IMU.
+
+    Raises:
+        InputError: the file cannot be read, or has another form.
+    """
+    values = read_yaml(path)
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: not a mapping of Kalibr's fields of an IMU")
+    try:
+        return KalibrImu.model_validate(values)
+    except ValidationError as error:
+        raise InputError(
+            describe_validation_error(path, error, KalibrImu)
+        ) from None

@@ -1,0 +1,1 @@
+"""The LiDAR: its description, presets and beams, its system."""

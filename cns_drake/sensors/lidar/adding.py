@@ -1,0 +1,379 @@
+"""Adding a LiDAR to a diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+import warnings
+
+from pydrake.geometry import (
+    FrameId,
+    GeometryId,
+    Meshcat,
+    MeshcatPointCloudVisualizer,
+    Rgba,
+    Role,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
+from pydrake.systems.framework import DiagramBuilder, System
+
+from cns_drake.motion.sweep import VehicleSweep
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.scene.geometry_revision import geometry_revision_port
+from cns_drake.sensors.carriers import (
+    body_and_pose,
+    connect_motion,
+    sensor_pose,
+)
+from cns_drake.sensors.lidar.config import (
+    LidarConfig,
+    WeatherConfig,
+    make_measurement,
+    make_pattern,
+    make_returns,
+)
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.measurement import MeasurementModel
+from cns_drake.sensors.lidar.patterns import BeamPattern
+from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+_VIEW_COLOR = Rgba(0.9, 0.2, 0.1, 1.0)
+_CLEAR = WeatherConfig()
+
+
+def add_lidar(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    body: RigidBody | Frame | FrameId,
+    X_PS: RigidTransform,
+    pattern: BeamPattern | str,
+    *,
+    name: str = "lidar",
+    unseen: Collection[RigidBody | FrameId | GeometryId] | None = None,
+    motion_distortion: bool = False,
+    motion: System | None = None,
+    range_noise: float = 0.0,
+    dropout: float = 0.0,
+    seed: int = 0,
+    returns: CalibratedReturns | str = "ideal",
+    **options: Any,
+) -> Lidar:
+    """Adds a LiDAR to a diagram and connects it to the SceneGraph.
+
+    Args:
+        builder: holds `scene_graph`.
+        scene_graph: the SceneGraph to scan.
+        body: P, a body or a frame fixed on one, of a finalized plant that is
+            registered with `scene_graph`; or a frame that any other source has
+            registered there.
+        X_PS: pose of the sensor S in P.
+        pattern: the beams, or the name of a preset, which then turns at the
+            rate of its data sheet.
+        name: name of the system.
+        unseen: frames and geometries that the LiDAR does not see; by default
+            its body and all bodies welded to it, without the world.
+        motion_distortion: whether the LiDAR and all other bodies of the plant
+            keep moving during a turn (see `Lidar`).
+        motion: the source of the bodies' velocities then, if not the plant
+            itself.
+        range_noise: standard deviation of the ranges [m].
+        dropout: probability that a return is lost.
+        seed: seed of both, and of calibrated returns. The noise depends on it,
+            on the name and on the number of the frame. `measurement` of
+            `Lidar` replaces these three.
+        returns: `ideal`, `calibrated` by the data sheet of a preset, or a
+            `CalibratedReturns`.
+        options: further arguments of `Lidar`.
+
+    Returns:
+        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`
+        and `X_WS`.
+
+    Raises:
+        KeyError: there is no preset of that name.
+        RuntimeError: the body is not registered with a SceneGraph.
+        TypeError: an argument is of the wrong type.
+        ValueError: the diagram has a system of that name, the noise is out of
+            range, motion distortion needs a body, or calibrated returns need a
+            preset.
+
+    Warns:
+        UserWarning: the SceneGraph has no geometry that the LiDAR could see.
+
+    Example:
+        from cns_drake import add_lidar
+
+        lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
+        builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
+    """
+    _check_arguments(builder, scene_graph, name, body, X_PS, pattern)
+    _warn_of_nothing_to_see(scene_graph, options.get("role", Role.kPerception))
+    _choose_measuring(
+        options, pattern, returns, name, range_noise, dropout, seed
+    )
+    if not isinstance(body, FrameId):
+        body, X_PS = body_and_pose(body, X_PS)
+    if isinstance(pattern, str):
+        pattern = make_beam_pattern(pattern)
+    if isinstance(body, RigidBody):
+        plant = body.GetParentPlant()
+        frame_id = plant.GetBodyFrameIdOrThrow(body.index())
+        if unseen is None:
+            unseen = _welded_to(body)
+        options.setdefault("anchored_frames", _anchored_frames(plant))
+        if motion_distortion:
+            options["moving_bodies"] = _moving_bodies(plant)
+    else:
+        frame_id = body
+        if motion_distortion:
+            raise ValueError(
+                "motion distortion needs a body of a plant, which has its "
+                "velocity; a frame of another source does not"
+            )
+    if unseen is not None:
+        options["unseen"] = [
+            _frame_of(place) if isinstance(place, RigidBody) else place
+            for place in unseen
+        ]
+    lidar = builder.AddNamedSystem(
+        name, Lidar(frame_id, X_PS, pattern, **options)
+    )
+    connect_lidar(builder, scene_graph, lidar)
+    if motion_distortion and isinstance(body, RigidBody):
+        port = "body_spatial_velocities"
+        connect_motion(builder, motion, body, {port: lidar.GetInputPort(port)})
+    return lidar
+
+
+def apply_lidar_config(
+    config: LidarConfig,
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    body: RigidBody,
+    *,
+    name: str = "lidar",
+    seed: int = 0,
+    weather: WeatherConfig = _CLEAR,
+    trajectory: Trajectory | None = None,
+    **options: Any,
+) -> Lidar:
+    """Adds the LiDAR that a description describes to a diagram.
+
+    Args:
+        config: the description.
+        builder: holds `scene_graph`.
+        scene_graph: the SceneGraph to scan.
+        body: the body that carries it.
+        name: name of the system.
+        seed: seed of its noise.
+        weather: weather around it.
+        trajectory: prescribed motion of the body. A LiDAR with motion
+            distortion gets its poses from there, by a system `<name>_sweep`.
+        options: further arguments of `add_lidar`.
+    """
+    pattern = make_pattern(config)
+    lidar = add_lidar(
+        builder,
+        scene_graph,
+        body,
+        sensor_pose(config),
+        pattern,
+        name=name,
+        measurement=make_measurement(config, name, seed),
+        returns=make_returns(config, weather, name, seed) or "ideal",
+        **options,
+    )
+    if config.motion_distortion and trajectory is not None:
+        sweep = builder.AddNamedSystem(
+            f"{name}_sweep",
+            VehicleSweep(trajectory, pattern.column_t_ns * 1e-9),
+        )
+        builder.Connect(
+            sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
+        )
+    return lidar
+
+
+def add_lidar_view(
+    builder: DiagramBuilder,
+    lidar: Lidar,
+    meshcat: Meshcat,
+    *,
+    period: float | None = None,
+    color: Rgba = _VIEW_COLOR,
+    point_size: float = 0.05,
+) -> MeshcatPointCloudVisualizer:
+    """Adds a live view of a LiDAR's scans, at their places in Meshcat.
+
+    Args:
+        builder: holds the LiDAR.
+        lidar: its points are shown at the path of its system's name.
+        meshcat: the view.
+        period: time between two shown scans [s]; by default that of a turn.
+        color: colour of the points.
+        point_size: their size [m].
+
+    Example:
+        from cns_drake import add_lidar_view
+
+        add_lidar_view(builder, lidar, meshcat)
+    """
+    name = lidar.get_name()
+    view = builder.AddNamedSystem(
+        f"{name}_view",
+        MeshcatPointCloudVisualizer(
+            meshcat, name, lidar.pattern.period if period is None else period
+        ),
+    )
+    view.set_default_rgba(color)
+    view.set_point_size(point_size)
+    builder.Connect(
+        lidar.GetOutputPort("point_cloud_W"), view.cloud_input_port()
+    )
+    return view
+
+
+def _choose_measuring(
+    options: dict[str, Any],
+    pattern: BeamPattern | str,
+    returns: CalibratedReturns | str,
+    name: str,
+    range_noise: float,
+    dropout: float,
+    seed: int,
+) -> None:
+    """Sets the options of `Lidar` for its measurement."""
+    if returns == "calibrated" and isinstance(pattern, str):
+        returns = CalibratedReturns.of_preset(
+            pattern, seed=seed, sensor_name=name
+        )
+    if isinstance(returns, CalibratedReturns):
+        if range_noise or dropout:
+            raise ValueError(
+                "range_noise, dropout: calibrated returns have their own; "
+                "leave these out"
+            )
+        options["returns"] = returns
+    elif returns != "ideal":
+        raise ValueError(
+            f"returns: {returns!r}: give 'ideal', 'calibrated' with the name "
+            "of a preset as pattern, or CalibratedReturns"
+        )
+    elif range_noise or dropout or seed:
+        if "measurement" in options:
+            raise ValueError(
+                "measurement: give either it or range_noise, dropout and seed"
+            )
+        options["measurement"] = MeasurementModel(
+            range_noise=range_noise,
+            dropout=dropout,
+            seed=seed,
+            sensor_name=name,
+        )
+
+
+def connect_lidar(
+    builder: DiagramBuilder, scene_graph: SceneGraph, lidar: Lidar
+) -> None:
+    """Connects a LiDAR's inputs to a SceneGraph."""
+    for source, target in (
+        (scene_graph.get_query_output_port(), "geometry_query"),
+        (geometry_revision_port(scene_graph), "geometry_revision"),
+    ):
+        builder.Connect(source, lidar.GetInputPort(target))
+
+
+def _welded_to(body: RigidBody) -> list[RigidBody]:
+    """Returns a body and all bodies welded to it, not through the world."""
+    plant = body.GetParentPlant()
+    world = plant.world_body().index()
+    neighbours: dict[int, list[RigidBody]] = {}
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(index)
+        if isinstance(joint, WeldJoint):
+            ends = joint.parent_body(), joint.child_body()
+            for one, other in (ends, ends[::-1]):
+                neighbours.setdefault(int(one.index()), []).append(other)
+    found: dict[int, RigidBody] = {}
+    rest = [] if body.index() == world else [body]
+    while rest:
+        place = rest.pop()
+        if int(place.index()) in found or place.index() == world:
+            continue
+        found[int(place.index())] = place
+        rest += neighbours.get(int(place.index()), [])
+    return list(found.values())
+
+
+def _anchored_frames(plant: MultibodyPlant) -> list[FrameId]:
+    """Returns the frames that can only move if the model is changed."""
+    return [_frame_of(b) for b in plant.GetBodiesWeldedTo(plant.world_body())]
+
+
+def _moving_bodies(plant: MultibodyPlant) -> dict[FrameId, int]:
+    """Returns frame -> index of its body."""
+    frames = {
+        k: plant.GetBodyFrameIdIfExists(BodyIndex(k))
+        for k in range(plant.num_bodies())
+    }
+    return {frame: k for k, frame in frames.items() if frame is not None}
+
+
+def _frame_of(body: RigidBody) -> FrameId:
+    return body.GetParentPlant().GetBodyFrameIdOrThrow(body.index())
+
+
+def _check_arguments(
+    builder: DiagramBuilder,
+    scene_graph: object,
+    name: str,
+    body: object,
+    X_PS: object,
+    pattern: object,
+) -> None:
+    """Checks the arguments of `add_lidar`.
+
+    Raises:
+        TypeError: the SceneGraph, the body, the pose or the pattern has the
+            wrong type.
+        ValueError: the diagram has a system of that name.
+    """
+    if not isinstance(scene_graph, SceneGraph):
+        raise TypeError(
+            f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "
+            "AddMultibodyPlantSceneGraph returns one beside the plant"
+        )
+    if not isinstance(body, RigidBody | Frame | FrameId):
+        cure = ""
+        if isinstance(body, str):
+            cure = f"; plant.GetBodyByName({body!r}) finds the body of a name"
+        raise TypeError(
+            f"body: {body!r} is not a RigidBody, Frame or FrameId{cure}"
+        )
+    if not isinstance(X_PS, RigidTransform):
+        raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")
+    if not isinstance(pattern, BeamPattern | str):
+        raise TypeError(
+            f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
+            "preset"
+        )
+    if builder.HasSubsystemNamed(name):
+        raise ValueError(
+            f"name: the diagram has a system '{name}'; give each LiDAR a name "
+            "of its own"
+        )
+
+
+def _warn_of_nothing_to_see(scene_graph: SceneGraph, role: Role) -> None:
+    """Warns if no registered geometry has the role yet."""
+    if scene_graph.model_inspector().NumGeometriesWithRole(role) == 0:
+        warnings.warn(
+            f"the SceneGraph holds no geometry of {role}: so far the LiDAR "
+            "has nothing to see. RegisterVisualGeometry of a plant gives the "
+            "perception role.",
+            stacklevel=3,
+        )

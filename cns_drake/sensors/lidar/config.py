@@ -1,0 +1,216 @@
+"""The description of a LiDAR and of the weather, and the models it gives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import (
+    Field,
+    PlainSerializer,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from cns_drake.base.drives.point_layouts import LayoutName
+from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.sensors.lidar.measurement import MeasurementModel
+from cns_drake.sensors.lidar.patterns import BeamPattern
+from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
+from cns_drake.sensors.returns.echo_choice import Echoes
+from cns_drake.sensors.sensor_config import (
+    Mount,
+    Section,
+    Triple,
+    field_off_by_default,
+)
+
+if TYPE_CHECKING:
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
+    from cns_drake.sensors.returns.weather import Weather
+
+
+class WeatherConfig(Section):
+    """The weather, which affects all LiDARs with calibrated returns.
+
+    Attributes:
+        visibility: meteorological visibility in fog [m]; no fog by default.
+        rain: rate of rain [mm/h].
+        snowfall: rate of snowfall, as water [mm/h].
+    """
+
+    visibility: float | None = Field(default=None, ge=5.0, le=1e6)
+    rain: float = Field(default=0.0, ge=0.0, le=300.0)
+    snowfall: float = Field(default=0.0, ge=0.0, le=300.0)
+
+    def weather(self) -> Weather:
+        """Returns the weather as the model of a LiDAR."""
+        # Slow to import, and not needed to describe a scenario.
+        from cns_drake.sensors.returns.weather import Weather
+
+        return Weather(self.visibility, self.rain, self.snowfall)
+
+
+class LidarConfig(Mount):
+    """A LiDAR.
+
+    Attributes:
+        preset: name of the unit, from the table of presets.
+        xyz: position in `base_link` [m].
+        rpy_deg: roll, pitch, yaw in `base_link` [deg].
+        columns: columns in a turn, in place of the preset's.
+        min_range: nearest range, in place of the preset's [m].
+        max_range: farthest range, in place of the preset's [m].
+        resolution: step of the coordinates, 2^-10 m; 0 records exact values
+            [m].
+        range_noise: standard deviation of a Gaussian error along the beam; the
+            range limits apply to the measured range [m].
+        dropout: each return is lost with this probability.
+        faint_dropout: on top, a return of intensity I is lost with this
+            probability times (1 - I).
+        motion_distortion: each column is cast from the sensor's pose at
+            `stamp + t` and expressed in its frame at that time, as real units
+            report it.
+        returns: `ideal`, or `calibrated` with the losses, errors and brightness
+            of the unit's data sheet.
+        echoes: the echoes of a beam that calibrated returns report; `dual` is
+            the strongest and the last.
+        rate: turns per second.
+        layout: the fields of a point in the recording.
+    """
+
+    xyz: Triple = (0.0, 0.0, 1.6)
+    preset: str = "cns"
+    columns: int | None = Field(default=None, ge=4, le=8192)
+    min_range: float | None = Field(default=None, ge=0.0)
+    max_range: float | None = Field(default=None, gt=0.0, le=1000.0)
+    # About the resolution of real units; needs a third less space than exact
+    # values.
+    resolution: float = Field(default=2.0**-10, ge=0.0, le=1.0)
+    range_noise: float = Field(default=0.0, ge=0.0, le=10.0)
+    dropout: float = Field(default=0.0, ge=0.0, le=1.0)
+    faint_dropout: float = Field(default=0.0, ge=0.0, le=1.0)
+    motion_distortion: bool = False
+    returns: Literal["ideal", "calibrated"] = field_off_by_default("ideal")
+    echoes: Annotated[Echoes, PlainSerializer(lambda echoes: echoes.value)] = (
+        field_off_by_default(Echoes.STRONGEST)
+    )
+    rate: Literal[5, 10, 20] = field_off_by_default(20)
+    layout: LayoutName = field_off_by_default("cns")
+
+    @field_validator("preset")
+    @classmethod
+    def _check_known(cls, preset: str) -> str:
+        if preset not in LIDAR_PRESETS:
+            known = ", ".join(LIDAR_PRESETS)
+            raise ValueError(f"unknown preset '{preset}'; known: {known}")
+        return preset
+
+    @model_validator(mode="after")
+    def _check_returns(self) -> LidarConfig:
+        if self.returns == "ideal":
+            if self.echoes != Echoes.STRONGEST:
+                raise ValueError(
+                    "echoes: only calibrated returns have a choice; add "
+                    "returns: calibrated"
+                )
+            return self
+        for field in ("range_noise", "dropout", "faint_dropout"):
+            if getattr(self, field):
+                raise ValueError(
+                    f"{field}: calibrated returns have their own; leave it out"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _check_unit(self) -> LidarConfig:
+        unit = LIDAR_PRESETS[self.preset]
+        if self.columns and unit.num_columns is None:
+            raise ValueError(f"the preset '{self.preset}' has no columns")
+        nearest = unit.min_range if self.min_range is None else self.min_range
+        farthest = unit.max_range if self.max_range is None else self.max_range
+        if nearest >= farthest:
+            raise ValueError(
+                f"min_range {nearest:g} is not below max_range {farthest:g}"
+            )
+        return self
+
+    def with_preset(self, preset: str) -> LidarConfig:
+        """Returns another unit with the same place and measurement.
+
+        Raises:
+            InputError: there is no such preset.
+        """
+        unit = make_lidar_config(preset)
+        unit_fields = ("preset", "columns", "min_range", "max_range")
+        return self.model_copy(
+            update={field: getattr(unit, field) for field in unit_fields}
+        )
+
+
+def make_lidar_config(preset: str) -> LidarConfig:
+    """Returns a LiDAR of a preset.
+
+    Raises:
+        InputError: there is no such preset.
+    """
+    try:
+        return LidarConfig(preset=preset)
+    except ValidationError as error:
+        raise InputError(describe_validation_error("--lidar", error)) from None
+
+
+def make_pattern(config: LidarConfig) -> BeamPattern:
+    """Returns the beams of one turn."""
+    return make_beam_pattern(
+        config.preset,
+        1.0 / config.rate,
+        num_columns=config.columns,
+        min_range=config.min_range,
+        max_range=config.max_range,
+    )
+
+
+def make_returns(
+    config: LidarConfig, weather: WeatherConfig, name: str, seed: int
+) -> CalibratedReturns | None:
+    """Returns the model of a LiDAR's calibrated returns; None for ideal ones.
+
+    Args:
+        config: the LiDAR.
+        weather: weather of the drive.
+        name: the LiDAR's name.
+        seed: seed of the scenario.
+    """
+    if config.returns == "ideal":
+        return None
+    # Slow to import, and not needed to describe a scenario.
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+    return CalibratedReturns.of_preset(
+        config.preset,
+        echoes=config.echoes,
+        weather=weather.weather(),
+        seed=seed,
+        sensor_name=name,
+    )
+
+
+def make_measurement(
+    config: LidarConfig, name: str, seed: int
+) -> MeasurementModel:
+    """Returns the model of a LiDAR's measurement of true ranges.
+
+    Args:
+        config: the LiDAR.
+        name: the LiDAR's name.
+        seed: seed of the scenario.
+    """
+    return MeasurementModel(
+        resolution=config.resolution,
+        range_noise=config.range_noise,
+        dropout=config.dropout,
+        faint_dropout=config.faint_dropout,
+        seed=seed,
+        sensor_name=name,
+    )

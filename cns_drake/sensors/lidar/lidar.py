@@ -1,0 +1,540 @@
+"""A LiDAR that scans the geometry of a SceneGraph."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.perception import PointCloud
+from pydrake.systems.framework import (
+    Context,
+    InputPort,
+    LeafSystem,
+    ValueProducer,
+)
+
+from cns_drake.base.compiled import compiled
+from cns_drake.ray_casting.group_motion import Motion
+from cns_drake.ray_casting.moving_groups import (
+    EVERYWHERE,
+    NOTHING_KNOWN,
+    Ball,
+    KnownPoses,
+)
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.scene.structure_table import StructureTable
+from cns_drake.sensors.lidar.measurement import (
+    IDEAL,
+    MeasurementModel,
+    Returns,
+)
+from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
+from cns_drake.sensors.lidar.seen_geometry import SeenGeometry, Sight
+from cns_drake.sensors.returns.calibrated import (
+    CalibratedReturns,
+    CalibratedTurn,
+)
+
+# The class of points without a structure.
+SCATTERED_LABEL = CLASS_IDS["outlier"]
+
+
+class Lidar(LeafSystem):
+    """A LiDAR that sees all geometry of a role except its own body's.
+
+    .. pydrake_system::
+
+        name: Lidar
+        input_ports:
+        - geometry_query
+        - geometry_revision (optional)
+        - sweep (optional)
+        - frame_poses (optional)
+        - moving_instances (optional)
+        - body_spatial_velocities (with `moving_bodies`)
+        output_ports:
+        - scan
+        - point_cloud_S
+        - point_cloud_W
+        - X_WS
+
+    Frames: W is the world, P the parent frame, S the sensor frame (x
+    forward, y left, z up). `scan` is a structured array of `POINT_DTYPE`,
+    one record per return in firing order; beams whose nearest surface is
+    closer than the minimum range or farther than the maximum range return
+    nothing. `point_cloud_S` holds the same positions as a Drake point cloud,
+    `point_cloud_W` those in the world, and `X_WS` is the pose of S at the
+    time of the output.
+
+    The turn starts at the time of the output. All its beams are cast from
+    the pose of S at that time, by the pose of P in the SceneGraph (a deskewed
+    scan). With the port `sweep`, poses come from there instead (a `Sweep` of
+    P): one for the whole turn; or with motion distortion one for each column,
+    at its own firing time. Its points are then expressed in S at that time, as
+    a real unit reports them: X_WS(time + t) takes them to their places in the
+    world. Other moving geometry stays, for the turn, at its place at the start.
+
+    With `moving_bodies` and the port `body_spatial_velocities` (a list over a
+    plant's bodies of V_WB, expressed in the world, as a MultibodyPlant gives
+    it), P and all other bodies of that plant keep their velocities for the
+    turn: each beam is cast at its own firing time, from the place of S then, on
+    the geometry at its place then. Points are expressed in S at that time, too.
+
+    `moving_instances` (abstract, the instance ids of structures) lists the
+    moving structures: their points have the label of the moving class.
+
+    `frame_poses` (abstract, `KnownPoses`) has poses X_WF that the SceneGraph
+    has as well; a LiDAR takes many of them from one array faster.
+
+    Drake cannot cast rays, so the system reads shapes and poses from the
+    QueryObject and casts on its own hierarchy, whose changed parts are built
+    anew. `geometry_revision` (from `geometry_revision_port`) shows when
+    geometry has changed; without it the LiDAR compares all geometry at every
+    scan, which in a world of thousands of geometries takes longer than the
+    scan.
+
+    Example:
+        from cns_drake import Lidar, make_beam_pattern
+
+        lidar = Lidar(frame_id, X_PS, make_beam_pattern("os1-64", 0.1))
+    """
+
+    def __init__(
+        self,
+        parent_frame_id: FrameId,
+        X_PS: RigidTransform,
+        pattern: BeamPattern,
+        *,
+        measurement: MeasurementModel = IDEAL,
+        returns: CalibratedReturns | None = None,
+        moving_bodies: Mapping[FrameId, int] | None = None,
+        role: Role = Role.kPerception,
+        unseen: Collection[FrameId | GeometryId] | None = None,
+        structures: StructureTable | None = None,
+        anchored_frames: Collection[FrameId] = (),
+        num_threads: int = 1,
+    ):
+        """Constructs the LiDAR.
+
+        Args:
+            parent_frame_id: the frame P that carries the sensor.
+            X_PS: pose of the sensor in P.
+            pattern: the beams.
+            measurement: the model of noise, losses and rounding.
+            returns: the model of a real unit; then `measurement` gives only the
+                resolution. None for ideal returns.
+            moving_bodies: frame -> index of its body in the port
+                `body_spatial_velocities`, which only a LiDAR with this has.
+            role: role of the geometry that it sees.
+            unseen: frames and geometries that it does not see; by default
+                P, unless that is the world's frame.
+            structures: gives labels and instance ids to returns.
+            anchored_frames: frames that never move, besides the world's; their
+                geometry is cheaper to cast on. If one moves after all, all
+                static geometry is built anew.
+            num_threads: number of threads that share its rays; the measurement
+                does not depend on it.
+        """
+        super().__init__()
+        self._parent_frame_id = parent_frame_id
+        self._X_PS = X_PS
+        self._pattern = pattern
+        self._measurement = measurement
+        self._returns = returns
+        sight = Sight(
+            role,
+            parent_frame_id,
+            None if unseen is None else frozenset(unseen),
+            structures or StructureTable(()),
+            frozenset(anchored_frames),
+            num_threads,
+        )
+        self._first = self._latest = _Turn(0, pattern.beams(0))
+        # When each column fires, as a part of a turn.
+        self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
+
+        declare = self.DeclareAbstractInputPort
+        self._geometry_query = declare("geometry_query", Value(QueryObject()))
+        self._revision = declare("geometry_revision", Value(object()))
+        self._moving = declare(
+            "moving_instances", Value(np.zeros(0, np.uint16))
+        )
+        self._sweep = declare("sweep", Value(object()))
+        self._frame_poses = declare("frame_poses", Value(object()))
+        self._velocities: InputPort | None = None
+        self._moving_bodies = dict(moving_bodies or {})
+        if moving_bodies is not None:
+            self._velocities = declare(
+                "body_spatial_velocities",
+                AbstractValue.Make([SpatialVelocity()]),
+            )
+        inputs = {self.all_input_ports_ticket()}
+        # Kept until the SceneGraph changes.
+        self._seen = self.DeclareCacheEntry(
+            description="ray-casting scene",
+            value_producer=ValueProducer(
+                allocate=lambda: Value(SeenGeometry(sight)),
+                calc=self._calc_seen,
+            ),
+            prerequisites_of_calc=inputs,
+        )
+        changes = (
+            measurement.is_random or returns is not None or not pattern.repeats
+        )
+        self._scan = self.DeclareAbstractOutputPort(
+            "scan",
+            alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
+            calc=self._calc_scan,
+            prerequisites_of_calc=(
+                inputs | ({self.time_ticket()} if changes else set())
+            ),
+        )
+        scan = {self.cache_entry_ticket(self._scan.cache_entry().cache_index())}
+        for name, calc, prerequisites in (
+            ("point_cloud_S", self._calc_point_cloud_S, scan),
+            ("point_cloud_W", self._calc_point_cloud_W, scan | inputs),
+        ):
+            self.DeclareAbstractOutputPort(
+                name,
+                alloc=lambda: Value(PointCloud()),
+                calc=calc,
+                prerequisites_of_calc=prerequisites,
+            )
+        self.DeclareAbstractOutputPort(
+            "X_WS",
+            alloc=lambda: Value(RigidTransform()),
+            calc=self._calc_X_WS,
+            prerequisites_of_calc=inputs,
+        )
+
+    @property
+    def pattern(self) -> BeamPattern:
+        return self._pattern
+
+    @property
+    def parent_frame_id(self) -> FrameId:
+        return self._parent_frame_id
+
+    @property
+    def X_PS(self) -> RigidTransform:
+        return self._X_PS
+
+    def EvalScene(self, context: Context) -> RayCastingScene:
+        """Returns what the LiDAR sees in a Context, to cast other rays on."""
+        scene = self._eval_seen(context).scene
+        assert scene is not None
+        return scene
+
+    def _eval_seen(self, context: Context) -> SeenGeometry:
+        seen = self._seen.Eval(context)
+        if seen.scene is None:  # In a cloned Context.
+            self._update(context, seen)
+        return seen
+
+    def _calc_seen(self, context: Context, value: AbstractValue) -> None:
+        self._update(context, value.get_value())
+
+    def _update(self, context: Context, seen: SeenGeometry) -> None:
+        known, ball = self._known_poses(context), EVERYWHERE
+        if known is not NOTHING_KNOWN:
+            # Geometry out of sight is not moved.
+            ball = self._calc_ball(context)
+        seen.update(
+            self._geometry_query.Eval(context),
+            _value(self._revision, context),
+            self._calc_motions(context),
+            known,
+            ball,
+        )
+
+    def _known_poses(self, context: Context) -> KnownPoses:
+        return _value(self._frame_poses, context, NOTHING_KNOWN)
+
+    def _calc_ball(self, context: Context) -> Ball:
+        """Returns the ball in which beams can meet geometry."""
+        model = self._returns or self._measurement
+        reach = model.reach(self._pattern.max_range)
+        p_WSset, _ = self._calc_poses(context)
+        middle, way = p_WSset[0], 0.0
+        if len(p_WSset) > 1:
+            middle = p_WSset.mean(axis=0)
+            way = np.linalg.norm(p_WSset - middle, axis=1).max()
+        # A metre of margin for rounding and merged beams.
+        return Ball(middle, float(reach + way) + 1.0)
+
+    def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
+        """Returns the motion of each frame that does not stay."""
+        if self._velocities is None:
+            return {}
+        V_WBs = self._velocities.Eval(context)
+        duration = self._pattern.period
+        motions = {
+            frame_id: Motion(
+                V_WBs[body].rotational(),
+                V_WBs[body].translational(),
+                duration,
+            )
+            for frame_id, body in self._moving_bodies.items()
+        }
+        return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
+
+    def _calc_scan(self, context: Context, output: AbstractValue) -> None:
+        seen = self._eval_seen(context)
+        frame, turn = self._turn_at(context.get_time())
+        p_WSset, R_WSset = self._calc_poses(context)
+        columns = turn.beams.cast_columns
+        times = self._times
+        if columns is not None:
+            times = times[columns]
+            if len(p_WSset) > 1:
+                p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
+        met, (beams, ranges, intensity) = self._measure(
+            seen, turn, p_WSset, R_WSset, times, frame
+        )
+        labels = seen.label
+        moving = _value(self._moving, context)
+        if moving is not None:
+            labels = seen.labels(moving)
+        # Zeros, so that the padding between fields is defined, too.
+        scan = np.zeros(len(beams), POINT_DTYPE)
+        assemble_points(
+            scan,
+            turn.table,
+            beams,
+            ranges,
+            intensity,
+            met,
+            labels,
+            seen.instance,
+            np.float32(self._measurement.resolution),
+        )
+        output.set_value(scan)
+
+    def _measure(
+        self,
+        seen: SeenGeometry,
+        turn: _Turn,
+        p_WSset: np.ndarray,
+        R_WSset: np.ndarray,
+        times: np.ndarray,
+        frame: int,
+    ) -> tuple[np.ndarray, Returns]:
+        """Returns the hit geometry of each return, and the returns."""
+        assert seen.scene is not None
+        if self._returns is not None:
+            reported = self._returns.measure(
+                seen.scene,
+                seen.materials(is_wet=self._returns.is_wet),
+                self._pattern,
+                turn.calibrated,
+                p_WSset,
+                R_WSset,
+                times,
+                frame,
+            )
+            return reported.geometry, Returns(*reported[:3])
+        hits = seen.scene.cast_rays(
+            p_WSset,
+            turn.d_Sset_cast,
+            self._measurement.reach(self._pattern.max_range),
+            R_WSset=R_WSset,
+            times=times,
+        )
+        returns = self._measurement.measure(
+            hits.ranges.take(turn.table.place),
+            self._pattern.min_range,
+            self._pattern.max_range,
+            frame,
+        )
+        places = turn.table.place.take(returns.beams)
+        return hits.geometry.take(places), returns
+
+    def _turn_at(self, time: float) -> tuple[int, _Turn]:
+        """Returns the number and the beams of the turn that starts at a time.
+
+        Args:
+            time: start of the turn [s].
+        """
+        frame = round(time / self._pattern.period)
+        if self._pattern.repeats:
+            return frame, self._first
+        if self._latest.frame != frame:
+            self._latest = _Turn(frame, self._pattern.beams(frame))
+        return frame, self._latest
+
+    def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
+        """Returns positions and orientations of S: one, or each column's."""
+        sweep = _value(self._sweep, context)
+        if sweep is not None:
+            sweep = sweep.of_frame(self._X_PS)
+            return sweep.p_WPset, sweep.R_WPset
+        query_object = self._geometry_query.Eval(context)
+        X_WP = self._known_poses(context).find(
+            self._parent_frame_id, query_object.GetPoseInWorld
+        )
+        X_WS = X_WP @ self._X_PS
+        motion = self._calc_motions(context).get(self._parent_frame_id)
+        if motion is not None:
+            R_WW0, way_P = motion.at(self._times)
+            p_PS_W = X_WS.translation() - X_WP.translation()
+            return (
+                X_WP.translation() + way_P + R_WW0 @ p_PS_W,
+                R_WW0 @ X_WS.rotation().matrix(),
+            )
+        # Copies are laid out like many poses: for Drake's views of its own
+        # memory, numba would compile all that takes poses once more.
+        p_WS, R_WS = X_WS.translation(), X_WS.rotation().matrix()
+        return np.array([p_WS]), np.array([R_WS])
+
+    def _calc_X_WS(self, context: Context, output: AbstractValue) -> None:
+        p_WSset, R_WSset = self._calc_poses(context)
+        output.set_value(RigidTransform(RotationMatrix(R_WSset[0]), p_WSset[0]))
+
+    def _calc_point_cloud_S(
+        self, context: Context, output: AbstractValue
+    ) -> None:
+        scan = self._scan.Eval(context)
+        p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
+        _fill(output.get_mutable_value(), p_SRset)
+
+    def _calc_point_cloud_W(
+        self, context: Context, output: AbstractValue
+    ) -> None:
+        scan = self._scan.Eval(context)
+        p_WSset, R_WSset = self._calc_poses(context)
+        column_t_ns = self._first.beams.column_t_ns
+        p_WRset = points_in_world(scan, column_t_ns, p_WSset, R_WSset)
+        _fill(output.get_mutable_value(), p_WRset.T)
+
+
+def _value(port: InputPort, context: Context, default: Any = None) -> Any:
+    """Returns the value of a port, or the default if it is not connected."""
+    return port.Eval(context) if port.HasValue(context) else default
+
+
+def _fill(point_cloud: PointCloud, p_FRset: np.ndarray) -> None:
+    point_cloud.resize(p_FRset.shape[1])
+    point_cloud.mutable_xyzs()[:] = p_FRset
+
+
+class BeamTable(NamedTuple):
+    """Constants of all scans, for all beams in firing order.
+
+    Attributes:
+        d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
+        ring: (num_beams,) uint16.
+        t_ns: (num_beams,) uint32 firing time since the start of the turn.
+        place: (num_beams,) position of each beam in the order of casting.
+    """
+
+    d_Sset: np.ndarray
+    ring: np.ndarray
+    t_ns: np.ndarray
+    place: np.ndarray
+
+
+class _Turn:
+    """The beams of a turn, ready for casting and assembling.
+
+    Attributes:
+        frame: number of the turn.
+        beams: in firing order.
+        d_Sset_cast: (N, 3) directions in the order of casting.
+        table: what beams add to points.
+    """
+
+    def __init__(self, frame: int, beams: Beams):
+        self.frame = frame
+        self.beams = beams
+        self.d_Sset_cast = beams.d_Sset[beams.packet_order]
+        self.table = BeamTable(
+            beams.d_Sset.astype(np.float32),
+            beams.ring,
+            beams.t_ns,
+            np.argsort(beams.packet_order),
+        )
+
+    @cached_property
+    def calibrated(self) -> CalibratedTurn:
+        """The same for calibrated returns."""
+        return CalibratedTurn(self.beams)
+
+
+@compiled
+def assemble_points(
+    scan: np.ndarray,
+    table: BeamTable,
+    beams: np.ndarray,
+    ranges: np.ndarray,
+    intensity: np.ndarray,
+    met: np.ndarray,
+    label: np.ndarray,
+    instance: np.ndarray,
+    step: np.float32,
+) -> None:
+    """Fills a scan, one point for each return.
+
+    Args:
+        scan: (N,) `POINT_DTYPE` to fill.
+        table: a `BeamTable`.
+        beams: (N,) the beams with a return.
+        ranges: (N,) float32 measured along them [m].
+        intensity: (N,) float32.
+        met: (N,) int32 index of the hit geometry in `label` and `instance`;
+            negative for the weather.
+        label: uint16 classes.
+        instance: uint16 structures.
+        step: coordinates are rounded to multiples of it [m]; not rounded if 0.
+    """
+    for k in range(len(beams)):
+        # For a signed index, numba looks at each use whether it counts from
+        # the end.
+        beam = np.uint64(beams[k])
+        x = table.d_Sset[beam, 0] * ranges[k]
+        y = table.d_Sset[beam, 1] * ranges[k]
+        z = table.d_Sset[beam, 2] * ranges[k]
+        if step > 0:
+            x = np.rint(x / step) * step
+            y = np.rint(y / step) * step
+            z = np.rint(z / step) * step
+        point = scan[k]
+        point.x = x
+        point.y = y
+        point.z = z
+        point.intensity = intensity[k]
+        point.ring = table.ring[beam]
+        point.t = table.t_ns[beam]
+        if met[k] < 0:
+            point.label, point.instance = SCATTERED_LABEL, 0
+        else:
+            geometry = np.uint64(met[k])
+            point.label = label[geometry]
+            point.instance = instance[geometry]
+
+
+def points_in_world(
+    scan: np.ndarray,
+    column_t_ns: np.ndarray,
+    p_WSset: np.ndarray,
+    R_WSset: np.ndarray,
+) -> np.ndarray:
+    """Returns the places of a scan's points in the world, (N, 3) [m].
+
+    Args:
+        scan: (N,) records of `POINT_DTYPE`.
+        column_t_ns: (T,) rising firing times of the columns [ns].
+        p_WSset: (K, 3) positions of S: one, or each column's.
+        R_WSset: (K, 3, 3) its orientations.
+    """
+    column = np.searchsorted(column_t_ns, scan["t"])
+    p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
+    return p_WSset[column % len(p_WSset)] + np.einsum(
+        "nij,nj->ni", R_WSset[column % len(R_WSset)], p_SRset
+    )

@@ -1,0 +1,186 @@
+"""Patterns that do not repeat, after Livox's units.
+
+Livox gives fields of view, rates and numbers of lines. The exact motion of a
+beam is not published as a formula; each class states its assumptions.
+Directions depend only on the time, so that a frame is always the same.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from cns_drake.sensors.lidar.patterns import BeamPattern, Beams, make_beams
+
+# Turns per second of the two wedge prisms of the Mid series: 7294 and -4664 per
+# minute, the defaults of HELIOS++ for such optics. Together they repeat after
+# 30 s.
+_PRISMS_HZ = (7294.0 / 60.0, -4664.0 / 60.0)
+# Turns per second about z of a Mid-360's beams: each of four lines ten times
+# in 0.1 s, where the user manual speaks of 40 lines.
+_TURNS_HZ = 100.0
+# Ups and downs per second: not a simple fraction of the turns, so that the
+# pattern repeats only after a long time.
+_NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
+
+
+class _TimedPattern(BeamPattern):
+    """Lines of beams that fire together, at a constant rate."""
+
+    repeats = False
+
+    def __init__(
+        self,
+        num_lines: int,
+        points_per_second: float,
+        min_range: float,
+        max_range: float,
+        period: float,
+    ):
+        self.min_range, self.max_range = min_range, max_range
+        self.period = period
+        self.num_lines = num_lines
+        self.num_firings = max(round(points_per_second * period / num_lines), 1)
+
+    def beams(self, frame: int) -> Beams:
+        firing = np.arange(self.num_firings)
+        step = self.period / self.num_firings
+        # A float can hold the number of any frame.
+        first = float(frame * self.num_firings)
+        d_Sset = self._directions((first + firing) * step)
+        return make_beams(
+            d_Sset.reshape(-1, 3),
+            np.tile(np.arange(self.num_lines), self.num_firings),
+            np.repeat(np.round(firing * step * 1e9), self.num_lines),
+        )
+
+    @abstractmethod
+    def _directions(self, times: np.ndarray) -> np.ndarray:
+        """Returns the (num_firings, num_lines, 3) directions at times [s]."""
+
+
+class RosettePattern(_TimedPattern):
+    """Two wedge prisms that turn against each other, before a row of lasers.
+
+    Each prism bends a beam by a quarter of the field of view, which therefore
+    is a disc about x, densest in its middle; the bends add up as vectors
+    (of first order: a real prism bends an oblique beam somewhat more). Lasers
+    one above the other give as many discs.
+
+    Example:
+        from cns_drake import RosettePattern
+
+        mid_70 = RosettePattern(
+            70.4, points_per_second=1e5, min_range=0.05, max_range=130.0,
+            period=0.1,
+        )
+    """
+
+    def __init__(
+        self,
+        fov_deg: float,
+        *,
+        points_per_second: float,
+        min_range: float,
+        max_range: float,
+        period: float,
+        num_lines: int = 1,
+        height_deg: float = 0.0,
+    ):
+        """Makes the pattern from the figures of a data sheet.
+
+        Args:
+            fov_deg: full angle of a disc.
+            points_per_second: of all lines together.
+            min_range: nearest range that is measured [m].
+            max_range: farthest range that is measured [m].
+            period: duration of a frame [s].
+            num_lines: lasers; line 0 is the highest.
+            height_deg: angle between the highest and the lowest.
+        """
+        super().__init__(
+            num_lines, points_per_second, min_range, max_range, period
+        )
+        self._bend = np.deg2rad(fov_deg) / 4.0
+        self._lines = np.deg2rad(
+            np.linspace(height_deg / 2.0, -height_deg / 2.0, num_lines)
+            if num_lines > 1
+            else np.zeros(1)
+        )
+
+    def _directions(self, times: np.ndarray) -> np.ndarray:
+        first, second = (2.0 * np.pi * hz * times for hz in _PRISMS_HZ)
+        left = self._bend * (np.cos(first) + np.cos(second))
+        up = self._bend * (np.sin(first) + np.sin(second))
+        angle = np.hypot(left, up)
+        x = np.cos(angle)
+        # sin(angle) / angle, which numpy has with pi in it.
+        y, z = left * np.sinc(angle / np.pi), up * np.sinc(angle / np.pi)
+        cos, sin = np.cos(self._lines), np.sin(self._lines)
+        return np.stack(
+            [
+                x[:, None] * cos - z[:, None] * sin,
+                np.broadcast_to(y[:, None], (len(times), self.num_lines)),
+                x[:, None] * sin + z[:, None] * cos,
+            ],
+            axis=-1,
+        )
+
+
+class NoddingPattern(_TimedPattern):
+    """Lines that rotate and, slowly, move up and down, each in its own band.
+
+    Bands of equal height fill the field of view. The turns about z, 100 a
+    second, and the ups and downs, 6.18 a second, are of no simple ratio, so
+    that frame after frame fills the gaps.
+
+    Example:
+        from cns_drake import NoddingPattern
+
+        mid_360 = NoddingPattern(
+            (-7.0, 52.0), num_lines=4, points_per_second=2e5,
+            min_range=0.1, max_range=70.0, period=0.1,
+        )
+    """
+
+    def __init__(
+        self,
+        elevations_deg: tuple[float, float],
+        *,
+        num_lines: int,
+        points_per_second: float,
+        min_range: float,
+        max_range: float,
+        period: float,
+    ):
+        """Makes the pattern from the figures of a data sheet.
+
+        Args:
+            elevations_deg: lowest and highest.
+            num_lines: lasers; line 0 has the highest band.
+            points_per_second: of all lines together.
+            min_range: nearest range that is measured [m].
+            max_range: farthest range that is measured [m].
+            period: duration of a frame [s].
+        """
+        super().__init__(
+            num_lines, points_per_second, min_range, max_range, period
+        )
+        self._low, self._high = np.deg2rad(elevations_deg)
+
+    def _directions(self, times: np.ndarray) -> np.ndarray:
+        azimuth = (np.pi - 2.0 * np.pi * _TURNS_HZ * times)[:, None]
+        phase = _NODS_HZ * times % 1.0
+        height = 1.0 - np.abs(2.0 * phase - 1.0)  # 0 up to 1, and down.
+        band = (self._high - self._low) / self.num_lines
+        lines = np.arange(self.num_lines)
+        elevation = self._high - band * (lines + 1.0 - height[:, None])
+        return np.stack(
+            [
+                np.cos(elevation) * np.cos(azimuth),
+                np.cos(elevation) * np.sin(azimuth),
+                np.sin(elevation),
+            ],
+            axis=-1,
+        )

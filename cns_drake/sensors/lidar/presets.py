@@ -1,0 +1,269 @@
+"""Beam patterns of commercial units, from their data sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cns_drake.sensors.lidar.livox_patterns import (
+    NoddingPattern,
+    RosettePattern,
+)
+from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
+
+
+@dataclass(frozen=True)
+class LidarPreset:
+    """A unit.
+
+    Attributes:
+        num_rings: its emitters.
+        num_columns: firings in a turn; None if it follows from the turn's
+            duration.
+        min_range: nearest range that is measured [m].
+        max_range: farthest range that is measured [m].
+        period: default duration of a turn [s].
+        source: of these numbers.
+        make: makes the pattern, from columns, ranges and period.
+    """
+
+    num_rings: int
+    num_columns: int | None
+    min_range: float
+    max_range: float
+    period: float
+    source: str
+    make: Callable[[int | None, float, float, float], BeamPattern]
+
+
+def _spinning(
+    elevations_rad: tuple[float, ...],
+    num_columns: int,
+    min_range: float,
+    max_range: float,
+    source: str,
+    *,
+    period: float = 0.05,
+    azimuths_rad: tuple[float, float] | None = None,
+) -> LidarPreset:
+    def make(
+        columns: int | None, nearest: float, farthest: float, period: float
+    ) -> BeamPattern:
+        return SpinningPattern(
+            elevations_rad=elevations_rad,
+            num_columns=num_columns if columns is None else columns,
+            min_range=nearest,
+            max_range=farthest,
+            period=period,
+            azimuths_rad=azimuths_rad,
+        )
+
+    return LidarPreset(
+        len(elevations_rad),
+        num_columns,
+        min_range,
+        max_range,
+        period,
+        source,
+        make,
+    )
+
+
+def _rosette(
+    fov_deg: float,
+    num_lines: int,
+    height_deg: float,
+    points_per_second: float,
+    min_range: float,
+    max_range: float,
+    source: str,
+) -> LidarPreset:
+    def make(
+        _: int | None, nearest: float, farthest: float, period: float
+    ) -> BeamPattern:
+        return RosettePattern(
+            fov_deg,
+            points_per_second=points_per_second,
+            min_range=nearest,
+            max_range=farthest,
+            period=period,
+            num_lines=num_lines,
+            height_deg=height_deg,
+        )
+
+    return LidarPreset(num_lines, None, min_range, max_range, 0.1, source, make)
+
+
+def _make_mid_360(
+    _: int | None, nearest: float, farthest: float, period: float
+) -> BeamPattern:
+    return NoddingPattern(
+        (-7.0, 52.0),
+        num_lines=4,
+        points_per_second=200_000.0,
+        min_range=nearest,
+        max_range=farthest,
+        period=period,
+    )
+
+
+def _uniform_deg(
+    top: float, bottom: float, num_rings: int
+) -> tuple[float, ...]:
+    elevations = np.deg2rad(np.linspace(top, bottom, num_rings))
+    return tuple(float(elevation) for elevation in elevations)
+
+
+def _hdl_64e_elevations() -> tuple[float, ...]:
+    # An upper block of 32 lasers from +2 deg in steps of 1/3 deg, a lower
+    # block of 32 down to -24.8 deg in steps of about 1/2 deg.
+    upper = np.linspace(2.0, -8.33, 32)
+    lower = np.linspace(-8.83, -24.8, 32)
+    elevations = np.deg2rad(np.concatenate([upper, lower]))
+    return tuple(float(elevation) for elevation in elevations)
+
+
+LIDAR_PRESETS: dict[str, LidarPreset] = {
+    "cns": _spinning(
+        _uniform_deg(22.5, -22.5, 32),
+        1024,
+        0.8,
+        120.0,
+        "the CNS paper: 32 channels, +-22.5 deg, 120 m, after Ouster's OS1",
+    ),
+    "os0-128": _spinning(
+        _uniform_deg(45.0, -45.0, 128),
+        1024,
+        0.3,
+        50.0,
+        "Ouster OS0 data sheet rev. C: 128 channels over 90 deg, 1024 "
+        "columns at 20 Hz, 50 m at 80 %",
+    ),
+    "os1-32": _spinning(
+        _uniform_deg(22.5, -22.5, 32),
+        1024,
+        0.5,
+        120.0,
+        "Ouster OS1 data sheet rev. C, uniform 32-channel configuration",
+    ),
+    "os1-64": _spinning(
+        _uniform_deg(22.5, -22.5, 64),
+        1024,
+        0.5,
+        120.0,
+        "Ouster OS1 data sheet rev. C, uniform 64-channel configuration",
+    ),
+    "os1-128": _spinning(
+        _uniform_deg(22.5, -22.5, 128),
+        1024,
+        0.5,
+        120.0,
+        "Ouster OS1 data sheet rev. C, 128 channels",
+    ),
+    "vlp-16": _spinning(
+        _uniform_deg(15.0, -15.0, 16),
+        900,
+        0.5,
+        100.0,
+        "Velodyne VLP-16 data sheet: 2 deg steps, 0.4 deg columns at 20 Hz",
+    ),
+    "hdl-64e": _spinning(
+        _hdl_64e_elevations(),
+        1040,
+        0.9,
+        120.0,
+        "Velodyne HDL-64E S2/S3 manual: 0.346 deg columns at 20 Hz",
+    ),
+    "hesai-pandar-xt32": _spinning(
+        _uniform_deg(15.0, -16.0, 32),
+        1000,
+        0.05,
+        120.0,
+        "Hesai PandarXT-32 user manual: 32 channels from +15 to -16 deg, "
+        "0.36 deg columns at 20 Hz, 0.05 to 120 m",
+    ),
+    "hokuyo-ust-20lx": _spinning(
+        (0.0,),
+        1081,
+        0.06,
+        20.0,
+        "Hokuyo UST-20LX specification: 270 deg in steps of 0.25 deg, "
+        "counter-clockwise, 25 ms a turn, 0.06 to 20 m",
+        period=0.025,
+        azimuths_rad=(-0.75 * np.pi, 0.75 * np.pi),
+    ),
+    "mid-70": _rosette(
+        70.4,
+        1,
+        0.0,
+        100_000.0,
+        0.05,
+        130.0,
+        "Livox Mid-70 user manual: a disc of 70.4 deg, 100,000 points/s, "
+        "0.05 m to 130 m at 20 %; prisms as in `RosettePattern`",
+    ),
+    "avia": _rosette(
+        70.4,
+        6,
+        6.8,
+        240_000.0,
+        1.0,
+        320.0,
+        "Livox Avia user manual: 6 lines, 70.4 x 77.2 deg without repeating, "
+        "240,000 points/s, 1 m to 320 m at 80 %; prisms as in "
+        "`RosettePattern`, whose discs of 70.4 deg then span 6.8 deg",
+    ),
+    "mid-360": LidarPreset(
+        4,
+        None,
+        0.1,
+        70.0,
+        0.1,
+        "Livox Mid-360 user manual: 4 lines, 360 deg, -7 to 52 deg, 200,000 "
+        "points/s, 0.1 m to 70 m at 80 %; its motion as in `NoddingPattern`",
+        _make_mid_360,
+    ),
+}
+
+
+def make_beam_pattern(
+    preset: str,
+    period: float | None = None,
+    *,
+    num_columns: int | None = None,
+    min_range: float | None = None,
+    max_range: float | None = None,
+) -> BeamPattern:
+    """Returns the pattern of a preset, with other values if given.
+
+    Args:
+        preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
+        period: duration of a turn [s].
+        num_columns: columns in a turn.
+        min_range: nearest range that is measured [m].
+        max_range: farthest range that is measured [m].
+
+    Raises:
+        KeyError: there is no preset of that name.
+        ValueError: the preset has no columns to choose.
+
+    Example:
+        from cns_drake import LIDAR_PRESETS, make_beam_pattern
+
+        patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
+    """
+    if preset not in LIDAR_PRESETS:
+        raise KeyError(
+            f"no LiDAR preset '{preset}'; there are: {', '.join(LIDAR_PRESETS)}"
+        )
+    base = LIDAR_PRESETS[preset]
+    if num_columns is not None and base.num_columns is None:
+        raise ValueError(f"the preset '{preset}' has no columns")
+    return base.make(
+        num_columns,
+        base.min_range if min_range is None else min_range,
+        base.max_range if max_range is None else max_range,
+        base.period if period is None else period,
+    )

@@ -1,0 +1,1 @@
+"""Ground-truth odometry: its description and its system."""

@@ -1,0 +1,134 @@
+"""Ground-truth odometry of a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.tree import BodyIndex, Frame, RigidBody
+from pydrake.systems.framework import (
+    Context,
+    DiagramBuilder,
+    LeafSystem,
+    System,
+)
+
+from cns_drake.sensors.carriers import body_and_pose, connect_motion
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """Pose and velocity of a body.
+
+    Attributes:
+        X_WB: its pose in the world.
+        V_WB_B: its spatial velocity in the world, expressed in the body
+            [rad/s, m/s].
+
+    Example:
+        from cns_drake import Odometry
+
+        still = Odometry()
+        print(still.X_WB.translation())
+    """
+
+    X_WB: RigidTransform = field(default_factory=RigidTransform)
+    V_WB_B: SpatialVelocity = field(default_factory=SpatialVelocity.Zero)
+
+
+class OdometrySensor(LeafSystem):
+    """Measures pose and velocity of a body, or a place on it, without error.
+
+    .. pydrake_system::
+
+        name: OdometrySensor
+        input_ports:
+        - body_poses
+        - body_spatial_velocities
+        output_ports:
+        - odometry
+
+    The inputs are lists over a plant's bodies of X_WP and V_WP, expressed in
+    the world; the output is an `Odometry` of the place B.
+    """
+
+    def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):
+        """Makes the sensor.
+
+        Args:
+            body: P, the moving body.
+            X_PB: pose of the place B on it; by default it is P itself.
+        """
+        super().__init__()
+        self._body = body.index()
+        self._X_PB = X_PB
+        plant = body.GetParentPlant()
+        self.frame_id = plant.GetBodyFrameIdIfExists(body.index())
+        self._body_poses = self.DeclareAbstractInputPort(
+            "body_poses", AbstractValue.Make([RigidTransform()])
+        )
+        self._body_velocities = self.DeclareAbstractInputPort(
+            "body_spatial_velocities", AbstractValue.Make([SpatialVelocity()])
+        )
+        self.DeclareAbstractOutputPort(
+            "odometry",
+            lambda: Value(Odometry()),
+            self._calc_odometry,
+            {self._body_poses.ticket(), self._body_velocities.ticket()},
+        )
+
+    @property
+    def X_PB(self) -> RigidTransform:
+        return RigidTransform() if self._X_PB is None else self._X_PB
+
+    def place_of(
+        self, body: BodyIndex, X_PC: RigidTransform
+    ) -> RigidTransform | None:
+        """Returns X_BC of a place C on the body P; None for another body."""
+        return self.X_PB.inverse() @ X_PC if body == self._body else None
+
+    def _calc_odometry(self, context: Context, output: AbstractValue) -> None:
+        X_WB = RigidTransform(self._body_poses.Eval(context)[self._body])
+        V_WB = self._body_velocities.Eval(context)[self._body]
+        if self._X_PB is not None:
+            V_WB = V_WB.Shift(X_WB.rotation() @ self._X_PB.translation())
+            X_WB = X_WB @ self._X_PB
+        R_BW = X_WB.rotation().inverse()
+        V_WB_B = SpatialVelocity(
+            R_BW @ V_WB.rotational(), R_BW @ V_WB.translational()
+        )
+        output.set_value(Odometry(X_WB, V_WB_B))
+
+
+def add_odometry(
+    builder: DiagramBuilder,
+    body: RigidBody | Frame,
+    *,
+    motion: System | None = None,
+    name: str = "odometry",
+) -> OdometrySensor:
+    """Adds odometry of a body to a diagram and connects it to its motion.
+
+    Args:
+        builder: of the diagram that holds the plant, or `motion`.
+        body: the body to observe, or a frame fixed on it, of a finalized
+            plant.
+        motion: the source of body poses and velocities, if not the plant
+            itself.
+        name: name of the system.
+
+    Example:
+        from cns_drake import add_odometry
+
+        odometry = add_odometry(builder, body)
+    """
+    X_PB = None
+    if isinstance(body, Frame):
+        body, X_PB = body_and_pose(body, RigidTransform())
+    sensor = builder.AddNamedSystem(name, OdometrySensor(body, X_PB))
+    ports = ("body_poses", "body_spatial_velocities")
+    inputs = {port: sensor.GetInputPort(port) for port in ports}
+    connect_motion(builder, motion, body, inputs)
+    return sensor

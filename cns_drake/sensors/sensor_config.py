@@ -1,0 +1,150 @@
+"""What the descriptions of all sensors share.
+
+These descriptions are the sections of a scenario. Reading them needs no Drake,
+which is slow to import.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+if TYPE_CHECKING:
+    from pydrake.geometry import SceneGraph
+    from pydrake.multibody.tree import RigidBody
+    from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+
+    from cns_drake.recording.rosbag2_metadata import Topic
+
+HIGHEST_RATE = 1000
+_NS_PER_S = 1_000_000_000
+
+# Greatest distance of a sensor on a vehicle [m]; rays are cast in single
+# precision.
+Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Triple = tuple[Place, Place, Place]
+Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
+
+
+class Section(BaseModel):
+    """A section of a scenario file: known fields, finite values, immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def field_off_by_default(default: Any, **constraints: Any) -> Any:
+    """Returns a field that is written only if it differs from the default.
+
+    Adding such a field does not change the text of scenarios without it.
+
+    Args:
+        default: the value without effect.
+        constraints: further arguments of `pydantic.Field`.
+    """
+    return Field(
+        default=default,
+        exclude_if=lambda value: value == default,
+        **constraints,
+    )
+
+
+class Mount(Section):
+    """Where a sensor sits on the vehicle.
+
+    Attributes:
+        xyz: position in base_link [m].
+        rpy_deg: roll, pitch, yaw in base_link [deg].
+    """
+
+    xyz: Triple
+    rpy_deg: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+
+
+class SensorConfig(Mount):
+    """A sensor that publishes one message at a time on one topic.
+
+    A kind of sensor derives from it. A field of a scenario that holds one is
+    added to its Diagram and recorded; the frame has the name of the field.
+
+    Attributes:
+        xyz: position in base_link [m].
+        rpy_deg: roll, pitch, yaw in base_link [deg].
+        rate: messages per second, from the rate of the fastest LiDAR to 1000;
+            by default one message a scan.
+    """
+
+    xyz: Triple = (0.0, 0.0, 0.0)
+    rate: int | None = field_off_by_default(None)
+
+    def topic(self, name: str) -> Topic:
+        """Returns the topic of the sensor of a name.
+
+        Its second part is that name: `/<name>/...`.
+        """
+        raise NotImplementedError
+
+    def add(
+        self,
+        builder: DiagramBuilder,
+        scene_graph: SceneGraph,
+        body: RigidBody,
+        *,
+        motion: System,
+        name: str,
+        seed: int,
+    ) -> OutputPort:
+        """Adds the sensor to a Diagram; returns the port to record.
+
+        Args:
+            builder: holds the SceneGraph.
+            scene_graph: has the geometry that the sensor may see.
+            body: the vehicle B, of a finalized plant.
+            motion: has the kinematic output ports of that plant.
+            name: names the sensor.
+            seed: seed of its noise.
+        """
+        raise NotImplementedError
+
+    def make_message(self, value: Any, frame_id: str, stamp_ns: int) -> Any:
+        """Returns the ROS 2 message of a value of the port.
+
+        Args:
+            value: measured by the sensor.
+            frame_id: name of its frame.
+            stamp_ns: the time [ns].
+        """
+        raise NotImplementedError
+
+
+def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:
+    """Checks that a rate of samples is possible.
+
+    Stamps are whole nanoseconds, so the rate must divide a billion.
+
+    Args:
+        rate: samples per second.
+        lowest: the lowest allowed rate; the highest is 1000.
+        multiple_of: the rate must be a multiple of it.
+
+    Raises:
+        ValueError: it is not allowed; the message has the nearest allowed
+            rates.
+    """
+    allowed = [
+        one
+        for one in range(lowest, HIGHEST_RATE + 1)
+        if _NS_PER_S % one == 0 and one % multiple_of == 0
+    ]
+    if rate in allowed:
+        return
+    below = [one for one in allowed if one < rate][-1:]
+    above = [one for one in allowed if one > rate][:1]
+    kind = "a number"
+    if multiple_of > 1:
+        kind = f"a multiple of {multiple_of}"
+    raise ValueError(
+        f"rate: {rate:g} a second; it must be {kind} from"
+        f" {lowest} to {HIGHEST_RATE} that divides 1,000,000,000 ns, such as"
+        f" {' or '.join(map(str, below + above))}"
+    )

@@ -1,0 +1,91 @@
+"""Topics of a drive, and the times at which its sensors are recorded."""
+
+from __future__ import annotations
+
+import math
+
+from cns_drake.recording.recorded_topics import (
+    OBJECT_TOPICS,
+    recording_topics,
+)
+from cns_drake.recording.rosbag2_metadata import Topic
+from cns_drake.recording.schedule import Schedule, make_schedule
+from cns_drake.scenarios.scenario import Scenario
+
+# Greatest error of a time as a multiple of a period, in periods.
+_TOLERANCE = 1e-6
+
+
+def point_layouts(scenario: Scenario) -> dict[str, str]:
+    """Returns LiDAR name -> layout of its points."""
+    return {name: one.layout for name, one in scenario.lidars.items()}
+
+
+def scenario_topics(scenario: Scenario) -> tuple[Topic, ...]:
+    """Returns the topics of a scenario's recording."""
+    return recording_topics(
+        scenario.lidars,
+        layouts=point_layouts(scenario),
+        with_objects=not scenario.traffic.is_off,
+        further=_further_topics(scenario).values(),
+    )
+
+
+def _further_topics(scenario: Scenario) -> dict[str, Topic]:
+    """Returns the topic of each further sensor, by the sensor's name."""
+    sensors = scenario.further_sensors.items()
+    return {name: sensor.topic(name) for name, sensor in sensors}
+
+
+def first_points_topic(scenario: Scenario) -> str:
+    """Returns the topic whose scans are the frames."""
+    return scenario_topics(scenario)[0].name
+
+
+def drive_schedule(scenario: Scenario) -> Schedule:
+    """Returns the schedule of a scenario's topics.
+
+    If the scenario has a number of frames, LiDARs end with the last one. An IMU
+    or odometry with its own rate continues until that scan is complete, so that
+    its samples enclose every scan.
+
+    Raises:
+        InputError: Kalibr's file cannot be used.
+    """
+    fastest = scenario.fastest_rate
+    odometry = scenario.odometry.rate or fastest
+    rates = {
+        "/imu/data": scenario.imu.sample_rate(fastest),
+        "/odometry": odometry,
+        "/tf": odometry,
+    }
+    if not scenario.traffic.is_off:
+        rates |= {topic.name: fastest for topic in OBJECT_TOPICS}
+    for name, topic in _further_topics(scenario).items():
+        rates[topic.name] = scenario.further_sensors[name].rate or fastest
+    for topic in scenario_topics(scenario):
+        if not topic.latched and topic.name not in rates:
+            rates[topic.name] = scenario.lidars[topic.name.split("/")[1]].rate
+    periods = {name: 1.0 / rate for name, rate in rates.items()}
+    if scenario.frames is None:
+        return make_schedule(periods)
+    last_scan = (scenario.frames - 1) * scenario.frame_period
+    complete = max(
+        (math.floor(last_scan * one.rate + _TOLERANCE) + 1) / one.rate
+        for one in scenario.lidars.values()
+    )
+    until = dict.fromkeys(periods, last_scan)
+    if not scenario.imu.is_ideal:
+        until["/imu/data"] = complete
+    if scenario.odometry.rate is not None:
+        until["/odometry"] = until["/tf"] = complete
+    # The number of the first sample at or after the end.
+    return make_schedule(
+        periods,
+        {
+            name: math.ceil(time * rates[name] - _TOLERANCE) / rates[name]
+            if time == complete
+            else time
+            for name, time in until.items()
+        },
+    )
