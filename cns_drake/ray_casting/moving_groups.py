@@ -31,6 +31,11 @@ class KnownPoses(NamedTuple):
     rows: Mapping[FrameId, int]
     X_WFs: np.ndarray
 
+    def __deepcopy__(self, memo: dict) -> KnownPoses:
+        # A Context is cloned with it; nobody changes it, nor can frames be
+        # copied.
+        return self
+
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
