@@ -21,8 +21,8 @@ import typer
 
 from cns_drake.city.plan import city_plan, stages
 from cns_drake.command_line import cli
-from cns_drake.motion.speeds import Speeds
 from cns_drake.roads import road_schema
+from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.scenarios import variation
 from cns_drake.scenarios.scenario import (

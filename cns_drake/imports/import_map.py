@@ -45,7 +45,7 @@ from cns_drake.imports.options import (
     ImportReport,
 )
 from cns_drake.imports.staged_city import StagedCity, grow, stage_city
-from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 

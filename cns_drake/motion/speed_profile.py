@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from pydrake.trajectories import BsplineTrajectory
 
-from cns_drake.motion.path_geometry import SmoothPath
-from cns_drake.motion.speeds import Speeds
-from cns_drake.motion.uniform_spline import REACH, make_uniform_spline
+from cns_drake.motion.path_geometry import (
+    REACH,
+    SmoothPath,
+    make_uniform_spline,
+)
+from cns_drake.roads.lane_path import Speeds
 
 # Distance of the knots of the time scaling [s]; acceleration changes within
 # about two of them, so the jerk stays near (acceleration / knot period).

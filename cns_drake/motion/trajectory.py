@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,33 +11,177 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from scipy.spatial.transform import Rotation
 
-from cns_drake.motion.body_ride import (
-    BodyRide,
-    RideMoments,
-    ride_motion,
-)
-from cns_drake.motion.frame_motion import FrameMotion, cross
 from cns_drake.motion.path_geometry import (
     PathIntegral,
     PathJet,
     PathSection,
     SmoothPath,
+    SplineDerivatives,
 )
 from cns_drake.motion.speed_profile import make_time_scaling
-from cns_drake.motion.speeds import Speeds
-from cns_drake.motion.uniform_spline import SplineDerivatives
-from cns_drake.roads.lane_path import LanePath
+from cns_drake.roads.lane_path import LanePath, Speeds
+
+
+class FrameMotion(NamedTuple):
+    """Pose, velocity and acceleration of a frame F in a frame E at N times.
+
+    Attributes:
+        R: (N, 3, 3) rotation R_EF.
+        p: (N, 3) place of F's origin [m].
+        w, v: (N, 3) angular [rad/s] and linear velocity [m/s], in E.
+        alpha, a: (N, 3) angular [rad/s^2] and linear acceleration [m/s^2], in
+            E.
+    """
+
+    R: np.ndarray
+    p: np.ndarray
+    w: np.ndarray
+    v: np.ndarray
+    alpha: np.ndarray
+    a: np.ndarray
+
+    def acceleration_at(self, p_FQ: np.ndarray) -> np.ndarray:
+        """Returns (N, 3) accelerations of a point Q fixed in F [m/s^2]."""
+        r = self.R @ p_FQ
+        return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
+
+    def of_frame(self, motion: FrameMotion) -> FrameMotion:
+        """Returns the motion in E of a frame B that moves in F.
+
+        Args:
+            motion: of B in F.
+        """
+        p, w, v, alpha, a = (
+            np.einsum("nij,nj->ni", self.R, vector) for vector in motion[1:]
+        )
+        rotating = cross(self.alpha, p) + cross(self.w, cross(self.w, p))
+        return FrameMotion(
+            R=self.R @ motion.R,
+            p=self.p + p,
+            w=self.w + w,
+            v=self.v + v + cross(self.w, p),
+            alpha=self.alpha + alpha + cross(self.w, w),
+            a=self.a + a + rotating + 2.0 * cross(self.w, v),
+        )
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Returns the (N, 3) cross products of (N, 3) vectors.
+
+    For a few vectors it takes a fraction of the time of `numpy.cross`.
+    """
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+
+
+# Heave, roll and pitch.
+NUM_COORDINATES = 3
+
+
+class RideMoments(NamedTuple):
+    """Heave, roll and pitch at N times.
+
+    Attributes:
+        q: (N, 3) heave of the body, upwards [m], roll and pitch about x and y
+            of the vehicle [rad].
+        dq, ddq: (N, 3) derivatives by time.
+        pivot: x of the point on the ground about which it turns [m].
+    """
+
+    q: np.ndarray
+    dq: np.ndarray
+    ddq: np.ndarray
+    pivot: float
+
+
+class BodyRide:
+    """The motion X_FB(t) of a body B against the frame F of its path.
+
+    At rest on a level road B is F. Its heave, roll and pitch are polynomials of
+    degree 5 between even times, where values and two derivatives are given. The
+    accelerations have no jumps. The body turns about a point on the ground, by
+    its pitch and then by its roll.
+    """
+
+    def __init__(
+        self,
+        q: np.ndarray,
+        dq: np.ndarray,
+        ddq: np.ndarray,
+        step: float,
+        pivot: float,
+    ):
+        """Makes the motion.
+
+        Args:
+            q: (N, 3) heave [m], roll and pitch [rad].
+            dq: (N, 3) their rates.
+            ddq: (N, 3) their accelerations.
+            step: between the N times [s], the first of which is zero.
+            pivot: x in F of the point about which the body turns [m].
+        """
+        self._pivot = pivot
+        from scipy.interpolate import PPoly
+
+        times = step * np.arange(len(q))
+        self._end = times[-1]
+        v, a = dq * step, ddq * step**2 / 2
+        # Remainders of the value and its derivatives at the end, after degree
+        # 2.
+        rest = q[1:] - q[:-1] - v[:-1] - a[:-1]
+        drest = v[1:] - v[:-1] - 2 * a[:-1]
+        ddrest = a[1:] - a[:-1]
+        coefficients = [
+            6 * rest - 3 * drest + ddrest,
+            -15 * rest + 7 * drest - 2 * ddrest,
+            10 * rest - 4 * drest + ddrest,
+            a[:-1],
+            v[:-1],
+            q[:-1],
+        ]
+        powers = step ** np.arange(5, -1, -1)[:, None, None]
+        spline = PPoly(np.array(coefficients) / powers, times)
+        self._splines = [spline, spline.derivative(), spline.derivative(2)]
+
+    def at(self, t: ArrayLike) -> RideMoments:
+        """Returns heave, roll and pitch at (N,) times; at the ends it rests."""
+        times = np.clip(np.atleast_1d(t), 0.0, self._end)
+        q, dq, ddq = (spline(times) for spline in self._splines)
+        return RideMoments(q, dq, ddq, self._pivot)
+
+
+def ride_motion(moments: RideMoments) -> FrameMotion:
+    """Returns how B moves in F.
+
+    With R = R_y(pitch) R_x(roll), the roll axis turns with the pitch.
+    """
+    heave, roll, pitch = moments.q.T
+    _, droll, dpitch = moments.dq.T
+    _, ddroll, ddpitch = moments.ddq.T
+    zero = np.zeros_like(heave)
+    (cr, sr), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (roll, pitch))
+    R_FB = np.array(
+        [
+            [cp, sp * sr, sp * cr],
+            [zero, cr, -sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    ).transpose(2, 0, 1)
+    w = np.stack([droll * cp, dpitch, -droll * sp], axis=1)
+    turning = droll * dpitch
+    alpha = np.stack(
+        [ddroll * cp - turning * sp, ddpitch, -ddroll * sp - turning * cp],
+        axis=1,
+    )
+    # The vector from the pivot to the origin of B.
+    r = -moments.pivot * R_FB[:, :, 0]
+    p, v = r + np.array([moments.pivot, 0.0, 0.0]), cross(w, r)
+    a = cross(alpha, r) + cross(w, v)
+    for vector, values in ((p, moments.q), (v, moments.dq), (a, moments.ddq)):
+        vector[:, 2] += values[:, 0]
+    return FrameMotion(R_FB, p, w, v, alpha, a)
+
 
 _UP = np.array([[0.0, 0.0, 1.0]])
-
-
-@dataclass(frozen=True)
-class JointMotion:
-    """An angle [rad] or a distance [m], its rate and its acceleration."""
-
-    position: np.ndarray
-    rate: np.ndarray
-    acceleration: np.ndarray
 
 
 class Moments(NamedTuple):
@@ -216,89 +359,3 @@ def _path_motion(
         alpha=ddyaw[:, None] * _UP - ddclimb[:, None] * left + turning,
         a=jet.ddp * rate**2 + jet.dp * acceleration,
     )
-
-
-class WheelMotion:
-    """Steering, rolling and travel of one wheel that does not slip.
-
-    The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, r its
-    radius. With path speed s, turn rate m about the vehicle's z and steering
-    angle d (all per path parameter), the ground below the wheel passes with
-    (s - m y, m x): tan(d) = m x / (s - m y), so a wheel on the rear axle
-    (x = 0) needs no steering, and it rolls by the length of that vector
-    divided by r.
-
-    While a ride moves the body, the wheel stays on the drawn ground: it travels
-    up in the body by as much as the body comes down there. That is exact for
-    small angles, and within a millimetre for 3 degrees. Steering and rolling
-    are those without a ride.
-    """
-
-    def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
-        """Prepares the wheel.
-
-        Args:
-            trajectory: of the vehicle.
-            p_BC: position of the wheel's centre in the vehicle frame [m].
-        """
-        self._x, self._y, self._radius = p_BC
-        self._rolled = PathIntegral(
-            trajectory.path, lambda jet: np.hypot(*self._ground_velocity(jet))
-        )
-
-    def _ground_velocity(self, jet: PathJet) -> tuple[np.ndarray, np.ndarray]:
-        return jet.speed - jet.turn * self._y, jet.turn * self._x
-
-    def steering(self, moments: Moments) -> JointMotion:
-        """Returns the steering at (N,) times, positive to the left."""
-        rate, acceleration, jet = moments[1:4]
-        a, b, da, db, dda, ddb = self._ground_motion(jet)
-        squared = a**2 + b**2
-        dsquared = 2.0 * (a * da + b * db)
-        dsteer = (a * db - b * da) / squared
-        ddsteer = (a * ddb - b * dda - dsteer * dsquared) / squared
-        return JointMotion(
-            position=np.arctan2(b, a),
-            rate=dsteer * rate,
-            acceleration=ddsteer * rate**2 + dsteer * acceleration,
-        )
-
-    def rolling(self, moments: Moments) -> JointMotion:
-        """Returns the rolling at (N,) times.
-
-        It is positive forwards and zero at the start.
-        """
-        rate, acceleration, jet, section = moments[1:5]
-        a, b, da, db, _, _ = self._ground_motion(jet)
-        g = np.hypot(a, b)
-        dg = (a * da + b * db) / g
-        return JointMotion(
-            position=self._rolled.evaluate(section) / self._radius,
-            rate=g * rate / self._radius,
-            acceleration=(dg * rate**2 + g * acceleration) / self._radius,
-        )
-
-    def travel(self, moments: Moments) -> JointMotion:
-        """Returns the travel upwards in the body at (N,) times [m]."""
-        ride = moments.ride
-        if ride is None:
-            still = np.zeros_like(moments.u)
-            return JointMotion(still, still, still)
-        down = np.array([-1.0, -self._y, self._x - ride.pivot])
-        # One product of all rows would round by their number.
-        return JointMotion(
-            *(
-                (one[:, None] @ down)[:, 0]
-                for one in (ride.q, ride.dq, ride.ddq)
-            )
-        )
-
-    def _ground_motion(self, jet: PathJet) -> tuple[np.ndarray, ...]:
-        """Returns the ground's velocity and its two derivatives by u."""
-        return (
-            *self._ground_velocity(jet),
-            jet.dspeed - jet.dturn * self._y,
-            jet.dturn * self._x,
-            jet.ddspeed - jet.ddturn * self._y,
-            jet.ddturn * self._x,
-        )

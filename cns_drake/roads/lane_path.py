@@ -1,10 +1,12 @@
-"""The line that a vehicle follows, and its speed limits."""
+"""The line that a vehicle follows, and bounds of its speed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from cns_drake.base.errors import InputError
 
@@ -12,6 +14,28 @@ from cns_drake.base.errors import InputError
 _MIN_LENGTH = 20.0
 # Longest path: planning takes time and memory for each metre [m].
 _MAX_LENGTH = 100_000.0
+# Distance of control points along the path [m]. The curvature then changes over
+# about 10 m, as a driver turns the wheel. In the tightest bends of a town the
+# path is less than 10 cm from the middle of the lane.
+POINT_SPACING = 2.0
+
+Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
+
+
+class Speeds(BaseModel):
+    """Bounds of a drive's speed and acceleration at every instant.
+
+    Attributes:
+        cruise: the highest speed; the roads' limits hold besides [m/s].
+        longitudinal_acceleration: bound along the path, both signs [m/s^2].
+        lateral_acceleration: bound of the centripetal acceleration [m/s^2].
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    cruise: float = Field(default=13.5, ge=0.5, le=60, allow_inf_nan=False)
+    longitudinal_acceleration: Acceleration = 2.0
+    lateral_acceleration: Acceleration = 3.0
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.control_points import POINT_SPACING
-from cns_drake.motion.ride import ride_on_springs
 from cns_drake.motion.suspension import (
     Suspension,
     load_car_masses,
     load_suspension_rates,
+    ride_on_springs,
 )
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import frames_within
+from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS

@@ -18,7 +18,7 @@ from pydantic import (
 
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
-from cns_drake.motion.speeds import Speeds
+from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
 from cns_drake.sensors.imu.config import ImuConfig
 from cns_drake.sensors.lidar.config import LidarConfig, WeatherConfig

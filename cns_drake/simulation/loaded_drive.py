@@ -17,10 +17,7 @@ from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.provenance import (
-    digest_inputs,
-    recording_fingerprint,
-)
+from cns_drake.scenarios.provenance import digest_inputs, recording_fingerprint
 from cns_drake.scenarios.scenario import Scenario, TrafficConfig
 from cns_drake.scenarios.scenario_files import (
     check_files,

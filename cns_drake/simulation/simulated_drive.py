@@ -25,10 +25,7 @@ from cns_drake.recording.schedule import frame_stamp_ns
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-    describe_scenario,
-)
+from cns_drake.scenarios.scenario_files import check_files, describe_scenario
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.simulation.loaded_drive import (

@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import make_waypoint_path
 

@@ -20,8 +20,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
-from cns_drake.motion.sweep import VehicleSweep
 from cns_drake.motion.trajectory import Trajectory
+from cns_drake.motion.vehicle_motion import VehicleSweep
 from cns_drake.scene.geometry_revision import geometry_revision_port
 from cns_drake.sensors.carriers import (
     body_and_pose,

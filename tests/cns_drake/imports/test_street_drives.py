@@ -17,8 +17,8 @@ from cns_drake.imports.openstreetmap.tags import (
     lanes_beside,
 )
 from cns_drake.imports.options import DriveOn, ImportOptions
-from cns_drake.motion.control_points import POINT_SPACING
 from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.waypoints import make_waypoint_path
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario

@@ -12,19 +12,16 @@ from helpers.drives import (
 import numpy as np
 import pytest
 
-from cns_drake.motion.ride import ride_on_springs
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.speed_profile import Speeds
 from cns_drake.motion.suspension import (
     Suspension,
     load_car_masses,
     load_suspension_rates,
+    ride_on_springs,
 )
-from cns_drake.motion.trajectory import (
-    Trajectory,
-    WheelMotion,
-    poses_and_motion,
-)
+from cns_drake.motion.trajectory import Trajectory, poses_and_motion
+from cns_drake.motion.vehicle_motion import WheelMotion
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 

@@ -12,11 +12,14 @@ from helpers.drives import (
 import numpy as np
 import pytest
 
-from cns_drake.motion.path_geometry import PathIntegral, SmoothPath
-from cns_drake.motion.speeds import Speeds
-from cns_drake.motion.trajectory import Trajectory, WheelMotion
-from cns_drake.motion.uniform_spline import make_uniform_spline
-from cns_drake.roads.lane_path import LanePath
+from cns_drake.motion.path_geometry import (
+    PathIntegral,
+    SmoothPath,
+    make_uniform_spline,
+)
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.motion.vehicle_motion import WheelMotion
+from cns_drake.roads.lane_path import LanePath, Speeds
 
 
 def motion(trajectory, t):

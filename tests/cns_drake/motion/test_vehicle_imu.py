@@ -12,12 +12,12 @@ from pydrake.systems.framework import DiagramBuilder
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.motion.ride import ride_on_springs
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.suspension import (
     Suspension,
     load_car_masses,
     load_suspension_rates,
+    ride_on_springs,
 )
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_imu import VehicleImu

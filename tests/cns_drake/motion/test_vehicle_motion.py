@@ -194,20 +194,6 @@ def test_time_may_go_back(hilly):
     assert np.abs(first[0] - first[1]).max() > 1.0
 
 
-def test_states_of_many_times_are_those_of_each(hilly):
-    plant, trajectory, one = hilly
-    vehicle = plant.GetModelInstanceByName("vehicle")
-    many = VehicleMotion(plant, vehicle, trajectory, period=0.05)
-    # In several blocks, between multiples, back again, and beyond the end.
-    for time in (0.0, 0.05 * 63, 0.05 * 64, 0.01, 0.05, 0.05 * 10_000):
-        np.testing.assert_array_equal(
-            evaluate(many, "position", time), evaluate(one, "position", time)
-        )
-        np.testing.assert_array_equal(
-            velocities(many, time), velocities(one, time)
-        )
-
-
 def test_the_vehicle_is_a_car():
     scene_graph = SceneGraph()
     plant = MultibodyPlant(time_step=0.0)

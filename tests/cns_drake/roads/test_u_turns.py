@@ -7,11 +7,10 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.control_points import POINT_SPACING
-from cns_drake.motion.speeds import Speeds
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.roads.centreline import Centreline
+from cns_drake.roads.lane_path import POINT_SPACING, Speeds
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
 from cns_drake.roads.u_turn import (

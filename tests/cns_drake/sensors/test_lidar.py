@@ -10,21 +10,13 @@ from helpers.lidar_stage import (
     positions,
 )
 import numpy as np
-from pydrake.geometry import (
-    Box,
-    Cylinder,
-    Role,
-    Sphere,
-)
+from pydrake.geometry import Box, Cylinder, Role, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.perception import PointCloud
 import pytest
 
-from cns_drake.motion.sweep import Sweep
-from cns_drake.scene.structure_table import (
-    StructureEntry,
-    StructureTable,
-)
+from cns_drake.motion.vehicle_motion import Sweep
+from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.measurement import MeasurementModel
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 
