@@ -5,11 +5,11 @@ As LT-SLAM does it (Kim and Kim, "LT-mapper", ICRA 2022), made robust:
 1. Each drive is checked against itself where it passes a place again, and
    straightened if it has drifted.
 2. A first guess: the same coordinates if both name the same datum or frame.
-Otherwise, or if that fails, places that look alike. 3. From where the guess
-holds, submaps are registered along the source's path, each from its neighbour's
-result, so that drift does not add up. 4. One rigid pose for the source if the
-loops agree on one, else a pose
-   graph that bends it. The target is held.
+   Otherwise, or if that fails, places that look alike.
+3. From where the guess holds, submaps are registered along the source's path,
+   each from its neighbour's result, so that drift does not add up.
+4. One rigid pose for the source if the loops agree on one, else a pose graph
+   that bends it. The target is held.
 5. Heights start at the target's ground, like the grid of the TCR.
 """
 
@@ -30,17 +30,15 @@ from evaluation.alignment.anchor_search import (
     find_guesses,
     fit_anchor,
     fit_bent,
+    straighten,
     upright,
 )
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
     evenly,
+    find_self_loops,
     loop_errors,
-)
-from evaluation.alignment.straightening import (
-    Straightened,
-    make_consistent,
 )
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.drive_views import MovedDrive
@@ -55,11 +53,16 @@ _FEWEST_LOOPS = 4
 _LEAST_YIELD = 0.25
 # Number of times that keyframes without a loop are tried again.
 _ROUNDS = 3
-# The source has drifted if a quarter of its loops are off by more under the
-# best rigid pose [m].
+# A drive has drifted if a quarter of its loops with itself, or of those with
+# the target under the best rigid pose, have a greater error [m].
 _DRIFT = 0.3
 # The ground of a world that is off zero by less is left there [m].
 _GROUND_TOLERANCE = 0.25
+# Number of tried pairs; number that must fit, so that a chance fit bends no
+# drive; and number of rounds, if the drive has drifted.
+_MOST_SELF_LOOPS = 30
+_FEWEST_SELF_LOOPS = 3
+_STRAIGHTENINGS = 3
 
 
 @dataclass(frozen=True)
@@ -374,3 +377,43 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
         "turn_deg": float(np.degrees(turn)),
         "bend": float(bend),
     }
+
+
+@dataclass(frozen=True)
+class Straightened:
+    """A drive that agrees with itself.
+
+    Attributes:
+        drive: with new poses, if it had drifted.
+        disagreement: of the drive with itself before, see `AlignmentReport`.
+    """
+
+    drive: Submaps
+    disagreement: float
+
+
+def make_consistent(drive: Drive, track: Track) -> Straightened:
+    """Makes a drive agree with itself, if it passes a place again.
+
+    It can where it passes a place again.
+
+    Raises:
+        InputError: if a scan cannot be read.
+    """
+    submaps = Submaps(drive)
+    worst = 0.0
+    # Near places come first: their loops bring others within reach.
+    for _ in range(_STRAIGHTENINGS):
+        loops = find_self_loops(submaps, _MOST_SELF_LOOPS, track)
+        if len(loops) < _FEWEST_SELF_LOOPS:
+            break
+        distances, _ = loop_errors(loops, submaps.X_WK, submaps.X_WK)
+        disagreement = float(np.quantile(distances, 0.75))
+        if disagreement < _DRIFT:
+            break
+        worst = max(worst, disagreement)
+        X_WS = submaps.bend(straighten(loops, submaps))
+        submaps = Submaps(
+            MovedDrive(drive, X_WS, drive.world_frame, drive.datum)
+        )
+    return Straightened(submaps, worst)

@@ -99,7 +99,7 @@ def _resident(field: str) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequences", nargs="*", default=DRIVES)
+    parser.add_argument("drives", nargs="*", default=DRIVES)
     parser.add_argument("--frames", type=int, help="instead of all")
     parser.add_argument("--long", type=int, default=10_000)
     arguments = parser.parse_args()

@@ -190,7 +190,7 @@ def _compare(scene, theirs, poses, d_S, cast, reach) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequences", nargs="*", default=DRIVES)
+    parser.add_argument("drives", nargs="*", default=DRIVES)
     parser.add_argument("--rounds", type=int, default=9)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

@@ -211,7 +211,7 @@ def print_shares(drive: str, frames: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sequences", nargs="*", default=DRIVES)
+    parser.add_argument("drives", nargs="*", default=DRIVES)
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--frames", type=int, default=100, help="to a turn")
     arguments = parser.parse_args()

@@ -38,16 +38,6 @@ def test_normals_are_those_of_the_eigenvectors():
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1.0)
 
 
-def test_points_on_a_line_have_no_normal():
-    line = np.arange(30.0)[:, None] * [1.0, 0.0, 0.0]
-    grid = np.stack(np.meshgrid(np.arange(9.0), np.arange(9.0)), -1)
-    plane = np.c_[grid.reshape(-1, 2), np.full(81, 100.0)]
-    found = make_surface(np.concatenate([line, plane]))
-    np.testing.assert_array_equal(found.points, plane)
-    np.testing.assert_allclose(np.abs(found.normals[:, 2]), 1.0)
-    assert not found.is_upright.any()
-
-
 @pytest.mark.parametrize(
     ("move", "yaw"),
     [
