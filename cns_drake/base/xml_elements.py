@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 import math
 from pathlib import Path
 from xml.parsers import expat
@@ -53,11 +53,14 @@ class Element:
         """Returns an attribute.
 
         Raises:
-            ValueError: if it is missing and has no default.
+            ValueError: if it is too long, or missing without a default.
         """
         value = self.attributes.get(name, default)
-        if value is None:
-            raise ValueError(f"line {self.line}: {self.tag}: no {name}")
+        if value is None or len(value) > _LONGEST_VALUE:
+            fault = f"no {name}"
+            if value is not None:
+                fault = f"{name} of {len(value)} letters"
+            raise ValueError(f"line {self.line}: {self.tag}: {fault}")
         return value
 
     def number(self, name: str, default: float | None = None) -> float:
@@ -80,14 +83,12 @@ class Element:
         return value
 
 
-def read_elements(path: Path, root: str, known: Collection[str]) -> Element:
+def read_elements(path: Path, root: str) -> Element:
     """Reads a file.
 
     Args:
         path: the file.
         root: tag of its outermost element.
-        known: tags of the elements that are kept, with their known children;
-            other elements are skipped with all they hold.
 
     Raises:
         InputError: if it cannot be read, is no XML, has another root, holds
@@ -95,8 +96,7 @@ def read_elements(path: Path, root: str, known: Collection[str]) -> Element:
     """
     parser = expat.ParserCreate()
     top = Element("", 0, {})
-    # None stands for an element that is skipped.
-    open_: list[Element | None] = [top]
+    open_ = [top]
     count = 0
 
     def refuse(fault: str) -> None:
@@ -108,18 +108,11 @@ def read_elements(path: Path, root: str, known: Collection[str]) -> Element:
             refuse(f"nested more than {_DEEPEST} deep")
         if len(open_) == 1 and tag != root:
             refuse(f"{tag[:40]} is no {root}")
-        parent = open_[-1]
-        if parent is None or (len(open_) > 1 and tag not in known):
-            open_.append(None)
-            return
         count += 1
         if count > _MOST_ELEMENTS:
             refuse(f"more than {_MOST_ELEMENTS} elements")
-        for name, value in attributes.items():
-            if len(value) > _LONGEST_VALUE:
-                refuse(f"{tag}: {name[:40]} of {len(value)} letters")
         element = Element(tag, parser.CurrentLineNumber, attributes)
-        parent.children.append(element)
+        open_[-1].children.append(element)
         open_.append(element)
 
     def end(_: str) -> None:
@@ -127,7 +120,7 @@ def read_elements(path: Path, root: str, known: Collection[str]) -> Element:
 
     def add(text: str) -> None:
         element = open_[-1]
-        if element is not None and len(element.content) < _LONGEST_VALUE:
+        if len(element.content) < _LONGEST_VALUE:
             element.content += text[:_LONGEST_VALUE]
 
     parser.StartElementHandler = start

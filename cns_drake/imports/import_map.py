@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-import contextlib
 from dataclasses import replace
 import os
 from pathlib import Path
@@ -15,7 +14,6 @@ from threadpoolctl import threadpool_limits
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.jobs.side_by_side import begun
 from cns_drake.base.map_folder import LANES_NAME
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.cityjson.structures import import_cityjson
@@ -31,6 +29,8 @@ from cns_drake.imports.drives.search import (
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.ground import Ground, bottom_of, ground_of
 from cns_drake.imports.map_files import (
+    city_facts,
+    draw_overview,
     map_draft,
     write_drives,
     write_facts,
@@ -110,15 +110,8 @@ def _import_city(
     drives = _lifted(drives, ground, city.faults)
     bare, dressing = staged.kept, None
     added: list[Imported] = []
-    with map_draft(output) as draft, contextlib.ExitStack() as stack:
-
-        def draw() -> None:
-            # Slow to import.
-            from cns_drake.imports.map_files import draw_overview
-
-            draw_overview(draft / "from_above.png", bare, space, drives)
-
-        drawing = stack.enter_context(begun(draw))
+    with map_draft(output) as draft:
+        draw_overview(draft / "from_above.png", bare, space, drives)
         if options.dressed:
             progress("dressing buildings and streets")
             dressing = dress_city(staged, city, drives, ground, options.seed)
@@ -126,40 +119,29 @@ def _import_city(
             names = {one.structure.name for one in bare}
             added = [o for o in staged.kept if o.structure.name not in names]
         progress(f"writing {output}")
-
-        def write_lanes() -> None:
-            text = lanes_of_streets(
-                city.streets,
-                city.street_places,
-                [*bare, *added],
-                [o for o in added if o.kind not in ("Sidewalk", "Lane mark")],
-                drives,
-                _side(city, options),
-            )
-            if text is not None:
-                (draft / LANES_NAME).write_text(text, "utf-8")
-
+        lanes = lanes_of_streets(
+            city.streets,
+            city.street_places,
+            [*bare, *added],
+            [o for o in added if o.kind not in ("Sidewalk", "Lane mark")],
+            drives,
+            _side(city, options),
+        )
+        if lanes is not None:
+            (draft / LANES_NAME).write_text(lanes, "utf-8")
         bottom = bottom_of(bare, ground)
         if dressing is not None:
             bottom = dressing.ground(bottom)
-        sizes = write_world(
-            draft, source, staged, bottom, dressing, (write_lanes,)
+        sizes = write_world(draft, source, staged, bottom, dressing)
+        facts = city_facts(
+            city, options, list(staged.standing), growth, dressing
         )
-        write_facts(
-            draft,
-            source,
-            city,
-            options,
-            list(staged.standing),
-            growth,
-            dressing,
-        )
+        write_facts(draft, source, facts, city.faults)
         write_drives(
             draft,
             _titles(staged, options),
             [drive.waypoints for drive in drives],
         )
-        drawing()
         finish(draft, sizes)
     return _report(staged, drives, city.faults)
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
-from itertools import chain
 import os
 from pathlib import Path
 import shutil
@@ -17,11 +15,9 @@ import numpy as np
 import yaml
 
 from cns_drake.base.files import part_path, user_errors
-from cns_drake.base.jobs.side_by_side import side_by_side
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.sdf import stage_sdf
 from cns_drake.city.generation.structure_rows import structure_table
-from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import (
     BoxShape,
     MeshShape,
@@ -31,13 +27,11 @@ from cns_drake.imports.dressing.whole_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.options import ImportFaults, ImportOptions
 from cns_drake.imports.staged_city import Growth, StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
 OF_BOX = 12  # triangles
-# Meshes are written in this many parts, side by side.
-_PARTS = 12
 _CRUISE = 8.0  # [m/s]
 _ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
 _DPI = 130
@@ -70,7 +64,6 @@ def write_world(
     city: StagedCity,
     bottom: Sequence[Structure],
     dressing: Dressing | None = None,
-    others: Sequence[Callable[[], None]] = (),
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
 
@@ -80,61 +73,36 @@ def write_world(
         city: all structures.
         bottom: the ground below them, at all stages.
         dressing: the added details, if the city was dressed.
-        others: write further files, side by side with these.
 
     Returns:
         Stage -> its numbers of structures and triangles.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
-
-    def write_stages() -> None:
-        table = structure_table(structures)
-        if dressing is not None:
-            names = [one.structure.name for one in city.kept]
-            origins = [dressing.origins.get(name, "file") for name in names]
-            table = with_column(
-                table, "origin", ["guess"] * len(bottom) + origins
-            )
-        (draft / STRUCTURES_NAME).write_text(table, "utf-8")
-        for stage, some in city.standing.items():
-            text = stage_sdf(
-                f"{draft.name}_{stage}",
-                [*bottom, *(one.structure for one in some)],
-                comment=f"Imported by cns-drake from {source.name}.",
-            )
-            (draft / stage_name(stage)).write_text(text, "utf-8")
-
-    # Trees of a kind share their meshes.
-    meshes = {
-        name: mesh
-        for structure in structures
-        for name, mesh in structure.model.meshes.items()
-    }
-    parts = [list(meshes.items())[k::_PARTS] for k in range(_PARTS)]
-    written = side_by_side(
-        [
-            *others,
-            write_stages,
-            *(partial(_write_meshes, draft / MESH_FOLDER, p) for p in parts),
-        ]
-    )
-    triangles = dict(chain.from_iterable(written[len(others) + 1 :]))
-    return {
-        stage: _size([*bottom, *(one.structure for one in some)], triangles)
-        for stage, some in city.standing.items()
-    }
-
-
-def _write_meshes(
-    folder: Path, meshes: Iterable[tuple[str, Mesh]]
-) -> list[tuple[str, int]]:
-    """Writes meshes; returns their names and numbers of triangles."""
-    found = []
-    for name, mesh in meshes:
-        text = mesh.to_obj()
-        (folder / f"{name}.obj").write_text(text, "utf-8")
-        found.append((name, triangles_in(text)))
-    return found
+    table = structure_table(structures)
+    if dressing is not None:
+        names = [one.structure.name for one in city.kept]
+        origins = [dressing.origins.get(name, "file") for name in names]
+        table = with_column(table, "origin", ["guess"] * len(bottom) + origins)
+    (draft / STRUCTURES_NAME).write_text(table, "utf-8")
+    triangles: dict[str, int] = {}
+    for structure in structures:
+        for name, mesh in structure.model.meshes.items():
+            # Trees of a kind share their meshes.
+            if name not in triangles:
+                text = mesh.to_obj()
+                (draft / MESH_FOLDER / f"{name}.obj").write_text(text, "utf-8")
+                triangles[name] = triangles_in(text)
+    sizes = {}
+    for stage, some in city.standing.items():
+        standing = [*bottom, *(one.structure for one in some)]
+        text = stage_sdf(
+            f"{draft.name}_{stage}",
+            standing,
+            comment=f"Imported by cns-drake from {source.name}.",
+        )
+        (draft / stage_name(stage)).write_text(text, "utf-8")
+        sizes[stage] = _size(standing, triangles)
+    return sizes
 
 
 def triangles_in(obj: str) -> int:
@@ -156,18 +124,15 @@ def _size(
     )
 
 
-def write_facts(
-    draft: Path,
-    source: Path,
+def city_facts(
     city: ForeignCity,
     options: ImportOptions,
     stages: Sequence[str],
     growth: Growth | None,
     dressing: Dressing | None = None,
-) -> None:
-    """Writes the source of the map, its place, and counts of drawn parts."""
-    facts = {
-        "source": source.name,
+) -> dict:
+    """Returns the place of a city's map, and counts of drawn parts."""
+    return {
         "reference_system": city.reference_system or "unknown",
         **({"axes": list(city.axes)} if city.axes else {}),
         "origin": list(city.origin),
@@ -175,20 +140,37 @@ def write_facts(
         "years": dict(zip(stages, options.years, strict=False)),
         **_drawn(options, growth),
         **({"dressing": dict(dressing.facts)} if dressing else {}),
-        "left_out_or_repaired": {
-            kind: number for kind, number, _ in city.faults.rows()
-        },
     }
-    comment = (
-        "# Where this map comes from. A place of the map plus the origin is"
-        " one of the\n# source [m].\n"
-    )
-    if city.axes:
+
+
+def write_facts(
+    draft: Path,
+    source: Path,
+    facts: Mapping[str, object],
+    faults: ImportFaults,
+    comment: str = "# Where this map comes from. A place of the map plus the"
+    " origin is one of the\n# source [m].\n",
+) -> None:
+    """Writes what is remembered of an import.
+
+    Args:
+        draft: the map's folder.
+        source: the imported file.
+        facts: name -> value.
+        faults: parts of the file that were left out or repaired.
+        comment: the beginning of the file.
+    """
+    if "axes" in facts:
         comment += (
             "# Places of the source are brought to metres east, north and up"
             " first.\n"
         )
-    text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
+    counts = {kind: number for kind, number, _ in faults.rows()}
+    text = yaml.safe_dump(
+        {"source": source.name, **facts, "left_out_or_repaired": counts},
+        sort_keys=False,
+        allow_unicode=True,
+    )
     (draft / "import.yaml").write_text(comment + text, "utf-8")
 
 

@@ -23,7 +23,6 @@ from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
 from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, gait_rate
 
-_TAGS = ("fcd-export", "timestep", "vehicle", "person")
 # Greatest deviation from even times, by rounding in the file [s].
 _TIME_TOLERANCE = 2e-3
 # Half of the vehicles of a map's own trace are nearer to its lanes [m].
@@ -95,7 +94,7 @@ def read_fcd(path: Path) -> FcdTrace:
         InputError: the file cannot be read or is not a trace, its times are not
             even, or it is empty.
     """
-    root = read_elements(path, "fcd-export", _TAGS)
+    root = read_elements(path, "fcd-export")
     steps = list(root.all("timestep"))
     try:
         times = np.array([step.number("time") for step in steps])

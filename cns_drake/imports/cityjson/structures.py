@@ -8,7 +8,6 @@ import re
 
 import numpy as np
 
-from cns_drake.base.jobs.side_by_side import mapped
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.cityjson.reader import (
     CityFile,
@@ -89,26 +88,19 @@ def import_structures(
     """
     groups = _families(city)
     names = _unique_names(list(groups))
-
-    def make(root: str) -> tuple[Imported | None, ImportFaults]:
-        faults = ImportFaults()
-        one = _make(
+    found = [
+        _make(
             names[root],
             city.objects[root],
-            groups[root],
-            faults,
+            members,
+            city.faults,
             origin,
             lod,
             year_attribute,
         )
-        return one, faults
-
-    found = []
-    for one, faults in mapped(make, list(groups)):
-        city.faults.extend(faults)
-        if one is not None:
-            found.append(one)
-    return found
+        for root, members in groups.items()
+    ]
+    return [one for one in found if one is not None]
 
 
 def _families(city: CityFile) -> dict[str, list[CityObject]]:

@@ -11,7 +11,6 @@ import shapely
 from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.jobs.side_by_side import mapped
 from cns_drake.city.geometry.structures import (
     MeshShape,
     Model,
@@ -95,23 +94,16 @@ class PlannedBuildings:
         plans = self.plans
         if plans:
             plans = _with_steps(plans, UpperSides(turned_up(paving)))
-
-        def make(number: int) -> tuple[Model, Counter[str]]:
+        by_lot: Counter[str] = Counter()
+        by_file: Counter[str] = Counter()
+        dressed = {}
+        for number, some in enumerate(self.bare):
             walls = zip(
                 plans.get(number, ()),
                 self.distances.get(number, ()),
                 strict=True,
             )
-            return _dressed(
-                self.bare[number], list(walls), self.paths, self.seed
-            )
-
-        by_lot: Counter[str] = Counter()
-        by_file: Counter[str] = Counter()
-        dressed = {}
-        for some, (model, counts) in zip(
-            self.bare, mapped(make, range(len(self.bare))), strict=True
-        ):
+            model, counts = _dressed(some, list(walls), self.paths, self.seed)
             by_lot += counts
             by_file.update(some.style.by_tag)
             structure = replace(some.one.structure, model=model)

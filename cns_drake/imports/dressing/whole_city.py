@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-import contextlib
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.side_by_side import begun
 from cns_drake.city.generation.structure_rows import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import plan_buildings
@@ -105,40 +103,22 @@ def dress_city(
     """
     always = set.intersection(*map(set, staged.standing.values()))
     is_paved = is_dense(staged.kept)
-    with contextlib.ExitStack() as stack:
-        laying = stack.enter_context(
-            begun(lambda: _laid(staged, city, drives, ground, is_paved))
-        )
-        planned = plan_buildings(
-            staged.kept, drives, city.streets, ground, seed, always
-        )
-        laid = laying()
-        marks = list(lane_marks(city.streets, drives)) if drives else []
-        added = [
-            with_kerb(one) if one.kind == "Sidewalk" else one for one in laid
-        ]
-        added += marks
-        dressing = stack.enter_context(
-            begun(
-                lambda: dress_streets(
-                    [*staged.kept, *added],
-                    city.things,
-                    city.streets,
-                    drives,
-                    ground,
-                    seed,
-                )
-            )
-        )
-        paving = [
-            one.triangles
-            for one in [*staged.kept, *laid]
-            if one.is_ground or one.kind == "Sidewalk"
-        ]
-        buildings = planned.dressed(
-            np.concatenate([np.zeros((0, 3, 3)), *paving])
-        )
-        things = dressing()
+    laid = _laid(staged, city, drives, ground, is_paved)
+    planned = plan_buildings(
+        staged.kept, drives, city.streets, ground, seed, always
+    )
+    marks = list(lane_marks(city.streets, drives)) if drives else []
+    added = [with_kerb(one) if one.kind == "Sidewalk" else one for one in laid]
+    added += marks
+    things = dress_streets(
+        [*staged.kept, *added], city.things, city.streets, drives, ground, seed
+    )
+    paving = [
+        one.triangles
+        for one in [*staged.kept, *laid]
+        if one.is_ground or one.kind == "Sidewalk"
+    ]
+    buildings = planned.dressed(np.concatenate([np.zeros((0, 3, 3)), *paving]))
     changed = dict(buildings.buildings)
     by_lot = Counter(buildings.by_lot)
     by_lot += Counter(one.kind for one in added)

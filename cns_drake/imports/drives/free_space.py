@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from scipy.ndimage import (
@@ -16,7 +15,6 @@ from scipy.ndimage import (
 import shapely
 from shapely import STRtree
 
-from cns_drake.base.jobs.side_by_side import mapped
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.ground import Ground
 
@@ -272,9 +270,9 @@ def _blocked(
     ]
     blocked = grid.empty()
     walls = [np.zeros((0, 3, 3))]
-    blocks = partial(_blocked_by, ground=ground, grid=grid)
-    for (row, column), triangles in mapped(blocks, solid):
-        blocked[row, column] = True
+    for one in solid:
+        cells, triangles = _blocked_by(one, ground, grid)
+        blocked[cells] = True
         walls.append(triangles)
     return blocked, np.concatenate(walls)
 

@@ -38,55 +38,6 @@ _MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
 # Shortest distance between the starts of two dashes [m].
 _CLOSEST_DASHES = 0.1
 _ENDS = ("predecessor", "successor")
-_KNOWN = frozenset(
-    (
-        "OpenDRIVE",
-        "arc",
-        "border",
-        "bridge",
-        "center",
-        "connection",
-        "cornerLocal",
-        "cornerRoad",
-        "elevation",
-        "elevationProfile",
-        "geoReference",
-        "geometry",
-        "header",
-        "height",
-        "junction",
-        "lane",
-        "laneOffset",
-        "laneSection",
-        "lanes",
-        "lateralProfile",
-        "left",
-        "line",
-        "link",
-        "object",
-        "objects",
-        "outline",
-        "outlines",
-        "paramPoly3",
-        "planView",
-        "poly3",
-        "predecessor",
-        "repeat",
-        "right",
-        "road",
-        "roadMark",
-        "shape",
-        "signal",
-        "signals",
-        "speed",
-        "spiral",
-        "successor",
-        "superelevation",
-        "tunnel",
-        "type",
-        "width",
-    )
-)
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
 # Longer networks, such as whole countries, are refused [m].
 _LARGEST = 20_000.0
@@ -261,7 +212,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
         InputError: naming file, road, line and fault, if the file cannot be
             read or describes an impossible road.
     """
-    top = read_elements(path, "OpenDRIVE", _KNOWN)
+    top = read_elements(path, "OpenDRIVE")
     roads: list[ImportedRoad] = []
     names: set[str] = set()
     together = 0.0
@@ -315,7 +266,7 @@ def _check_ids(elements: Iterable[Element]) -> None:
     """
     lines: dict[str, int] = {}
     for one in elements:
-        own = one.attributes.get("id", "")
+        own = one.text("id", "")
         if own in lines:
             raise ValueError(
                 f"{one.tag} {_stem(own)}: line {one.line}: duplicate id, that"

@@ -10,7 +10,6 @@ import re
 import numpy as np
 import shapely
 from shapely import GEOSException
-import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, stage_name
@@ -30,7 +29,13 @@ from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plan.stages import Stages
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.map_files import OF_BOX, triangles_in, write_drives
+from cns_drake.imports.map_files import (
+    OF_BOX,
+    draw_overview,
+    triangles_in,
+    write_drives,
+    write_facts,
+)
 from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
     bridge_decks,
@@ -342,7 +347,19 @@ def write_town(
         (draft / name).write_text(text, "utf-8")
     if town.lanes is not None:
         (draft / LANES_NAME).write_text(town.lanes, "utf-8")
-    _write_facts(draft, source, town)
+    write_facts(
+        draft,
+        source,
+        {
+            "reference_system": town.roads.reference_system or "unknown",
+            "origin": list(town.roads.origin),
+            "seed": town.seed,
+            "stages": {name: plan.story for name, plan in stages.items()},
+        },
+        town.faults,
+        "# Where the roads of this map come from; all else is drawn at random."
+        "\n# A place of the map plus the origin is one of the source [m].\n",
+    )
     write_drives(
         draft,
         {
@@ -355,9 +372,6 @@ def write_town(
             for drive in town.drives
         ],
     )
-    # Slow to import.
-    from cns_drake.imports.map_files import draw_overview
-
     draw_overview(
         draft / "from_above.png",
         list(_seen_from_above(town.city.structures)),
@@ -402,27 +416,6 @@ def _sizes(
             boxes + sum(map(triangles.__getitem__, meshes)),
         )
     return sizes
-
-
-def _write_facts(draft: Path, source: Path, town: Town) -> None:
-    facts = {
-        "source": source.name,
-        "reference_system": town.roads.reference_system or "unknown",
-        "origin": list(town.roads.origin),
-        "seed": town.seed,
-        "stages": {
-            stage: plan.story for stage, plan in town.stages.stages.items()
-        },
-        "left_out_or_repaired": {
-            kind: number for kind, number, _ in town.faults.rows()
-        },
-    }
-    comment = (
-        "# Where the roads of this map come from; all else is drawn at random."
-        "\n# A place of the map plus the origin is one of the source [m].\n"
-    )
-    text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
-    (draft / "import.yaml").write_text(comment + text, "utf-8")
 
 
 def _triangles(structure: Structure) -> int:

@@ -4,9 +4,8 @@ OpenStreetMap has no heights above sea level: the ground is level."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from functools import partial
 from pathlib import Path
 import re
 
@@ -15,7 +14,6 @@ import shapely
 from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.side_by_side import side_by_side
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
 from cns_drake.imports.faces import extruded, parts_of, sound_parts
@@ -193,21 +191,16 @@ def import_openstreetmap(
     bridges = bridges_of(features.ways, local) if dressed else Bridges()
     coasts = coasts_of(features.ways) if dressed else []
     limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
-    found = _made(
-        faults,
-        lambda own: make_buildings(
-            buildings, local, year_attribute, own, once=dressed
-        ),
-        lambda own: street_surfaces(features.ways, local, own, bridges),
-        lambda own: crossing_stripes(
-            features.crossings, features.ways, local, own
-        ),
-        lambda own: ground_areas(features.areas, local, own, dressed),
-        lambda own: sea(coasts, local, limits, own),
-        lambda own: parapets(features.ways, bridges, local),
-        lambda own: _barriers(features.ways, local, own),
-        lambda own: _trees(features.trees, local, own),
-    )
+    found = [
+        *make_buildings(buildings, local, year_attribute, faults, once=dressed),
+        *street_surfaces(features.ways, local, faults, bridges),
+        *crossing_stripes(features.crossings, features.ways, local, faults),
+        *ground_areas(features.areas, local, faults, dressed),
+        *sea(coasts, local, limits, faults),
+        *parapets(features.ways, bridges, local),
+        *_barriers(features.ways, local, faults),
+        *_trees(features.trees, local, faults),
+    ]
     also = bridges.left_out | {way.name for way in coasts}
     _count_unused(features, found, also)
     return ForeignCity(
@@ -259,30 +252,6 @@ def _no_buildings(faults: ImportFaults) -> str:
     if not unfit:
         return "the file has no buildings"
     return f"the file has no usable building; {'; '.join(unfit)}"
-
-
-def _made(
-    faults: ImportFaults,
-    *makers: Callable[[ImportFaults], Iterable[Imported]],
-) -> list[Imported]:
-    """Returns structures, those of each maker made side by side.
-
-    Args:
-        faults: is extended.
-        *makers: make structures; their argument takes the faults.
-    """
-
-    def call(
-        maker: Callable[[ImportFaults], Iterable[Imported]],
-    ) -> tuple[list[Imported], ImportFaults]:
-        own = ImportFaults()
-        return list(maker(own)), own
-
-    found = []
-    for some, own in side_by_side([partial(call, m) for m in makers]):
-        found += some
-        faults.extend(own)
-    return found
 
 
 def _bounds(buildings: Iterable[OsmArea]) -> tuple[np.ndarray, np.ndarray]:

@@ -39,9 +39,7 @@ def test_a_key_that_is_there_twice_is_refused():
         parse_json(b'{"b": {"a": 1, "a": 2}}')
 
 
-@pytest.mark.parametrize("piece", [1, 3, 1 << 24])
-def test_only_brackets_outside_of_texts_nest(monkeypatch, piece):
-    monkeypatch.setattr("cns_drake.base.json_text._PIECE", piece)
+def test_only_brackets_outside_of_texts_nest():
     value = {'"[{\\': ["[" * 60 + '\\"', "]" * 60, [1, {"]": [2]}]] * 30}
     assert parse_json(json.dumps(value).encode()) == value
     deep = "[" * 50 + "1" + "]" * 50
