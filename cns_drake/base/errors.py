@@ -117,7 +117,7 @@ def nearest_field(
     """Returns the field that is written most like an unknown one.
 
     Args:
-        model: of the whole file.
+        model: the model that the whole file should fit.
         place: keys and indices that lead to the unknown field; the last is the
             field itself.
     """

@@ -75,7 +75,7 @@ def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
 
     Args:
         points: (N,) structured array.
-        name: of the field.
+        name: the field's name.
         values: (N,) or (N, K) float64.
 
     Raises:

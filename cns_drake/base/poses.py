@@ -64,7 +64,7 @@ def interpolate(
     Args:
         X_0: (N, 4, 4).
         X_1: (N, 4, 4).
-        fraction: (N,) of the way from the one to the other.
+        fraction: (N,) share of the way from the one to the other.
 
     Returns:
         (N, 4, 4); rotations are made orthonormal.

@@ -104,7 +104,7 @@ def count_progress(
     Args:
         progress: where the task is shown.
         task: its id.
-        note: of the frames done, how many of them are new since the first
+        note: the frames done, how many of them are new since the first
             call, and the time [s] they took -> what to add.
         unit: what is counted.
     """

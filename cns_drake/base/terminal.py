@@ -50,7 +50,7 @@ def make_program(name: str, summary: str, epilog: str) -> typer.Typer:
     when called without arguments.
 
     Args:
-        name: of the program.
+        name: the program's name.
         summary: how its help begins.
         epilog: how it ends; see `example`.
     """

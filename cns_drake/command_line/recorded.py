@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress_bars import count_progress, show_progress
-
-
-class ExportFormat(str, Enum):
-    """Layouts to which drives are exported."""
-
-    CNS = "cns"
-    KITTI = "kitti"
-    TUM = "tum"
 
 
 def export(
@@ -28,7 +19,7 @@ def export(
         ),
     ],
     layout: Annotated[
-        ExportFormat,
+        Literal["cns", "kitti", "tum"],
         typer.Option(
             "--format",
             help="Layout: CNS data set, KITTI odometry, or TUM (the "
@@ -65,7 +56,7 @@ def export(
         task = progress.add_task(drive.name, total=None, note="reading")
         drive = export_drive(
             drive,
-            layout.value,
+            layout,
             output,
             lidar=sensor,
             absent_in=absent_in,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -27,8 +26,16 @@ from cns_drake.command_line.options import (
 if TYPE_CHECKING:
     from cns_drake.base.jobs.cluster import Cluster
     from cns_drake.scenarios.scenario import Scenario
+    from cns_drake.sensors.lidar.config import WeatherConfig
 
 Kind = Literal["ideal", "calibrated"]
+Returns = Annotated[
+    Kind | None,
+    typer.Option(
+        help="Ideal returns, or those of the unit's data sheet with noise, "
+        "losses and calibrated reflectivity as intensity."
+    ),
+]
 Fog = Annotated[
     float | None,
     typer.Option(
@@ -68,34 +75,8 @@ def family_members(
     return members
 
 
-if TYPE_CHECKING:
-    from cns_drake.sensors.lidar.config import WeatherConfig
-
-
-class ReturnsName(str, Enum):
-    """Models of LiDAR returns."""
-
-    IDEAL = "ideal"
-    CALIBRATED = "calibrated"
-
-
-Returns = Annotated[
-    ReturnsName | None,
-    typer.Option(
-        help="Ideal returns, or those of the unit's data sheet with noise, "
-        "losses and calibrated reflectivity as intensity."
-    ),
-]
-
-
-_KINDS: dict[ReturnsName, Kind] = {
-    ReturnsName.IDEAL: "ideal",
-    ReturnsName.CALIBRATED: "calibrated",
-}
-
-
 def choose_returns(
-    returns: ReturnsName | None,
+    returns: Kind | None,
     fog: float | None,
     rain: float,
     snowfall: float,
@@ -106,12 +87,12 @@ def choose_returns(
         InputError: a value is out of range; the message names its option.
     """
     if fog is None and not rain and not snowfall:
-        return None if returns is None else _KINDS[returns], None
+        return returns, None
     from pydantic import ValidationError
 
     from cns_drake.sensors.lidar.config import WeatherConfig
 
-    if returns is ReturnsName.IDEAL:
+    if returns == "ideal":
         raise InputError("--returns ideal: weather needs calibrated returns")
     try:
         weather = WeatherConfig(visibility=fog, rain=rain, snowfall=snowfall)

@@ -95,7 +95,7 @@ def family_controls(
     Members that differ only by their city share one.
 
     Args:
-        members: of a family.
+        members: a family's drives.
         query_drive: drive of the queries.
     """
     city = {

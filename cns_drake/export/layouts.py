@@ -81,7 +81,7 @@ def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
 
     Args:
         drive: the recording.
-        name: of the drive; by default the recording's.
+        name: the drive's name; by default the recording's.
     """
     if drive.scenario is None:
         return {}

@@ -81,9 +81,9 @@ def construction_year(
     """Returns the year in which an object was built, if the file has it.
 
     Args:
-        attributes: of the object.
+        attributes: the object's attributes.
         attribute: the attribute that holds the year; the usual ones if None.
-        name: of the object.
+        name: the object's name.
         faults: counts values that are not years, and years to come.
     """
     faults = faults or ImportFaults()
@@ -146,7 +146,7 @@ def stands_at(
         year: year in which it was built; None if unknown.
         until: year in which it was demolished, if it was.
         stage: number of the stage, from 0 on.
-        years: of the stages; without any, everything of today stands.
+        years: the stages' years; without any, everything of today stands.
         undated: the stage of objects without a year.
     """
     if not years:

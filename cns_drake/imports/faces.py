@@ -33,7 +33,7 @@ def face_triangles(
     Args:
         rings: (N, 3) corners of the outer ring, then of holes [m], without
             repeated corners.
-        name: of the object, for the faults.
+        name: the object's name, for the faults.
         faults: counts repaired faces and those left out.
     """
     rings = [_cleaned(ring, name, faults) for ring in rings]
@@ -200,11 +200,11 @@ def extruded(
     Args:
         polygon: the footprint.
         low, high: heights of its lowest and its highest point.
-        name: of the object, for the faults.
+        name: the object's name, for the faults.
         faults: counts roofs that became flat.
         roof: shape: flat; pyramidal on any footprint; gabled or hipped on
             one of four corners. Others are made flat.
-        roof_height: of the roof, from the eaves.
+        roof_height: the roof's height above the eaves [m].
     """
     polygon = orient(polygon)
     eaves = high - roof_height

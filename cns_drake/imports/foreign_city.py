@@ -52,7 +52,7 @@ class Imported:
         structure: in the world.
         kind: type of its object, such as Building.
         year: in which it was built, if known.
-        triangles: (M, 3, 3) of all surfaces that a car could hit or drive over,
+        triangles: (M, 3, 3) all surfaces that a car could hit or drive over,
             in the world [m].
         until: year in which it was demolished, if it was.
         tags: its tags or attributes in the file.
@@ -116,8 +116,8 @@ class Street:
         nodes: number of each place; streets with a common number meet there.
         forward, backward: whether it is driven along its line, and against.
         aside: from its middle to that of the outermost lane [m].
-        width: of its carriageway; 0 if unknown [m].
-        name: of its element in the file.
+        width: its carriageway's width; 0 if unknown [m].
+        name: that of its element in the file.
         tags: its tags in the file.
     """
 
@@ -154,7 +154,7 @@ class ForeignCity:
         structures: in the world of the map.
         origin: the map's origin in the file's coordinates, as metres east,
             north and up, or latitude and longitude [deg].
-        reference_system: of the origin, as the file names it.
+        reference_system: that of the origin, as the file names it.
         faults: counts of parts that were repaired or left out.
         streets: streets with known lanes, in which drives are searched.
         street_places: signals, crossings and paths, for traffic.

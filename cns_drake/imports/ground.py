@@ -96,7 +96,7 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
 
     Args:
         feet: (N, 3) places on the ground [m], one or more.
-        corners: (M, 3) of all structures; the ground reaches beyond them [m].
+        corners: (M, 3) those of all structures; the ground reaches beyond [m].
     """
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
@@ -138,7 +138,7 @@ def ground_of(
     """Returns the ground of a city: its terrain, or one below its feet.
 
     Args:
-        structures: of the city.
+        structures: the city's structures.
         below_bridges: whether bridges and tunnels do not count as feet, unless
             there is nothing else.
     """
@@ -194,7 +194,7 @@ def _lattice(triangles: np.ndarray, spacing: float) -> Iterator[np.ndarray]:
 
     Args:
         triangles: to sample [m].
-        spacing: of the points [m].
+        spacing: greatest distance from a place to a point [m].
     """
     while len(triangles):
         edges = triangles - np.roll(triangles, 1, axis=1)

@@ -67,7 +67,7 @@ def import_city(
         source: CityJSON (.json, .jsonl), OpenStreetMap (.osm, .pbf) or
             OpenDRIVE (.xodr).
         output: the folder, which must not be there yet.
-        options: of the import.
+        options: what the user has chosen.
         progress: takes one line at a time.
         finish: adds files to the folder, which has its name and all files but
             is not yet in its place. If it fails, nothing is left.

@@ -205,7 +205,7 @@ def write_drives(
     """Writes routes, and scenarios of each through every stage.
 
     Args:
-        folder: of the map, with the map's name.
+        folder: the map's folder, with the map's name.
         stages: stage -> words for its time, the end of a title.
         routes: waypoints (N, 3) of at most two [m].
         cruise: speed on each [m/s].
@@ -243,7 +243,7 @@ def draw_overview(
 
     Args:
         path: the picture to write.
-        structures: of the whole city.
+        structures: all those of the city.
         space: the room for a car, if it is to be drawn.
         drives: the drives that were found.
     """

@@ -77,12 +77,12 @@ class ImportOptions:
     """The options of an import.
 
     Attributes:
-        years: of the stages, increasing; without any there is one stage.
+        years: the stages' years, increasing; without any there is one stage.
         year_attribute: the attribute with the year of construction; the usual
             ones if None.
         undated: the first stage of buildings without a year.
         lod: level of detail; the highest of each object if None.
-        seed: of the draws of `grow`, and of buildings along a file's roads.
+        seed: seeds the draws of `grow`, and buildings along a file's roads.
         along: waypoints of a drive, in place of the two proposed ones.
         grow: share of the buildings that an added first stage lacks, or has
             lower, at random; no such stage if None.
@@ -110,7 +110,7 @@ class ImportReport:
 
     Attributes:
         kinds: type of object -> number of structures.
-        triangles: of all.
+        triangles: number of triangles of all structures.
         stages: stage -> number of structures.
         undated, dated: buildings without a year, and with one.
         drives: lengths of the proposed drives [m].

@@ -54,7 +54,7 @@ def keep_near(
     Other structures become None.
 
     Args:
-        structures: of the city.
+        structures: the city's structures.
         drives: at least one.
         distance: greatest distance of a structure's nearest corner, or of its
             bounding box [m].
@@ -173,7 +173,7 @@ class StagedCity:
         """Returns the city without structures far from drives.
 
         Args:
-            drives: of the city.
+            drives: the city's drives.
             distance: see `keep_near` [m].
             faults: counts structures left out.
 
@@ -370,10 +370,10 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
     not change them.
 
     Args:
-        city: of one stage; what is gone by then stands at the first, and what
+        city: a single stage; what is gone by then stands at the first, and what
             has its place today does not.
         part: share of its buildings that are missing or lower at first.
-        seed: of the lot.
+        seed: the seed of the draws.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]

@@ -56,8 +56,8 @@ class MessageOrder:
         """Begins without messages.
 
         Args:
-            folder: of the recording; errors name it.
-            topics: of the recording.
+            folder: the recording's folder; errors name it.
+            topics: the recording's topics.
         """
         self._folder = folder
         self._latched = {topic.name for topic in topics if topic.latched}

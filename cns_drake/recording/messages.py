@@ -76,7 +76,7 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
     """Returns what is about the stamp, the width and the data of a cloud.
 
     Args:
-        dtype: of its records.
+        dtype: its records' type.
         frame_id: see `encode_point_cloud`.
     """
     data = ros_types.serialize(
@@ -130,7 +130,7 @@ def make_imu(
         specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
             ground +9.81 along z.
         stamp_ns: the time of the measurement [ns].
-        variances: of each axis of the specific force [m^2/s^4] and of the
+        variances: those of each axis of the specific force [m^2/s^4] and the
             angular velocity [rad^2/s^2].
 
     Returns:

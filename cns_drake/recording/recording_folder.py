@@ -18,7 +18,7 @@ class RecordingFolder:
         path: the folder; its last part names the recording.
         mcap: the messages.
         scenario: the recorded scenario.
-        fingerprint: of all inputs; see `cns_drake.scenarios.provenance`.
+        fingerprint: that of all inputs; see `cns_drake.scenarios.provenance`.
         metadata: for rosbag2. It gets its name last: with it, the recording is
             finished.
     """

@@ -91,7 +91,7 @@ class Fault:
     """A place where a file cannot be read.
 
     Attributes:
-        offset: of the damaged record [bytes].
+        offset: where the damaged record begins [bytes].
         text: what is wrong.
     """
 

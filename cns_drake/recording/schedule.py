@@ -30,7 +30,7 @@ def frames_within(duration: float, period: float = FRAME_PERIOD) -> int:
     The first frame is taken at its start.
 
     Args:
-        duration: of the drive [s].
+        duration: how long the drive takes [s].
         period: time between frames [s].
     """
     return math.floor(duration / period) + 1

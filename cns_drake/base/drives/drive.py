@@ -234,7 +234,7 @@ class PlacedDrive:
     """The world frame and the map of a drive that is closed again.
 
     Attributes:
-        name: of the drive.
+        name: the drive's name.
         world_frame: name of the frame of its poses.
         scenario: its `map`, if it names one.
     """

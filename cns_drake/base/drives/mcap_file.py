@@ -120,7 +120,7 @@ def read_chunk(stream: BinaryIO, size: int) -> bytes:
 
     Args:
         stream: the file.
-        size: of the records, as the file's index has it [bytes].
+        size: the records' length, as the file's index has it [bytes].
 
     Raises:
         ValueError: if it is damaged, too large or of unknown compression.
@@ -386,7 +386,7 @@ class McapFile:
 
         Args:
             stream: the file.
-            offset: of the record of the index in it [bytes].
+            offset: where the record of the index begins in it [bytes].
             left: how long the index may be [bytes].
         """
         stream.seek(offset + RECORD_HEADER.size)

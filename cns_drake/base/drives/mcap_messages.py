@@ -130,7 +130,7 @@ class StaticTransforms:
         """Reads the transforms.
 
         Args:
-            messages: of type tf2_msgs/msg/TFMessage.
+            messages: each of type tf2_msgs/msg/TFMessage.
             where: file and topic, for errors.
 
         Raises:

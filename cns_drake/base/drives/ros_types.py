@@ -167,6 +167,6 @@ def deserialize(data: bytes | memoryview, message_type: str) -> Any:
     """Returns the message of a CDR form.
 
     Raises:
-        Exception: of any type, if the data are no such message.
+        Exception: any type of error, if the data are no such message.
     """
     return _TYPESTORE.deserialize_cdr(data, message_type)

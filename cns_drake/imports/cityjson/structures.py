@@ -82,7 +82,7 @@ def import_structures(
 
     Args:
         city: the content of the file; its faults are extended.
-        origin: (3,) of the world in the file's coordinates [m].
+        origin: (3,) the world's origin in the file's coordinates [m].
         lod: level of detail to take; the highest of each object if None.
         year_attribute: see `construction_year`.
     """

@@ -209,7 +209,8 @@ def simplified_drive(
     Args:
         xy: (N, 2) places to pass, about 1 m apart [m].
         space: where a car has room.
-        tolerances: of its waypoints against these places, tried in turn [m].
+        tolerances: greatest distances of its waypoints from these places,
+            tried in turn [m].
     """
     found: WaypointDrive | Obstacle = Obstacle(xy[len(xy) // 2])
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):

@@ -56,7 +56,7 @@ def surface_samples(
 
     Args:
         triangles: to sample.
-        spacing: of the points [m].
+        spacing: greatest distance from a place to a point [m].
         window: (2,) least and greatest x and y; points outside are left out.
     """
     while len(triangles):
@@ -170,7 +170,7 @@ def find_free_space(
     """Returns the room for a car, on roads if the file has any.
 
     Args:
-        structures: of the whole city, at all stages.
+        structures: all those of the city, at all stages.
         ground: below them.
     """
     low, high = _window(structures)

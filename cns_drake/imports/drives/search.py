@@ -144,7 +144,7 @@ class WayGraph(ABC):
     """Pieces of way, each with its successors.
 
     Attributes:
-        lengths: (N,) of the pieces [m].
+        lengths: (N,) lengths of the pieces [m].
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class WayGraph(ABC):
         """Makes the graph.
 
         Args:
-            lengths: (N,) of the pieces [m].
+            lengths: (N,) lengths of the pieces [m].
             before, after: (L,) numbers of pieces; `before` leads into `after`.
             costs: (L,) from middle to middle; the length if None [m].
         """
@@ -270,8 +270,8 @@ def _farthest(
     """Returns the longest way from a piece that meets no place twice.
 
     Args:
-        graph: of all pieces.
-        links: of the usable pieces; transposed links give the way to the piece,
+        graph: all pieces.
+        links: between usable pieces; transposed links give the way to it,
             in reverse order.
         start: the piece.
         longest: greatest length of the returned way [m].
@@ -344,7 +344,7 @@ def _arm(
     """Returns the longest way from a piece, or to it.
 
     Args:
-        graph: of all pieces.
+        graph: all pieces.
         used: pieces of the drives.
         joint: the piece among them where the way begins.
         backwards: whether it ends there instead.

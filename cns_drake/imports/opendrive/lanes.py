@@ -85,7 +85,7 @@ def is_raised(kind: str, height: float) -> bool:
 
     Args:
         kind: its type.
-        height: of its inner edge above the road in the file [m].
+        height: how high its inner edge stands above the road in the file [m].
     """
     return kind in _RAISED or height >= _LEAST_KERB
 
@@ -102,7 +102,7 @@ class LaneBand:
         inner, outer: (N, 3) places on its edges, in the order of the road; two
             are the same at a step in its width [m].
         middle: (N, 3) between them.
-        heading, roll, grade: (N,) of the road there [rad, rad, 1].
+        heading, roll, grade: (N,) the road's there [rad, rad, 1].
         s: (N,) along the road [m].
     """
 

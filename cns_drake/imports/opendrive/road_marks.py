@@ -61,7 +61,7 @@ def moved_off_kerbs(
     Args:
         border: (N, 3) places of a border of lanes [m].
         left: (N, 2) unit vectors to its left.
-        reach: of the lines to the left and to the right of it [m].
+        reach: how far the lines reach to the left and to the right of it [m].
         carriageway: prepared.
     """
     xy = border[:, :2].copy()
@@ -130,9 +130,9 @@ def road_marks(
     """Yields the marks of each road.
 
     Args:
-        prefix: of the names.
+        prefix: how the names begin.
         bands: lanes of the roads.
-        heights: of the ground at (N, 2) places [m]; the marks lie on the
+        heights: gives the ground's at (N, 2) places [m]; the marks lie on the
             borders of lanes if None.
         carriageway: with kerbs all around, which the marks do not leave; lanes
             have no kerbs if None [m].
@@ -198,10 +198,10 @@ def _painted(
 
     Args:
         border: (N, 3) places [m].
-        s, heading: (N,) of the road there [m, rad].
+        s, heading: (N,) the road's there [m, rad].
         marks: along it.
         side: positive if outwards is to the left.
-        end: of the last mark along the road [m].
+        end: where the last mark ends along the road [m].
         carriageway: see `road_marks`.
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
@@ -227,7 +227,7 @@ def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
     """Returns the lines of a mark, as the file has them or usual ones.
 
     Args:
-        mark: of the file.
+        mark: as the file has it.
         side: positive if outwards is to the left.
     """
     styles = [word for word in mark.kind.split() if word in _STYLES]

@@ -117,7 +117,7 @@ class Cubic:
         Args:
             u, v: four coefficients each, of p^0 first [m].
             last: p at the end.
-            length: of the curve in the file [m].
+            length: the curve's length in the file [m].
             by_parameter: whether p is the distance itself.
             stretched: whether the whole curve is scaled to that length; else it
                 ends where the length is reached.
@@ -175,7 +175,7 @@ class Piece:
     Attributes:
         s: its start along the road [m].
         x, y, heading: its first point in the world [m, rad].
-        length: of it [m].
+        length: its length [m].
         shape: in the frame of that point.
     """
 
@@ -267,7 +267,7 @@ class MarkLine:
 
     Attributes:
         aside: distance from the border of the lane, positive to the left [m].
-        start: of the first dash, from the start of the mark [m].
+        start: where the first dash begins, from the start of the mark [m].
         dash, gap: lengths of a dash and of the gap after it; the line is
             continuous if the gap is 0 [m].
         width: [m].
@@ -288,7 +288,7 @@ class RoadMark:
         start: along the road [m].
         kind: its type, such as `solid broken`.
         colour: as the file names it.
-        width: of one line [m].
+        width: how wide one line is [m].
         lines: the lines it consists of; those usual for its kind if empty.
     """
 
@@ -312,7 +312,7 @@ class Lane:
         kind: its type, such as driving.
         width: over the distance along the road; or border: distance of its
             outer edge from the middle.
-        height: of its inner edge above the road [m].
+        height: how high its inner edge stands above the road [m].
         marks: on its outer border, one after the other.
     """
 
@@ -379,12 +379,12 @@ class ImportedRoad:
     Attributes:
         name: its id in letters, digits, dots and dashes, unique.
         junction: id of the junction that it belongs to, or none.
-        length: of it [m].
-        pieces: of its course, one after the other.
+        length: its length [m].
+        pieces: parts of its course, one after the other.
         elevation: height of the reference line [m].
         superelevation: roll about it [rad].
-        lane_offset: of the middle of its lanes, to the left [m].
-        sections: of its lanes, one after the other.
+        lane_offset: how far the middle of its lanes lies to the left [m].
+        sections: stretches with the same lanes, one after the other.
         keeps_left: whether its traffic keeps left.
         limits: pairs of start and value of a speed limit [m, m/s].
         things: beside it.
@@ -452,7 +452,7 @@ class RoadMap:
     Attributes:
         roads: in the order of the file.
         reference_system: as the file names it.
-        origin: (3,) of the world in the file's coordinates [m].
+        origin: (3,) the world's origin in the file's coordinates [m].
     """
 
     roads: tuple[ImportedRoad, ...]

@@ -64,7 +64,7 @@ def read_marks(
 
     Args:
         lane: the element.
-        start: of its section along the road [m].
+        start: where its section begins along the road [m].
         road: name of the road.
         faults: counts marks whose lines are not usable.
 

@@ -88,8 +88,8 @@ class Town:
     """A town, and the result of its import.
 
     Attributes:
-        roads: of the file.
-        seed: of the random draws.
+        roads: the file's roads.
+        seed: the seed of the random draws.
         city: everything, in all stages.
         stages: the differences between the stages.
         streets: the areas of the roads that lie on the ground.
@@ -120,7 +120,7 @@ def build_town(
 
     Args:
         source: OpenDRIVE.
-        seed: of the generator's draws.
+        seed: the seed of the generator's draws.
         progress: takes one line at a time.
         dressed: whether the file's road marks are painted.
 
@@ -236,7 +236,7 @@ def _count_spans(
     """Counts the bridges and tunnels of a file that are not built.
 
     Args:
-        roads: of the file.
+        roads: the file's roads.
         raised: names of the roads that pass over others on decks.
         faults: takes the counts.
     """

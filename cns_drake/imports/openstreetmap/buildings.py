@@ -84,7 +84,7 @@ def make_buildings(
     """Yields buildings; parts replace the area that they cover.
 
     Args:
-        areas: of buildings and parts.
+        areas: buildings and their parts.
         local: the map's coordinates.
         year_attribute: see `construction_year`.
         faults: counts what is not made as the file has it.

@@ -119,7 +119,7 @@ def make_things(
 
     Args:
         nodes: id, tags and place of each [deg].
-        ways: of the file.
+        ways: the file's ways.
         kinds: id -> kind of a thing.
         local: brings places to metres.
     """
@@ -157,7 +157,7 @@ def import_openstreetmap(
     """Reads a file; its origin is the middle of its buildings.
 
     Args:
-        path: of the file.
+        path: the file.
         year_attribute: see `construction_year`.
         dressed: whether the sea, and grounds by what they are made of, are
             made, bridges have parapets or are left out, and demolished
@@ -242,7 +242,7 @@ def _no_buildings(faults: ImportFaults) -> str:
     """Returns why a file gives no buildings.
 
     Args:
-        faults: of the file.
+        faults: those that the file has.
     """
     unfit = [
         f"{kind}: {number}, such as {example}"

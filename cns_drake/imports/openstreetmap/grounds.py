@@ -102,7 +102,7 @@ def ground_areas(
     """Yields the areas that are ground.
 
     Args:
-        areas: of the file.
+        areas: the file's areas.
         local: brings places to metres.
         faults: counts what is repaired.
         dressed: whether they get the look of their material.
@@ -178,7 +178,7 @@ def sea(
     """Yields the sea on the right of coasts, if there is any.
 
     Args:
-        coasts: of the file.
+        coasts: the file's coastlines.
         local: brings places to metres.
         limits: (2, 2) least x and y, and greatest, of the city [m].
         faults: counts what is repaired.

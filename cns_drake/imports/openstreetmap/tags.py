@@ -193,8 +193,8 @@ def tag_value(
     """Returns the value of a tag; None if it has no valid one.
 
     Args:
-        tags: of a thing.
-        key: of the tag.
+        tags: a thing's tags.
+        key: the tag's key.
         read: parser of its value.
         most: greatest plausible value.
         where: name of the thing, and the counts for values that cannot be
@@ -222,7 +222,7 @@ def heights(
     All three are measured from the ground [m].
 
     Args:
-        tags: of the building.
+        tags: the building's tags.
         where: see `tag_value`.
     """
 
@@ -290,7 +290,7 @@ def street_width(
     """Returns the width of a street for cars [m]; None for other ways.
 
     Args:
-        tags: of a way.
+        tags: a way's tags.
         where: see `tag_value`.
     """
     kind = tags.get("highway", "").removesuffix("_link")
@@ -329,8 +329,8 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     """Returns the distance of the outermost lane from a street's middle [m].
 
     Args:
-        tags: of the street.
-        width: of its carriageway [m].
+        tags: the street's tags.
+        width: its carriageway's width [m].
     """
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
     if not lanes:
@@ -409,7 +409,7 @@ class LaneLayout(NamedTuple):
 
     Attributes:
         forward, backward: number of lanes along its line, and against it.
-        width: of each [m].
+        width: each lane's width [m].
     """
 
     forward: int
@@ -423,7 +423,7 @@ class LaneLayout(NamedTuple):
 
         Args:
             is_forward: whether it leads along the street's line.
-            number: of the lane in its direction, 0 for the innermost one.
+            number: the lane's in its direction, 0 for the innermost one.
         """
         same, other = self.forward, self.backward
         if not is_forward:
@@ -435,8 +435,8 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
     """Returns the lanes of a street; none where vehicles cannot pass.
 
     Args:
-        tags: of the street.
-        width: of its carriageway [m].
+        tags: the street's tags.
+        width: its carriageway's width [m].
     """
     is_along, is_against = driven_ways(tags)
     directions = is_along + is_against
@@ -473,7 +473,7 @@ def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
     """Returns the speed limit of a street [m/s].
 
     Args:
-        tags: of the street.
+        tags: the street's tags.
         is_forward: whether along its line.
     """
     side = "forward" if is_forward else "backward"

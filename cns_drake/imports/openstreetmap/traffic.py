@@ -136,7 +136,7 @@ class StreetTraffic:
         Args:
             streets: they meet at common nodes.
             crossed: nodes at which people cross.
-            surface: of all streets; ways that leave it are left out.
+            surface: the area of all streets; ways that leave it are left out.
             side: 1 if traffic keeps right, -1 if left.
         """
         self.stretches = list(_stretches(streets, crossed))
@@ -367,9 +367,9 @@ def lanes_of_streets(
     """Returns the text of a file of lanes; None if no vehicle can drive on.
 
     Args:
-        streets: of the file.
+        streets: the file's streets.
         places: signals, crossings and paths.
-        structures: of the city.
+        structures: the city's structures.
         added: parked cars and other things that were put beside the streets;
             those that stand in a lane are named in the file.
         drives: traffic keeps to the streets near them.

@@ -51,7 +51,7 @@ class StreetWalkways:
             paths: (N, 2) middles of ways for people [m].
             crossed: nodes of streets at which people cross.
             sidewalks: area of sidewalks and paths.
-            height: of sidewalks above the streets [m].
+            height: how high sidewalks stand above the streets [m].
         """
         walked = sidewalks.buffer(-_FROM_EDGE, quad_segs=2)
         shapely.prepare(walked)
