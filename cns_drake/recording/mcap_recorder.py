@@ -122,8 +122,8 @@ class McapRecorder(LeafSystem):
             further: name -> further sensor.
             layouts: LiDAR name -> layout of its points (see
                 `point_layouts`), `cns` unless given.
-            imu_variances: those of specific force [m^2/s^4] and angular velocity
-                [rad^2/s^2].
+            imu_variances: variances of specific force [m^2/s^4] and of
+                angular velocity [rad^2/s^2].
             with_imu_samples: whether there is a port `imu_samples`.
             with_objects: whether there is a port `objects`.
             start_ns: the stamp of time zero [ns].
