@@ -92,13 +92,7 @@ def make_station(
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
     motion = builder.AddNamedSystem(
-        "vehicle_motion",
-        VehicleMotion(
-            plant,
-            world.vehicle,
-            trajectory,
-            period=scenario.frame_period,
-        ),
+        "vehicle_motion", VehicleMotion(plant, world.vehicle, trajectory)
     )
     to_pose = builder.AddNamedSystem(
         "geometry_pose", MultibodyPositionToGeometryPose(plant)
