@@ -23,7 +23,6 @@ from scipy.spatial import cKDTree
 
 from evaluation.change.tcr import TAU, TemporalChange
 from evaluation.geometry.hull import in_convex_hull
-from evaluation.geometry.nearest import NearestPoints
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.report.drawing import PIXELS, Legend, plain, save, unit
 
@@ -173,7 +172,7 @@ def judge_points(
     """
     # A distance beyond the bound only counts as far away, so the search stops
     # there.
-    _, distances = NearestPoints(other).find(points, 2.0 * tau)
+    distances, _ = cKDTree(other).query(points, distance_upper_bound=2.0 * tau)
     return distances > tau, in_convex_hull(points, other)
 
 

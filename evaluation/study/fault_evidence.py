@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.jobs.step import Reporter
@@ -17,7 +18,6 @@ from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import within_range
-from evaluation.geometry.coinciding import CoincidingPoints
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
@@ -206,9 +206,18 @@ class _Shown:
         return thin(self.points[self.points[:, 2] > _standing()], _CELL)
 
     @cached_property
-    def coinciding(self) -> CoincidingPoints:
-        """Compares the standing points with others."""
-        return CoincidingPoints(self.standing, _COINCIDENT)
+    def tree(self) -> cKDTree:
+        """Finds the nearest of the standing points."""
+        return cKDTree(self.standing, balanced_tree=False, compact_nodes=False)
+
+    def coinciding(self, points: np.ndarray) -> float:
+        """Returns the part of points (N, 3) that coincide with standing ones.
+
+        Args:
+            points: in the frame of the sensor [m], N > 0.
+        """
+        found, _ = self.tree.query(points, distance_upper_bound=_COINCIDENT)
+        return float(np.isfinite(found).mean())
 
     @cached_property
     def some(self) -> np.ndarray:
@@ -286,8 +295,11 @@ class _Aligner:
         )
         for k, X_PQ in zip(standing, poses, strict=True):
             if X_PQ is not None:
-                moved = transform(X_PQ, query.standing)
-                shared[k] = min(places[k].coinciding.shares(moved))
+                place = places[k]
+                shared[k] = min(
+                    place.coinciding(transform(X_PQ, query.standing)),
+                    query.coinciding(transform(inverse(X_PQ), place.standing)),
+                )
         return shared
 
     def _place(self, place: _Shown) -> LayeredScan:
