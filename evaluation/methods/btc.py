@@ -14,12 +14,11 @@ the grids on which planes and keypoints are found then coincide.)
 Scores are those of the public program (equal for 243 single scans of two
 LiDARs and 163 submaps, each against 308 places). Two details that the method
 leaves open follow the program. One is the order in which planes are compared
-(`btc_voxel_order`), by which the order of a cloud's points matters. The other
+(`btc_planes`), by which the order of a cloud's points matters. The other
 is a lean of keypoints on ground that leans sideways, which lowers scores there;
 `image_axes: orthogonal` corrects it.
 
-The steps are one module each: `btc_planes`, `btc_keypoints`,
-`btc_triangles` and `btc_verification`.
+Planes are found by `btc_planes`, keypoints and triangles by `btc_triangles`.
 """
 
 from __future__ import annotations
@@ -36,31 +35,29 @@ from pydantic import (
     PositiveFloat,
     PositiveInt,
 )
+from scipy.spatial import cKDTree
 
-from evaluation.geometry.nearest import NearestPoints
-from evaluation.methods.btc_keypoints import (
-    find_keypoints,
-    height_image,
-    image_axes,
-    suppress,
-)
-from evaluation.methods.btc_planes import (
-    Planes,
-    base_plane,
-    voxel_planes,
-)
+from cns_drake.base import poses
+from evaluation.methods.btc_planes import Planes, base_plane, voxel_planes
 from evaluation.methods.btc_triangles import (
     Triangles,
     TriangleTable,
+    find_keypoints,
+    height_image,
+    image_axes,
     make_table,
     make_triangles,
     match,
-)
-from evaluation.methods.btc_verification import (
-    find_motion,
-    plane_overlap,
+    suppress,
 )
 from evaluation.methods.method import Method, MethodConfig, register
+
+# Fixed in the public program: how many pairs are tried at most (about), how
+# far from its partner a vertex may come to lie [m], and how many pairs must
+# agree on a motion.
+_TRIALS = 50
+_VERTEX_LIMIT = 3.0
+_MIN_AGREEING = 4
 
 # A bit of an int64 for each layer, and one for the sign.
 _MAX_LAYERS = 62
@@ -163,12 +160,12 @@ class BtcDatabase:
 
     Attributes:
         places: their descriptions.
-        centers: of the planes of each place.
+        centers: trees of the centers of each place's planes.
         table: the triangles of all.
     """
 
     places: Sequence[BtcDescription]
-    centers: Sequence[NearestPoints]
+    centers: Sequence[cKDTree]
     table: TriangleTable
 
 
@@ -222,7 +219,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def build_database(self, places: Sequence[BtcDescription]) -> BtcDatabase:
         return BtcDatabase(
             places=places,
-            centers=[NearestPoints(place.planes.centers) for place in places],
+            centers=[cKDTree(place.planes.centers) for place in places],
             table=make_table(
                 [place.triangles for place in places],
                 self.config.side_resolution,
@@ -305,3 +302,88 @@ class Btc(Method[BtcDescription, BtcDatabase]):
             )
             if X_PQ is not None:
                 yield int(place), X_PQ
+
+
+def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Returns the motion that brings triangles closest to their partners.
+
+    Kabsch's solution, without reflections.
+
+    Args:
+        query: (..., 3, 3) vertices, one a row [m].
+        place: (..., 3, 3) their partners.
+
+    Returns:
+        (..., 4, 4) X_PQ.
+    """
+    query_mean = query.mean(axis=-2)
+    place_mean = place.mean(axis=-2)
+    covariance = np.swapaxes(query - query_mean[..., None, :], -1, -2) @ (
+        place - place_mean[..., None, :]
+    )
+    U, _, Vt = np.linalg.svd(covariance)
+    V = np.swapaxes(Vt, -1, -2).copy()
+    mirrored = np.linalg.det(V @ np.swapaxes(U, -1, -2)) < 0.0
+    V[..., 2] *= np.where(mirrored, -1.0, 1.0)[..., None]
+    R = V @ np.swapaxes(U, -1, -2)
+    p = place_mean - (R @ query_mean[..., None])[..., 0]
+    return poses.make_pose(R, p)
+
+
+def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
+    """Returns the motion with the most agreeing pairs of triangles.
+
+    Every pair, or every n-th of many, proposes the motion that aligns it.
+
+    Args:
+        query: (M, 3, 3) vertices, M > 0.
+        place: (M, 3, 3) vertices of their partners.
+
+    Returns:
+        X_PQ (4, 4), the first of equally good ones; None where too few
+        pairs agree.
+    """
+    stride = len(query) // _TRIALS + 1
+    # As many as there are whole strides.
+    tried = np.arange(len(query) // stride) * stride
+    motions = align(query[tried], place[tried])
+    turned = query.reshape(-1, 3) @ np.swapaxes(motions[:, :3, :3], 1, 2)
+    offsets = turned + motions[:, None, :3, 3] - place.reshape(-1, 3)
+    is_near = (offsets**2).sum(axis=2) < _VERTEX_LIMIT**2
+    agreeing = is_near.reshape(len(motions), -1, 3).all(axis=2).sum(axis=1)
+    best = int(agreeing.argmax())
+    return motions[best] if agreeing[best] >= _MIN_AGREEING else None
+
+
+def plane_overlap(
+    query: Planes,
+    place: Planes,
+    place_centers: cKDTree,
+    X_PQ: np.ndarray,
+    normal_limit: float,
+    distance_limit: float,
+) -> float:
+    """Returns the part of a query's patches that lie on one of a place.
+
+    Each patch is compared with the one whose center is nearest to its own.
+
+    Args:
+        query: patches of the query, at least one.
+        place: patches of the place, at least one.
+        place_centers: tree of the centers of the latter.
+        X_PQ: (4, 4) the query's frame in that of the place.
+        normal_limit: upper limit of the difference of the two normals.
+        distance_limit: of the center from the other's plane [m].
+    """
+    centers = poses.transform(X_PQ, query.centers)
+    normals = query.normals @ X_PQ[:3, :3].T
+    _, nearest = place_centers.query(centers)
+    # |n1 - n2| < d of unit vectors; either sign of a normal will do.
+    cosines = np.abs((normals * place.normals[nearest]).sum(axis=1))
+    offsets = ((centers - place.centers[nearest]) * place.normals[nearest]).sum(
+        axis=1
+    )
+    fitting = (cosines > 1.0 - 0.5 * normal_limit**2) & (
+        np.abs(offsets) < distance_limit
+    )
+    return np.count_nonzero(fitting) / len(query)

@@ -1,6 +1,10 @@
 """Planes in a cloud: one a voxel, and the ground plane.
 
-Part of BTC (see `evaluation.methods.btc`).
+Part of BTC (see `evaluation.methods.btc`). Which patches of the ground come
+together to its largest plane depends on the order in which they are compared,
+and on that plane all keypoints depend. The public program takes the voxels as
+the hash table of its C++ library (libstdc++) holds them. That order is no
+part of the method, but it is a definite one, and only with it scores agree.
 """
 
 from __future__ import annotations
@@ -10,7 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from evaluation.methods.btc_voxel_order import voxel_order
+
+# The hash of a voxel's index, in the public program.
+_FACTOR = 116101
+_MODULUS = 10_000_000_000
+
+# How many buckets a std::unordered_map of libstdc++ has when it grows by one
+# element at a time: the primes of its table that follow each other by its
+# rule (at least twice as many, once there are as many elements as buckets).
+_NUM_BUCKETS = (
+    13, 29, 59, 127, 257, 541, 1109, 2357, 5087, 10273, 20753, 42043, 85229,
+    172933, 351061, 712697, 1447153, 2938679, 5967347, 12117689, 24607243,
+    49969847, 101473717, 206062531,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -48,7 +64,7 @@ def voxel_planes(
     """Returns the voxels whose points lie on a plane.
 
     They come in the order of the public program, which depends on the order of
-    the points; see `evaluation.methods.btc_voxel_order`.
+    the points.
 
     Args:
         points: (N, 3) [m].
@@ -59,7 +75,8 @@ def voxel_planes(
     index, counts, centers, covariances = _moments(points, voxel_size)
     visited = voxel_order(index)
     dense = visited[counts[visited] > max_points]
-    planes, variances = _fit(centers[dense], covariances[dense], counts[dense])
+    covariances = covariances[dense] / counts[dense, None, None]
+    planes, variances = _fit(centers[dense], covariances, counts[dense])
     return planes.take(variances < flatness)
 
 
@@ -146,14 +163,24 @@ def group_alike(
         distance_limit: see `base_plane`.
     """
     num_planes = len(centers)
+    # |n1 - n2| < d of unit vectors; either sign of a normal will do.
+    min_cosine = 1.0 - 0.5 * normal_limit * normal_limit
     labels = np.full(num_planes, -1)
     num_groups = 0
     excesses = np.empty(num_planes)
     # One more than needed, for a write that is not kept.
     alike = np.empty(num_planes + 1, dtype=np.int64)
-    by_axis = np.ascontiguousarray(centers.T), np.ascontiguousarray(normals.T)
+    x, y, z = np.ascontiguousarray(centers.T)
+    a, b, c = np.ascontiguousarray(normals.T)
     for i in range(num_planes - 1, 0, -1):
-        _compare(*by_axis, i, normal_limit, distance_limit, excesses)
+        # Without a branch, so that several patches are compared at a time.
+        for j in range(i):
+            cosine = abs(a[i] * a[j] + b[i] * b[j] + c[i] * c[j])
+            dx, dy, dz = x[j] - x[i], y[j] - y[i], z[j] - z[i]
+            from_i = abs(a[i] * dx + b[i] * dy + c[i] * dz)
+            from_j = abs(a[j] * dx + b[j] * dy + c[j] * dz)
+            apart = max(from_i, from_j) - distance_limit
+            excesses[j] = max(apart, min_cosine - cosine)
         num_alike = 0
         for j in range(i):
             alike[num_alike] = j
@@ -171,41 +198,6 @@ def group_alike(
 
 
 @compiled
-def _compare(
-    centers: np.ndarray,
-    normals: np.ndarray,
-    i: int,
-    normal_limit: float,
-    distance_limit: float,
-    excesses: np.ndarray,
-) -> None:
-    """Writes by how much patches before `i` are not like it; below 0 if alike.
-
-    The loop has no branch, so that it handles several patches at a time.
-
-    Args:
-        centers: (3, P) [m].
-        normals: (3, P) unit.
-        i: number of a patch.
-        normal_limit: see `base_plane`.
-        distance_limit: see `base_plane`.
-        excesses: (P,) to write to.
-    """
-    # |n1 - n2| < d of unit vectors; either sign of a normal will do.
-    min_cosine = 1.0 - 0.5 * normal_limit * normal_limit
-    x, y, z = centers[0, i], centers[1, i], centers[2, i]
-    a, b, c = normals[0, i], normals[1, i], normals[2, i]
-    for j in range(i):
-        u, v, w = normals[0, j], normals[1, j], normals[2, j]
-        cosine = abs(a * u + b * v + c * w)
-        dx, dy, dz = centers[0, j] - x, centers[1, j] - y, centers[2, j] - z
-        from_i = abs(a * dx + b * dy + c * dz)
-        from_j = abs(u * dx + v * dy + w * dz)
-        apart = max(from_i, from_j) - distance_limit
-        excesses[j] = max(apart, min_cosine - cosine)
-
-
-@compiled
 def _moments(
     points: np.ndarray, voxel_size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -213,7 +205,7 @@ def _moments(
 
     Returns:
         (V, 3) int64 indices along x, y and z; (V,) number of points; (V, 3)
-        their mean; (V, 3, 3) their covariance.
+        their mean; (V, 3, 3) their covariance, times their number.
     """
     num_points = len(points)
     places = np.empty(3 * num_points, dtype=np.int64)
@@ -265,18 +257,10 @@ def _moments(
         dx = points[i, 0] - means[voxel, 0]
         dy = points[i, 1] - means[voxel, 1]
         dz = points[i, 2] - means[voxel, 2]
-        covariances[voxel, 0, 0] += dx * dx
-        covariances[voxel, 1, 0] += dy * dx
-        covariances[voxel, 1, 1] += dy * dy
-        covariances[voxel, 2, 0] += dz * dx
-        covariances[voxel, 2, 1] += dz * dy
-        covariances[voxel, 2, 2] += dz * dz
-    for voxel in range(num_voxels):
-        for axis in range(3):
-            for other in range(axis + 1):
-                covariance = covariances[voxel, axis, other] / counts[voxel]
-                covariances[voxel, axis, other] = covariance
-                covariances[voxel, other, axis] = covariance
+        for axis, offset in enumerate((dx, dy, dz)):
+            covariances[voxel, axis, 0] += offset * dx
+            covariances[voxel, axis, 1] += offset * dy
+            covariances[voxel, axis, 2] += offset * dz
     found = slice(num_voxels)
     return index[found], counts[found], means[found], covariances
 
@@ -287,3 +271,49 @@ def _fit(
     """Returns the planes of least squares, and the variances (P,) off them."""
     variances, axes = np.linalg.eigh(covariances)
     return Planes(centers, axes[:, :, 0], covariances, counts), variances[:, 0]
+
+
+def voxel_order(index: np.ndarray) -> np.ndarray:
+    """Returns (V,) in which order the public program visits voxels.
+
+    Args:
+        index: (V, 3) int64 of distinct voxels along x, y and z, in the order
+            in which they were first met.
+    """
+    x, y, z = np.asarray(index, dtype=np.int64).T
+    # fmod: a remainder with the sign of the dividend, as in C++.
+    code = np.fmod(z * _FACTOR, _MODULUS) + y
+    code = np.fmod(code * _FACTOR, _MODULUS) + x
+    return hash_table_order(code.astype(np.uint64))
+
+
+def hash_table_order(codes: np.ndarray) -> np.ndarray:
+    """Returns (N,) in which order a std::unordered_map is iterated.
+
+    The elements are one list, on which those of a bucket follow each other.
+    A new element goes to the front of its bucket, a new bucket to the front
+    of the list. When the number of buckets grows, all elements are put in
+    anew, in the order of the list.
+
+    Args:
+        codes: (N,) uint64 hashes of the elements, in the order in which they
+            were put in, one by one.
+
+    Raises:
+        ValueError: there are too many.
+    """
+    if len(codes) > _NUM_BUCKETS[-1]:
+        raise ValueError(f"{len(codes)} elements")
+    order = np.zeros(0, dtype=np.int64)
+    for num_buckets in _NUM_BUCKETS:
+        added = np.arange(len(order), min(num_buckets, len(codes)))
+        order = np.concatenate([order, added])
+        buckets = codes[order] % np.uint64(num_buckets)
+        # Where each bucket is first met: the first of equal indices is
+        # assigned last.
+        first = np.empty(num_buckets, dtype=np.int64)
+        first[buckets[::-1]] = np.arange(len(order))[::-1]
+        order = order[np.argsort(first[buckets], kind="stable")[::-1]]
+        if len(order) == len(codes):
+            break
+    return order

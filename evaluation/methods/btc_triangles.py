@@ -1,19 +1,31 @@
-"""Triangles between keypoints, and the search for similar ones.
+"""Keypoints of a cloud, their triangles, and the search for similar ones.
 
-Part of BTC (see `evaluation.methods.btc`).
+Part of BTC (see `evaluation.methods.btc`). Seen along the normal of a plane,
+the cloud is an image; each of its cells has bits for the heights above the
+plane that have points. Cells with many heights (walls, trunks, posts) are the
+keypoints, if they are not part of a line of such.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import itertools
+import math
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.compiled import compiled
-from evaluation.geometry.sorting import cell_order
-from evaluation.methods.btc_keypoints import Keypoints, count_bits
+
+# Cells along the side of a square in which one keypoint may lie, the least
+# number of points of an image, and by how many heights a cell may have less
+# than its neighbour and still continue a line: fixed in the public program.
+_SEGMENT = 5
+_MIN_POINTS = 6
+_LINE_MARGIN = 3
+
+_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 # Fixed in the public program: how much longer the two short sides must be than
 # the long one [m], the sides' difference at which two triangles of one cloud
@@ -23,12 +35,264 @@ _MIN_DETOUR = 0.2
 _SAME = 0.001
 _REACH = 1.5
 
+# The search reaches this much farther, against rounding.
+_MARGIN = 1.0 + 1e-9
+
 # A similarity of exactly the limit counts, with either rounding: the public
 # program holds the limit in single precision, where 0.7 is 1e-8 less.
 _ROUNDING = 1e-8
 
-# Three cell numbers of 20 bits make one key.
-_KEY_BITS = 20
+
+@dataclass(frozen=True)
+class Keypoints:
+    """Keypoints with their binary descriptors.
+
+    Attributes:
+        positions: (K, 3) on the plane [m].
+        heights: (K,) int64, bit k set if there are points in layer k.
+    """
+
+    positions: np.ndarray
+    heights: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.heights)
+
+
+@dataclass(frozen=True)
+class HeightImage:
+    """A cloud seen along the normal of a plane.
+
+    Attributes:
+        heights: (rows, columns) int64, bit k set if there are points in
+            layer k. At least one more cell than there are points for, up and
+            to the right; a multiple of the segment.
+        means: (rows, columns, 2) mean of the points of a cell, along rows
+            and along columns [m]; NaN where there are none.
+    """
+
+    heights: np.ndarray
+    means: np.ndarray
+
+
+def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
+    """Returns the directions of an image on a plane, (3, 3) of length 1.
+
+    They are, one a row: along the rows' numbers, along the columns' (which
+    follows the x axis as far as the plane allows), and the normal.
+
+    By a wrong term, the second direction of the public program has a
+    component along the normal that is the normal's y component. Keypoints
+    then lie on a plane through the same center that is tilted by as much:
+    on level ground, about as much as the ground itself. It is followed
+    unless `orthogonal`.
+
+    Args:
+        normal: (3,) unit, z >= 0.
+        orthogonal: whether all directions are.
+    """
+    a, b, c = normal
+    if orthogonal:
+        along = [c, 0.0, -a] if abs(b) < 1.0 else [1.0, 0.0, 0.0]
+    elif c != 0.0:
+        along = [1.0, 0.0, -(a + b) / c]
+    else:
+        along = [1.0, -a / b, 0.0] if b != 0.0 else [0.0, 1.0, 0.0]
+    along = np.array(along) / np.linalg.norm(along)
+    across = np.cross(normal, along)
+    return np.stack([across / np.linalg.norm(across), along, normal])
+
+
+def height_image(
+    points: np.ndarray,
+    center: np.ndarray,
+    axes: np.ndarray,
+    *,
+    resolution: float,
+    height_range: tuple[float, float],
+    height_step: float,
+    num_layers: int,
+) -> HeightImage:
+    """Draws points into the cells of a grid that starts at the first.
+
+    Its memory grows with the area that the points cover.
+
+    Args:
+        points: (N, 3) [m].
+        center: (3,) a point of the plane [m].
+        axes: (3, 3) of the image.
+        resolution: length of a cell [m].
+        height_range: limits of the heights above the plane [m].
+        height_step: of the layers of height [m].
+        num_layers: how many layers; points above them only count for the
+            means.
+    """
+    return HeightImage(
+        *_draw(
+            points,
+            center,
+            axes,
+            resolution,
+            height_range,
+            height_step,
+            num_layers,
+        )
+    )
+
+
+def peaks(
+    num_heights: np.ndarray, min_heights: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Finds the cells that stand out, away from lines.
+
+    One a segment: the cell with most heights, the first of equal ones. It is
+    part of a line if in some direction one neighbour is nearly as high and
+    the opposite one at least half as high.
+
+    Args:
+        num_heights: (rows, columns) bits set in each cell; multiples of the
+            segment.
+        min_heights: that a peak needs.
+
+    Returns:
+        Rows (C,) and columns (C,), by segment along rows, then columns.
+    """
+    rows, columns = (length // _SEGMENT for length in num_heights.shape)
+    segments = (
+        num_heights.reshape(rows, _SEGMENT, columns, _SEGMENT)
+        .transpose(0, 2, 1, 3)
+        .reshape(rows * columns, _SEGMENT * _SEGMENT)
+    )
+    highest = segments.argmax(axis=1)
+    most = segments[np.arange(len(segments)), highest]
+    segment = np.flatnonzero(most >= min_heights)
+    row = segment // columns * _SEGMENT + highest[segment] // _SEGMENT
+    column = segment % columns * _SEGMENT + highest[segment] % _SEGMENT
+    # At the other two sides, the image ends in empty cells.
+    inside = (row > 0) & (column > 0)
+    row, column = row[inside], column[inside]
+    peak = num_heights[row, column]
+    in_line = np.zeros(len(row), dtype=bool)
+    for down, right in _NEIGHBOURS:
+        one = num_heights[row + down, column + right]
+        other = num_heights[row - down, column - right]
+        low, high = np.minimum(one, other), np.maximum(one, other)
+        in_line |= (high >= peak - _LINE_MARGIN) & (
+            (low >= 0.5 * peak) | (low >= peak - _LINE_MARGIN)
+        )
+    return row[~in_line], column[~in_line]
+
+
+def find_keypoints(
+    image: HeightImage, center: np.ndarray, axes: np.ndarray, min_heights: int
+) -> Keypoints:
+    """Returns the peaks of an image, as places on its plane.
+
+    Args:
+        image: of a cloud.
+        center: (3,) with which the image was drawn [m].
+        axes: (3, 3) likewise.
+        min_heights: that a keypoint needs.
+    """
+    cells = peaks(count_bits(image.heights), min_heights)
+    return Keypoints(
+        positions=center + image.means[cells] @ axes[:2],
+        heights=image.heights[cells],
+    )
+
+
+def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
+    """Returns keypoints with more heights than any other nearby.
+
+    If two are equal, neither stays.
+
+    Args:
+        keypoints: all.
+        radius: of the neighbourhood [m].
+        max_number: greatest number of kept ones, those with most heights.
+    """
+    tree = cKDTree(keypoints.positions)
+    pairs = tree.query_pairs(radius, output_type="ndarray")
+    num_heights = count_bits(keypoints.heights)
+    one, other = num_heights[pairs[:, 0]], num_heights[pairs[:, 1]]
+    kept = np.ones(len(keypoints), dtype=bool)
+    kept[pairs[one <= other, 0]] = False
+    kept[pairs[other <= one, 1]] = False
+    chosen = np.flatnonzero(kept)
+    if len(chosen) > max_number:
+        order = np.argsort(-num_heights[chosen], kind="stable")
+        chosen = chosen[order[:max_number]]
+    return Keypoints(keypoints.positions[chosen], keypoints.heights[chosen])
+
+
+@compiled
+def count_bits(words: np.ndarray) -> np.ndarray:
+    """Returns the number of set bits in int64 numbers from 0 to 2^62 - 1.
+
+    These are sums of neighbouring bits, pairs, nibbles, then of all bytes at
+    once.
+    """
+    words = words - ((words >> 1) & 0x5555555555555555)
+    words = (words & 0x3333333333333333) + ((words >> 2) & 0x3333333333333333)
+    words = (words + (words >> 4)) & 0x0F0F0F0F0F0F0F0F
+    return (words * 0x0101010101010101) >> 56
+
+
+@compiled
+def _draw(
+    points: np.ndarray,
+    center: np.ndarray,
+    axes: np.ndarray,
+    resolution: float,
+    height_range: tuple[float, float],
+    height_step: float,
+    num_layers: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns heights and means as of a `HeightImage`; see `height_image`."""
+    # Rows, columns and heights of the points between the limits.
+    near = np.empty((len(points), 3))
+    num_near = 0
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for i in range(len(points)):
+        x = points[i, 0] - center[0]
+        y = points[i, 1] - center[1]
+        z = points[i, 2] - center[2]
+        height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+        if height_range[0] <= height <= height_range[1]:
+            # On the plane: the other axes need not be orthogonal to it.
+            x -= height * axes[2, 0]
+            y -= height * axes[2, 1]
+            z -= height * axes[2, 2]
+            for axis in range(2):
+                place = (
+                    axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
+                )
+                near[num_near, axis] = place
+                low[axis] = min(low[axis], place)
+                high[axis] = max(high[axis], place)
+            near[num_near, 2] = height
+            num_near += 1
+    shape = (_SEGMENT, _SEGMENT)
+    if num_near < _MIN_POINTS:
+        num_near = 0
+    else:
+        rows = int((high[0] - low[0]) / resolution) // _SEGMENT + 2
+        columns = int((high[1] - low[1]) / resolution) // _SEGMENT + 2
+        shape = (rows * _SEGMENT, columns * _SEGMENT)
+    heights = np.zeros(shape, dtype=np.int64)
+    counts = np.zeros(shape)
+    means = np.zeros((shape[0], shape[1], 2))
+    for i in range(num_near):
+        row = int((near[i, 0] - low[0]) / resolution)
+        column = int((near[i, 1] - low[1]) / resolution)
+        layer = int((near[i, 2] - height_range[0]) / height_step)
+        if layer < num_layers:
+            heights[row, column] |= 1 << layer
+        counts[row, column] += 1.0
+        means[row, column, 0] += near[i, 0]
+        means[row, column, 1] += near[i, 1]
+    # Without points, 0 / 0 is NaN.
+    return heights, means / counts.reshape(shape[0], shape[1], 1)
 
 
 @dataclass(frozen=True)
@@ -66,16 +330,16 @@ class TriangleTable:
     to the same three numbers.
 
     Attributes:
-        keys: (T,) int64, non-decreasing; the three numbers of the cell.
         triangles: T of them.
         clouds: (T,) number of each triangle's cloud.
-        resolution: of the sides [m].
+        resolution: length that is one unit of the sides [m].
+        tree: of the sides [m].
     """
 
-    keys: np.ndarray
     triangles: Triangles
     clouds: np.ndarray
     resolution: float
+    tree: cKDTree
 
 
 def make_triangles(
@@ -122,7 +386,7 @@ def make_triangles(
     sides, order, corners = sides[kept], order[kept], corners[kept]
     # Each triangle is seen from up to three corners; the first one counts.
     lengths = (sides / _SAME).astype(np.int64)
-    by_length = cell_order(lengths)
+    by_length = np.lexsort(lengths.T)
     differs = np.diff(lengths[by_length], axis=0, prepend=-1).any(axis=1)
     first = np.sort(by_length[differs])
     sides, order, corners = sides[first], order[first], corners[first]
@@ -152,13 +416,16 @@ def make_table(clouds: Sequence[Triangles], resolution: float) -> TriangleTable:
         np.concatenate([cloud.heights for cloud in clouds]),
     )
     numbers = np.repeat(np.arange(len(clouds)), [len(c) for c in clouds])
-    cells = (triangles.sides / resolution + 0.5).astype(np.int64)
-    keys = (cells[:, 0] << 2 * _KEY_BITS) | (cells[:, 1] << _KEY_BITS)
-    keys |= cells[:, 2]
-    order = np.argsort(keys, kind="stable")
+    order = np.lexsort(_cells(triangles.sides / resolution).T[::-1])
+    triangles = triangles.take(order)
     return TriangleTable(
-        keys[order], triangles.take(order), numbers[order], resolution
+        triangles, numbers[order], resolution, cKDTree(triangles.sides)
     )
+
+
+def _cells(sides: np.ndarray) -> np.ndarray:
+    """Returns the cells (T, 3) of sides (T, 3) in units of the resolution."""
+    return (sides + 0.5).astype(np.int64)
 
 
 def match(
@@ -185,76 +452,24 @@ def match(
         (M,) triangles of the query, non-decreasing, and (M,) of the table;
         those of one triangle of the query in the order of the table.
     """
-    return _match(
-        query.sides / table.resolution,
-        query.heights,
-        table.keys,
-        table.triangles.sides / table.resolution,
-        table.triangles.heights,
-        side_tolerance,
-        min_similarity,
+    limits = side_tolerance * np.sqrt((query.sides**2).sum(axis=1))
+    # Farther ones are in other cells, whose corners are sqrt(3) from a center.
+    farthest = (_REACH + math.sqrt(3.0)) * table.resolution
+    reach = np.minimum(limits, farthest) * _MARGIN
+    near = table.tree.query_ball_point(query.sides, reach, return_sorted=True)
+    of_query = np.repeat(np.arange(len(query)), [len(one) for one in near])
+    of_table = np.fromiter(
+        itertools.chain.from_iterable(near), np.int64, len(of_query)
     )
-
-
-@compiled
-def _match(
-    query_sides: np.ndarray,
-    query_heights: np.ndarray,
-    keys: np.ndarray,
-    table_sides: np.ndarray,
-    table_heights: np.ndarray,
-    side_tolerance: float,
-    min_similarity: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """See `match`; sides in units of the resolution."""
-    found_query: np.ndarray = np.empty(1024, dtype=np.int64)
-    found_table: np.ndarray = np.empty(1024, dtype=np.int64)
-    num_found = 0
-    for i in range(len(query_sides)):
-        a, b, c = query_sides[i]
-        limit = side_tolerance * np.sqrt(a * a + b * b + c * c)
-        bits = count_bits(query_heights[i])
-        for x in range(int(a) - 1, int(a) + 2):
-            for y in range(int(b) - 1, int(b) + 2):
-                # The three cells along the longest side follow each other.
-                row = (x << 2 * _KEY_BITS) | (y << _KEY_BITS)
-                z = int(c) - 1
-                last = row | (z + 2)
-                j = np.searchsorted(keys, row | z)
-                while j < len(keys) and keys[j] <= last:
-                    z = keys[j] - row
-                    to_center = np.sqrt(
-                        (x + 0.5 - a) ** 2
-                        + (y + 0.5 - b) ** 2
-                        + (z + 0.5 - c) ** 2
-                    )
-                    difference = np.sqrt(
-                        (table_sides[j, 0] - a) ** 2
-                        + (table_sides[j, 1] - b) ** 2
-                        + (table_sides[j, 2] - c) ** 2
-                    )
-                    if to_center < _REACH and difference < limit:
-                        similarity = 0.0
-                        for vertex in range(3):
-                            heights = table_heights[j, vertex]
-                            common = count_bits(
-                                query_heights[i, vertex] & heights
-                            )
-                            similarity += (
-                                2.0
-                                * common
-                                / (bits[vertex] + count_bits(heights))
-                            )
-                        if similarity / 3.0 > min_similarity - _ROUNDING:
-                            if num_found == len(found_query):
-                                found_query = np.append(
-                                    found_query, np.empty_like(found_query)
-                                )
-                                found_table = np.append(
-                                    found_table, np.empty_like(found_table)
-                                )
-                            found_query[num_found] = i
-                            found_table[num_found] = j
-                            num_found += 1
-                    j += 1
-    return found_query[:num_found], found_table[:num_found]
+    sides = query.sides[of_query] / table.resolution
+    others = table.triangles.sides[of_table] / table.resolution
+    limit = side_tolerance * np.sqrt((sides**2).sum(axis=1))
+    difference = np.sqrt(((others - sides) ** 2).sum(axis=1))
+    to_center = np.sqrt(((_cells(others) + 0.5 - sides) ** 2).sum(axis=1))
+    is_near = (to_center < _REACH) & (difference < limit)
+    of_query, of_table = of_query[is_near], of_table[is_near]
+    heights, others = query.heights[of_query], table.triangles.heights[of_table]
+    common = count_bits(heights & others)
+    similarity = 2.0 * common / (count_bits(heights) + count_bits(others))
+    is_alike = similarity.sum(axis=1) / 3.0 > min_similarity - _ROUNDING
+    return of_query[is_alike], of_table[is_alike]

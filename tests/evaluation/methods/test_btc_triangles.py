@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.methods.btc_keypoints import Keypoints
 from evaluation.methods.btc_triangles import (
+    Keypoints,
     Triangles,
     make_table,
     make_triangles,
@@ -278,8 +278,9 @@ class TestTable:
         ]
         table = make_table(clouds, 0.2)
         assert table.clouds.tolist() == [0, 0, 1, 1, 0, 1]
-        assert (np.diff(table.keys) >= 0).all()
-        assert len(set(table.keys.tolist())) == 2
+        cells = np.rint(table.triangles.sides / 0.2).astype(int).tolist()
+        assert cells == sorted(cells)
+        assert len({tuple(cell) for cell in cells}) == 2
         np.testing.assert_allclose(
             table.triangles.sides[:, 0], [3.0, 3.0, 3.01, 3.01, 5.0, 5.01]
         )

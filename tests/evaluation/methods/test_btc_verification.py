@@ -2,15 +2,15 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from cns_drake.base import poses
-from evaluation.geometry.nearest import NearestPoints
-from evaluation.methods.btc_planes import Planes
-from evaluation.methods.btc_verification import (
+from evaluation.methods.btc import (
     align,
     find_motion,
     plane_overlap,
 )
+from evaluation.methods.btc_planes import Planes
 
 
 def random_motion(rng, reach=20.0):
@@ -145,7 +145,7 @@ class TestPlaneOverlap:
 
     def overlap(self, query, place, X_PQ):
         return plane_overlap(
-            query, place, NearestPoints(place.centers), X_PQ, 0.2, 0.5
+            query, place, cKDTree(place.centers), X_PQ, 0.2, 0.5
         )
 
     def test_itself(self):

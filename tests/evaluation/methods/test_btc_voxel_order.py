@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.methods.btc_voxel_order import (
+from evaluation.methods.btc_planes import (
     hash_table_order,
     voxel_order,
 )
