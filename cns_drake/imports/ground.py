@@ -12,12 +12,7 @@ from shapely.geometry import Point
 
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import hull_of
-from cns_drake.city.geometry.structures import (
-    MeshShape,
-    Model,
-    Part,
-    Structure,
-)
+from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
 from cns_drake.imports.foreign_city import Imported
 
 # Cells of a guessed ground, and how far it reaches beyond the city [m].

@@ -14,7 +14,7 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.generation.structure_rows import MAX_STRUCTURES
+from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.building_years import (

@@ -25,7 +25,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry.object_meshes import FOLDER
+from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.scene.structure_table import (
     MAX_INSTANCE,
     StructureEntry,

@@ -11,8 +11,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.geometry.object_parts import part_triangles
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.geometry.structures import Model, part_triangles
 from cns_drake.transient.draws import draws
 from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.standing import (

@@ -9,10 +9,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.furniture.fences import FENCES
+from cns_drake.city.furniture.pavilions import FENCES
 from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
-from cns_drake.city.geometry.object_parts import Builder, assemble, block
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.geometry.structures import Builder, Model, assemble, block
 from cns_drake.transient.draws import draws
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.scene_editing import SceneEditing

@@ -9,8 +9,14 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.object_parts import assemble, bar, block, post
-from cns_drake.city.geometry.structures import Model, Part
+from cns_drake.city.geometry.structures import (
+    Model,
+    Part,
+    assemble,
+    bar,
+    block,
+    post,
+)
 from cns_drake.transient.draws import draws
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.scene_editing import SceneEditing

@@ -25,7 +25,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry.object_meshes import FOLDER
+from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.city.geometry.structures import (
     BoxShape,
     CylinderShape,

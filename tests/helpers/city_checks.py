@@ -5,10 +5,7 @@ import pytest
 import shapely
 from shapely.strtree import STRtree
 
-from cns_drake.city.geometry.object_parts import (
-    HEADROOM,
-    part_triangles,
-)
+from cns_drake.city.geometry.structures import HEADROOM, part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
 
 # Parts may reach this far outside a footprint: plinths, pilasters, steps.

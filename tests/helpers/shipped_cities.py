@@ -13,8 +13,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from cns_drake.city.generation.city_structures import City, make_city
-from cns_drake.city.geometry.object_parts import part_triangles
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry.structures import Structure, part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.scenarios.shipped import worlds_folder

@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 
-from cns_drake.city.geometry.object_meshes import FOLDER
+from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world

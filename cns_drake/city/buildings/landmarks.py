@@ -24,10 +24,8 @@ from pydantic import BaseModel
 import yaml
 
 from cns_drake.city.facades.assembly import Building, Dice, Rgb
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.object_meshes import read_mesh
-from cns_drake.city.geometry.object_parts import triple
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.geometry.mesh import Mesh, read_mesh
+from cns_drake.city.geometry.structures import MeshShape, triple
 
 _MODELS = Path(__file__).parent / "landmark_models"
 _Triple = tuple[float, float, float]

@@ -12,8 +12,7 @@ from pydantic import BaseModel
 from shapely.geometry import Polygon
 
 from cns_drake.city.facades import massing
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.object_meshes import object_mesh
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes, object_mesh
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
 
 Rgb = tuple[float, float, float]

@@ -10,8 +10,14 @@ from functools import partial
 
 import numpy as np
 
-from cns_drake.city.geometry.object_parts import Builder, assemble, triple
-from cns_drake.city.geometry.structures import MeshShape, Model, Part
+from cns_drake.city.geometry.structures import (
+    Builder,
+    MeshShape,
+    Model,
+    Part,
+    assemble,
+    triple,
+)
 
 # Paint colours, roughly in the shares seen on the road.
 PAINTS = (

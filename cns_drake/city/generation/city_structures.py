@@ -24,18 +24,24 @@ from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import snap
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.ground.bridges import bridge_structures
 from cns_drake.city.ground.districts import share_out
 from cns_drake.city.ground.elevation import aprons, make_ground
-from cns_drake.city.ground.markings import marking_structure
-from cns_drake.city.ground.streets import kerb_height, street_structures
-from cns_drake.city.ground.terrain import GroundShape, ground_structures
+from cns_drake.city.ground.streets import (
+    kerb_height,
+    marking_structure,
+    street_structures,
+)
+from cns_drake.city.ground.terrain import (
+    GroundShape,
+    bridge_structures,
+    ground_structures,
+)
 from cns_drake.city.placement.building_rows import place_buildings
 from cns_drake.city.placement.draft import Draft
-from cns_drake.city.placement.junction_furniture import furnish_junctions
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import furnish
 from cns_drake.city.placement.sidewalks import (
+    furnish_junctions,
     furnish_sidewalks,
     park_along_streets,
     plant_medians,

@@ -1,16 +1,15 @@
-"""Polygon meshes of the city and their deterministic OBJ text."""
+"""Polygon meshes of the city, and their deterministic OBJ text."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 import itertools
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from cns_drake.city.geometry.obj_text import obj_text
 
 # Coordinates are stored in whole millimetres: far below LiDAR precision, and
 # it keeps the files small and equal from machine to machine.
@@ -78,22 +77,17 @@ class Mesh:
         collapse are dropped; the same mesh always gives the same text.
         """
         thousandths = np.rint(self.vertices * 10**_DECIMALS).astype(np.int64)
-        unique, inverse = _unique_rows(thousandths)
-        return obj_text(unique, inverse[self._corners] + 1).decode("ascii")
-
-
-def _unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns distinct rows of (N, 3), sorted, and each row's number in them.
-
-    As `np.unique` along an axis, which takes several times as long.
-    """
-    order = np.lexsort(rows.T[::-1])
-    ordered = rows[order]
-    is_first = np.ones(len(rows), dtype=bool)
-    is_first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    inverse = np.empty(len(rows), dtype=np.int64)
-    inverse[order] = np.cumsum(is_first) - 1
-    return ordered[is_first], inverse
+        unique, inverse = np.unique(thousandths, axis=0, return_inverse=True)
+        # 15 digits are as exact as the numbers, without any noughts at the end.
+        lines = [
+            f"v {x:.15g} {y:.15g} {z:.15g}\n"
+            for x, y, z in (unique / 10**_DECIMALS).tolist()
+        ]
+        for face in (inverse.reshape(-1)[self._corners] + 1).tolist():
+            corners = [c for k, c in enumerate(face) if c != face[k - 1]]
+            if len(corners) > 2:
+                lines.append(f"f {' '.join(map(str, corners))}\n")
+        return "".join(lines)
 
 
 def merge_meshes(*meshes: Mesh) -> Mesh:
@@ -132,3 +126,33 @@ def boxes(
 ) -> list[Mesh]:
     """Returns equal boxes about all points of a grid [m]."""
     return [box_mesh(size, point) for point in itertools.product(xs, ys, zs)]
+
+
+FOLDER = Path(__file__).parents[1] / "object_meshes"
+
+
+def object_mesh(name: str) -> Mesh:
+    """Returns the mesh of this name.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    return read_mesh(FOLDER / f"{name}.obj")
+
+
+@cache
+def read_mesh(path: Path) -> Mesh:
+    """Returns the mesh of an OBJ file of the city generator's own.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    vertices: list[list[float]] = []
+    faces: list[tuple[int, ...]] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        kind, *values = line.split()
+        if kind == "v":
+            vertices.append([float(value) for value in values])
+        elif kind == "f":
+            faces.append(tuple(int(value) - 1 for value in values))
+    return Mesh(np.array(vertices), tuple(faces))

@@ -1,24 +1,253 @@
-"""Ground polygons: tiles, surfaces and walls as meshes."""
+"""Polygons of the ground: triangles, tiles, surfaces, walls, taken places."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 import math
 from typing import TypeVar
 
 import numpy as np
 import shapely
 from shapely.affinity import affine_transform
-from shapely.geometry import MultiPolygon, Polygon, box
+from shapely.geometry import LinearRing, MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.triangulation import triangulate
+
+_MM = 1000.0
+# A corner or point as whole millimetres.
+_Point = tuple[int, int]
+
+
+def triangulate(polygon: Polygon) -> np.ndarray:
+    """Returns a polygon as (M, 3, 2) counter-clockwise triangles [m].
+
+    Vertices are those of the polygon, rounded to millimetres; its edges are
+    edges of triangles.
+
+    Args:
+        polygon: valid, also after rounding; holes may touch the outer ring
+            and each other in points.
+
+    Raises:
+        ValueError: the polygon is found not to be valid.
+    """
+    polygon = shapely.orient_polygons(shapely.normalize(polygon))
+    rings = [_ring(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    if len(rings[0]) < 3:
+        return np.zeros((0, 3, 2))
+    corners = sorted({corner for ring in rings for corner in ring})
+    outer, *holes = (_with_corners_on_edges(ring, corners) for ring in rings)
+    fixed = {
+        frozenset(edge) for ring in (outer, *holes) for edge in _edges(ring)
+    }
+    triangles = _flip(_cut_ears(_bridge(outer, holes)), fixed)
+    return np.array(triangles, dtype=float).reshape(-1, 3, 2) / _MM
+
+
+def _ring(ring: LinearRing) -> list[_Point]:
+    """Returns a ring's corners without repetitions, from the least one on."""
+    xy = np.array(ring.coords)[:-1, :2]
+    points = [tuple(p) for p in np.rint(xy * _MM).astype(int).tolist()]
+    corners = [p for k, p in enumerate(points) if p != points[k - 1]]
+    if not corners:
+        return []
+    start = corners.index(min(corners))
+    return corners[start:] + corners[:start]
+
+
+def _with_corners_on_edges(
+    ring: list[_Point], corners: list[_Point]
+) -> list[_Point]:
+    """Returns a ring with a corner wherever another ring touches it."""
+    points = np.array(corners, dtype=np.int64)
+    starts = np.array(ring, dtype=np.int64)
+    ways = np.roll(starts, -1, axis=0) - starts
+    result = []
+    # Some edges at a time, for there may be thousands, and as many corners.
+    parts = 1 + len(ring) * len(corners) // 1_000_000
+    for some in np.array_split(np.arange(len(ring)), parts):
+        way = ways[some, None]
+        offset = points - starts[some, None]
+        part = (offset * way).sum(axis=2)
+        inside = way[..., 0] * offset[..., 1] == way[..., 1] * offset[..., 0]
+        inside &= (part > 0) & (part < (way * way).sum(axis=2))
+        for k, row, touched in zip(some, part, inside, strict=True):
+            result.append(ring[k])
+            if touched.any():
+                those = np.flatnonzero(touched)
+                order = np.argsort(row[those], kind="stable")
+                result += [corners[i] for i in those[order]]
+    return result
+
+
+def _edges(ring: list[_Point]) -> Iterator[tuple[_Point, _Point]]:
+    return zip(ring, ring[1:] + ring[:1], strict=True)
+
+
+def _cross(a: _Point, b: _Point, c: _Point) -> int:
+    """Returns twice the area of a triangle, positive counter-clockwise."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _bridge(outer: list[_Point], holes: list[list[_Point]]) -> list[_Point]:
+    """Returns one ring that runs into every hole and back again."""
+    ring = outer
+    left = sorted(holes, key=lambda hole: max(hole), reverse=True)
+    while left:
+        # The hole that reaches furthest to the right sees the ring.
+        hole = left.pop(0)
+        walls = [*_edges(ring), *(e for h in (hole, *left) for e in _edges(h))]
+        touching = _insert_touching(ring, hole)
+        ring = touching or _insert_apart(ring, hole, walls)
+    return ring
+
+
+def _insert_touching(
+    ring: list[_Point], hole: list[_Point]
+) -> list[_Point] | None:
+    """Runs around a hole at a corner that it shares; None if there is none."""
+    for k, corner in enumerate(hole):
+        for i in (i for i, other in enumerate(ring) if other == corner):
+            if _opens_towards(ring, i, hole[(k + 1) % len(hole)]):
+                return ring[:i] + hole[k:] + hole[:k] + ring[i:]
+    return None
+
+
+def _insert_apart(
+    ring: list[_Point], hole: list[_Point], walls: list[tuple[_Point, _Point]]
+) -> list[_Point]:
+    """Runs to a hole along a line that crosses no wall, and back."""
+    k = hole.index(max(hole))
+    for i in sorted(
+        range(len(ring)),
+        key=lambda i: (_square_distance(ring[i], hole[k]), ring[i], i),
+    ):
+        if _opens_towards(ring, i, hole[k]) and not any(
+            _crosses(ring[i], hole[k], a, b) for a, b in walls
+        ):
+            return ring[: i + 1] + hole[k:] + hole[: k + 1] + ring[i:]
+    raise ValueError("a hole lies outside its polygon")
+
+
+def _square_distance(a: _Point, b: _Point) -> int:
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2
+
+
+def _opens_towards(ring: list[_Point], i: int, target: _Point) -> bool:
+    """Returns whether a point is in the inner angle at a corner of a ring."""
+    before, at, after = ring[i - 1], ring[i], ring[(i + 1) % len(ring)]
+    is_left_of_in = _cross(before, at, target) > 0
+    is_left_of_out = _cross(at, after, target) > 0
+    if _cross(before, at, after) > 0:
+        return is_left_of_in and is_left_of_out
+    return is_left_of_in or is_left_of_out
+
+
+def _crosses(p: _Point, q: _Point, a: _Point, b: _Point) -> bool:
+    """Returns whether segment pq meets segment ab other than at p or q."""
+    sides = (_cross(p, q, a), _cross(p, q, b))
+    others = (_cross(a, b, p), _cross(a, b, q))
+    if sides[0] * sides[1] < 0 and others[0] * others[1] < 0:
+        return True
+    return any(
+        side == 0 and c not in (p, q) and _is_between(p, q, c)
+        for side, c in zip(sides, (a, b), strict=True)
+    )
+
+
+def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
+    """Returns whether a point on the line pq is on the segment."""
+    return all(min(p[k], q[k]) <= c[k] <= max(p[k], q[k]) for k in range(2))
+
+
+def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
+    """Returns triangles that fill a ring, which may touch itself."""
+    points = np.array(ring, dtype=np.int64)
+    left = list(range(len(ring)))
+    triangles, start = [], 0
+    while len(left) > 3:
+        for step in range(len(left)):
+            k = (start + step) % len(left)
+            ear = (
+                ring[left[k - 1]],
+                ring[left[k]],
+                ring[left[k + 1 - len(left)]],
+            )
+            if _cross(*ear) > 0 and not _any_inside(points[left], ear):
+                triangles.append(ear)
+                left.pop(k)
+                # Continuing behind the ear avoids fans of thin triangles.
+                start = k
+                break
+        else:
+            a, b = ring[left[0]], ring[left[1]]
+            if any(_cross(a, b, ring[i]) for i in left):
+                raise ValueError("the polygon crosses itself")
+            return triangles
+    a, b, c = (ring[i] for i in left)
+    return [*triangles, (a, b, c)] if _cross(a, b, c) > 0 else triangles
+
+
+def _any_inside(
+    points: np.ndarray, triangle: tuple[_Point, _Point, _Point]
+) -> bool:
+    """Returns whether a triangle has any of (N, 2) points but its corners."""
+    x, y = points.T
+    inside = np.ones(len(points), dtype=bool)
+    is_corner = np.zeros(len(points), dtype=bool)
+    for k, (bx, by) in enumerate(triangle):
+        ax, ay = triangle[k - 1]
+        inside &= (bx - ax) * (y - ay) >= (by - ay) * (x - ax)
+        is_corner |= (x == bx) & (y == by)
+    return bool((inside & ~is_corner).any())
+
+
+def _flip(
+    triangles: Iterable[tuple[_Point, _Point, _Point]],
+    fixed: set[frozenset[_Point]],
+) -> list[tuple[_Point, _Point, _Point]]:
+    """Flips inner edges until every circumcircle is empty (Lawson)."""
+    # Directed edge -> the third corner of the triangle on its left.
+    apex: dict[tuple[_Point, _Point], _Point] = {}
+    for a, b, c in triangles:
+        apex[a, b], apex[b, c], apex[c, a] = c, a, b
+    pending = sorted(apex)
+    while pending:
+        a, b = pending.pop()
+        if (a, b) not in apex or (b, a) not in apex:
+            continue
+        if frozenset((a, b)) in fixed:
+            continue
+        c, d = apex[a, b], apex[b, a]
+        if not _in_circle(a, b, c, d):
+            continue
+        del apex[a, b], apex[b, a]
+        for u, v, w in ((a, d, c), (d, b, c)):
+            apex[u, v], apex[v, w], apex[w, u] = w, u, v
+        pending += [(b, c), (c, a), (a, d), (d, b)]
+    return sorted((a, b, c) for (a, b), c in apex.items() if a < b and a < c)
+
+
+def _in_circle(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
+    """Returns whether d is inside the circle through a, b and c.
+
+    The three are counter-clockwise. Then the quadrilateral a, d, b, c is
+    convex as well, so that its diagonal can be flipped.
+    """
+    rows = [(p[0] - d[0], p[1] - d[1]) for p in (a, b, c)]
+    (ax, ay), (bx, by), (cx, cy) = rows
+    a2, b2, c2 = (x * x + y * y for x, y in rows)
+    return (
+        ax * (by * c2 - b2 * cy)
+        - ay * (bx * c2 - b2 * cx)
+        + a2 * (bx * cy - by * cx)
+    ) > 0
+
 
 # Height above W's origin [m] at arrays of x and y [m].
 HeightMap = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Shape = TypeVar("Shape", bound=BaseGeometry)
-
 # Polygons are snapped to whole millimetres like the meshes, so that shapes
 # which share an edge keep sharing it.
 _GRID = 0.001
@@ -237,3 +466,56 @@ def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
     """Returns which of (N, 4, 2) rings have their corners in one plane."""
     z = np.round(_heights(rings.reshape(-1, 2), height), 3).reshape(-1, 4)
     return abs(z[:, 0] - z[:, 1] + z[:, 2] - z[:, 3]) < 0.0005
+
+
+class Occupancy:
+    """The ground that is taken, as a growing set of polygons in W.
+
+    A few thousand polygons are expected; candidates are found by bounds in
+    one vectorised comparison, and only those are checked exactly.
+    """
+
+    def __init__(self) -> None:
+        self._geometries: list[BaseGeometry] = []
+        self._bounds: np.ndarray = np.zeros((64, 4))
+
+    def add(self, geometry: BaseGeometry) -> None:
+        """Takes the ground of a polygon."""
+        count = len(self._geometries)
+        if count == len(self._bounds):
+            self._bounds = np.concatenate(
+                [self._bounds, np.zeros_like(self._bounds)]
+            )
+        shapely.prepare(geometry)
+        self._bounds[count] = geometry.bounds
+        self._geometries.append(geometry)
+
+    def is_free(
+        self,
+        geometry: BaseGeometry,
+        clearance: float = 0.0,
+        ignore: BaseGeometry | None = None,
+    ) -> bool:
+        """Returns whether a polygon keeps its distance from all taken ones.
+
+        Args:
+            geometry: the polygon in W [m].
+            clearance: least distance [m]; with 0 polygons may touch.
+            ignore: a taken polygon that may be closer, but not overlapped.
+        """
+        x0, y0, x1, y1 = geometry.bounds
+        taken = self._bounds[: len(self._geometries)]
+        near = np.flatnonzero(
+            (taken[:, 0] < x1 + clearance)
+            & (taken[:, 1] < y1 + clearance)
+            & (taken[:, 2] > x0 - clearance)
+            & (taken[:, 3] > y0 - clearance)
+        )
+        for index in near:
+            other = self._geometries[index]
+            if clearance > 0 and other is not ignore:
+                if other.distance(geometry) < clearance:
+                    return False
+            elif other.intersects(geometry) and not other.touches(geometry):
+                return False
+        return True

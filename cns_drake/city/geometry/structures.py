@@ -1,14 +1,18 @@
-"""Structures: the named things a city is made of and a stage may lack."""
+"""Structures: the named things a city is made of, and their parts."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 
+import numpy as np
+from numpy.typing import ArrayLike
+from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.polygons import placed
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, object_mesh
+from cns_drake.city.geometry.polygons import hull_of, placed
 
 
 @dataclass(frozen=True)
@@ -114,3 +118,202 @@ class Structure:
             self.xyz[1] + s * x + c * y,
             self.xyz[2] + z,
         )
+
+
+# Posts and trunks reach this far into the ground, so that no gap shows where
+# the ground falls away a little [m].
+ROOT_DEPTH = 0.3
+# Parts above this height (crowns, signs, mast arms) leave the ground below them
+# free [m].
+HEADROOM = 2.4
+_FOOTPRINT_MARGIN = 0.02
+_ROUND_SIDES = 12
+
+
+@dataclass(frozen=True)
+class Builder:
+    """How to make objects of one kind.
+
+    Attributes:
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        build: `build(rng, **parameters) -> Model`; every parameter has a
+            default, most are then drawn from `rng`. The same generator
+            state gives the same model.
+    """
+
+    semantic_class: str
+    build: Callable[..., Model]
+
+
+def post(
+    name: str,
+    radius: float,
+    height: float,
+    xy: tuple[float, float] = (0.0, 0.0),
+    rgb: tuple[float, float, float] | None = None,
+) -> Part:
+    """Returns an upright cylinder from below the ground to `height` [m]."""
+    return Part(
+        name,
+        CylinderShape(radius, height + ROOT_DEPTH),
+        xyz=(xy[0], xy[1], (height - ROOT_DEPTH) / 2),
+        rgb=rgb,
+    )
+
+
+def bar(
+    name: str,
+    start: ArrayLike,
+    end: ArrayLike,
+    radius: float,
+    rgb: tuple[float, float, float] | None = None,
+) -> Part:
+    """Returns a cylinder between two points [m]."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    along = end - start
+    length = float(np.linalg.norm(along))
+    pitch = float(np.arccos(np.clip(along[2] / length, -1, 1)))
+    yaw = float(np.arctan2(along[1], along[0]))
+    return Part(
+        name,
+        CylinderShape(radius, length),
+        xyz=triple((start + end) / 2),
+        rpy=(0.0, pitch, yaw),
+        rgb=rgb,
+    )
+
+
+def block(
+    name: str,
+    size: Iterable[float],
+    center: Iterable[float],
+    yaw: float = 0.0,
+    rgb: tuple[float, float, float] | None = None,
+) -> Part:
+    """Returns a box of the given size about `center` [m]."""
+    return Part(
+        name,
+        BoxShape(triple(size)),
+        xyz=triple(center),
+        rpy=(0.0, 0.0, float(yaw)),
+        rgb=rgb,
+    )
+
+
+def one_mesh(
+    name: str,
+    colours: Sequence[tuple[float, float, float]],
+    semantic_class: str = "other-object",
+    **stretch: tuple[float, float],
+) -> Builder:
+    """Returns a builder of objects of one mesh.
+
+    Args:
+        name: of the mesh.
+        colours: to choose from.
+        semantic_class: of the objects.
+        stretch: x, y or z -> range of the scale along this axis.
+    """
+
+    def build(rng: np.random.Generator) -> Model:
+        scale = [1.0, 1.0, 1.0]
+        for axis, (low, high) in stretch.items():
+            scale["xyz".index(axis)] = round(float(rng.uniform(low, high)), 3)
+        count = len(colours)
+        rgb = colours[int(rng.integers(count)) if count > 1 else 0]
+        return assemble(Part("body", MeshShape(name, triple(scale)), rgb=rgb))
+
+    return Builder(semantic_class, build)
+
+
+def triple(values: Iterable[float]) -> tuple[float, float, float]:
+    """Returns three numbers, from an array for instance, as Python floats."""
+    x, y, z = values
+    return float(x), float(y), float(z)
+
+
+def assemble(*parts: Part) -> Model:
+    """Returns the model of parts whose meshes are `object_meshes`.
+
+    Its footprint is the convex hull of all geometry below `HEADROOM`.
+    """
+    shapes = [part.shape for part in parts]
+    names = [shape.mesh for shape in shapes if isinstance(shape, MeshShape)]
+    meshes = {name: object_mesh(name) for name in names}
+    return Model(parts, meshes, ground_footprint(parts, meshes))
+
+
+def ground_footprint(
+    parts: Sequence[Part], meshes: Mapping[str, Mesh]
+) -> Polygon:
+    """Returns the convex hull, in S, of the parts below `HEADROOM`."""
+    corners: list[np.ndarray] = [np.zeros((0, 2))]
+    for part in parts:
+        mesh = part_mesh(part, meshes)
+        p = mesh.vertices
+        is_low = p[:, 2] <= HEADROOM
+        corners.append(p[is_low, :2])
+        if is_low.all():
+            continue
+        triangles = mesh.triangles()
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            a, b = p[triangles[:, i]], p[triangles[:, j]]
+            cut = (a[:, 2] - HEADROOM) * (b[:, 2] - HEADROOM) < 0
+            a, b = a[cut], b[cut]
+            t = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
+            corners.append(a[:, :2] + t[:, None] * (b - a)[:, :2])
+    # Rounded to millimetres: the last bits of a sine differ between machines.
+    hull = hull_of(np.round(np.concatenate(corners), 3))
+    return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
+
+
+def part_triangles(
+    part: Part, meshes: Mapping[str, Mesh]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a part's (N, 3) vertices in S and (M, 3) triangles.
+
+    Round shapes become the prisms and the octahedra-like hulls that just
+    contain them, so that a footprint made from them is never too small.
+    """
+    mesh = part_mesh(part, meshes)
+    return mesh.vertices, mesh.triangles()
+
+
+def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
+    """Returns a part's mesh in S, round shapes as in `part_triangles`."""
+    shape = part.shape
+    scale = np.ones(3)
+    if isinstance(shape, MeshShape):
+        mesh, scale = meshes[shape.mesh], np.asarray(shape.scale)
+    elif isinstance(shape, BoxShape):
+        mesh = box_mesh(shape.size)
+    elif isinstance(shape, CylinderShape):
+        mesh = _round_mesh(shape.radius, shape.length)
+    else:
+        mesh = _round_mesh(shape.radius, 2 * shape.radius)
+    vertices = mesh.vertices * scale @ rotation(part.rpy).T + part.xyz
+    return mesh.with_vertices(vertices)
+
+
+def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
+    """Returns R = Rz(yaw) Ry(pitch) Rx(roll), as in SDF."""
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _round_mesh(radius: float, length: float) -> Mesh:
+    """Returns the prism that just contains an upright cylinder."""
+    angle = 2 * np.pi * np.arange(_ROUND_SIDES) / _ROUND_SIDES
+    ring = radius / np.cos(np.pi / _ROUND_SIDES)
+    x, y = ring * np.cos(angle), ring * np.sin(angle)
+    low = np.column_stack([x, y, np.full(_ROUND_SIDES, -length / 2)])
+    n = _ROUND_SIDES
+    sides = [(k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n)]
+    high = low + np.array([0.0, 0.0, length])
+    return Mesh(np.concatenate([low, high]), tuple(sides))

@@ -1,19 +1,281 @@
-"""The structures of a city at each of its stages."""
+"""The structures of a city at each of its stages.
+
+Plants are younger, buildings lower or under construction, or their lots are in
+another use."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+import math
+from typing import get_args
 import zlib
 
 import numpy as np
+import shapely
+from shapely.geometry import Polygon, box
+from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.growth.building_sites import building_site
-from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
+from cns_drake.city.buildings import ARCHETYPES, sample
+from cns_drake.city.furniture.site_equipment import CRANES
+from cns_drake.city.geometry.polygons import Occupancy
+from cns_drake.city.geometry.structures import (
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    Model,
+    Part,
+    Shape,
+    SphereShape,
+    Structure,
+    part_mesh,
+)
 from cns_drake.city.growth.lowering import lowered
-from cns_drake.city.growth.young_plants import younger
-from cns_drake.city.plan.stages import Stages
+from cns_drake.city.placement.objects import OBJECTS, pick
+from cns_drake.city.plan.stages import LotUse, Stages
+
+
+def younger(model: Model, height: float) -> Model:
+    """Returns a plant of a height, alike in all its proportions.
+
+    Args:
+        model: the grown plant, on z = 0.
+        height: of its top [m].
+
+    Returns:
+        A plant with the same footprint; the model itself if it is lower.
+    """
+    top = max(
+        part_mesh(part, model.meshes).vertices[:, 2].max()
+        for part in model.parts
+    )
+    if top <= height:
+        return model
+    share = round(height / float(top), 4)
+    parts = tuple(_scaled(part, share) for part in model.parts)
+    return replace(model, parts=parts)
+
+
+def _scaled(part: Part, share: float) -> Part:
+    x, y, z = np.round(np.multiply(part.xyz, share), 4).tolist()
+    return replace(part, shape=_scaled_shape(part.shape, share), xyz=(x, y, z))
+
+
+def _scaled_shape(shape: Shape, share: float) -> Shape:
+    def times(values: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = np.round(np.multiply(values, share), 5).tolist()
+        return x, y, z
+
+    if isinstance(shape, MeshShape):
+        return MeshShape(shape.mesh, times(shape.scale))
+    if isinstance(shape, BoxShape):
+        return BoxShape(times(shape.size))
+    if isinstance(shape, CylinderShape):
+        radius, length = shape.radius * share, shape.length * share
+        return CylinderShape(round(radius, 4), round(length, 4))
+    return SphereShape(round(shape.radius * share, 4))
+
+
+_FRAME = "unfinished_tower"
+# Room for a crane beside the frame [m].
+_CRANE_ROOM = 7.0
+# The jib clears the frame by this [m].
+_CRANE_RISE = 14.0
+_CRANE_REACH = 30.0
+# Grid lines in each direction from which a rectangle on a lot is chosen.
+_MOST_SIDES = 12
+
+
+def building_site(model: Model, height: float, name: str, seed: int) -> Model:
+    """Returns the frame of a building that is being built, with its crane.
+
+    Args:
+        model: the finished building.
+        height: of the frame [m].
+        name: of the building.
+        seed: of the frame and the crane.
+
+    Returns:
+        A model within the building's footprint, except for the jib.
+
+    Raises:
+        ValueError: there is no room for a frame.
+    """
+    lot = largest_rectangle(model.footprint)
+    x0, y0, x1, y1 = lot.bounds
+    low, high = ARCHETYPES[_FRAME].widths
+    rng = np.random.default_rng(seed)
+    crane_xy = None
+    if x1 - x0 > low + _CRANE_ROOM:
+        crane_xy = (x1 - _CRANE_ROOM / 2, (y0 + y1) / 2)
+        x1 -= _CRANE_ROOM
+    x1, y1 = min(x1, x0 + high), min(y1, y0 + high)
+    if min(x1 - x0, y1 - y0) < low:
+        raise ValueError(
+            f"sites: {name}: its lot is too small for a site, which takes "
+            f"{low} m by {low} m"
+        )
+    lowest, highest = ARCHETYPES[_FRAME].heights
+    height = float(np.clip(height, lowest, highest))
+    frame = sample(_FRAME, box(x0, y0, x1, y1), height, rng, f"{name}_site")
+    if crane_xy is None:
+        return Model(frame.parts, frame.meshes, model.footprint)
+    crane = CRANES["tower_crane"].build(
+        rng, height=height + _CRANE_RISE, reach=_CRANE_REACH
+    )
+    return Model(
+        (*frame.parts, *(_beside(part, crane_xy) for part in crane.parts)),
+        {**frame.meshes, **crane.meshes},
+        model.footprint,
+    )
+
+
+def _beside(part: Part, xy: tuple[float, float]) -> Part:
+    x, y, z = part.xyz
+    at = (round(x + xy[0], 3), round(y + xy[1], 3), z)
+    return Part(f"crane_{part.name}", part.shape, at, part.rpy, part.rgb)
+
+
+def largest_rectangle(footprint: BaseGeometry) -> Polygon:
+    """Returns a large rectangle along the axes that lies within a footprint.
+
+    If all edges of the footprint run along the axes, it is the largest.
+    Otherwise it is the largest whose sides pass through corners of the
+    footprint.
+    """
+    corners = shapely.get_coordinates(footprint.simplify(0.05))
+    xs, ys = (_spread(np.unique(np.round(c, 3))) for c in corners.T)
+    x0, x1 = (xs[k] for k in np.triu_indices(len(xs), 1))
+    y0, y1 = (ys[k] for k in np.triu_indices(len(ys), 1))
+    boxes = shapely.box(x0[:, None], y0[None], x1[:, None], y1[None]).reshape(
+        -1
+    )
+    room = footprint.buffer(0.01)
+    shapely.prepare(room)
+    inside = boxes[shapely.covers(room, boxes)]
+    if len(inside) == 0:
+        x, y = footprint.representative_point().coords[0]
+        return box(x - 0.1, y - 0.1, x + 0.1, y + 0.1)
+    return max(inside, key=lambda one: one.area)
+
+
+def _spread(values: np.ndarray) -> np.ndarray:
+    """Returns at most a dozen of increasing values."""
+    if len(values) <= _MOST_SIDES:
+        return values
+    kept = np.linspace(0, len(values) - 1, _MOST_SIDES).round().astype(int)
+    return values[kept]
+
+
+# Distance to the edges of the lot, where the neighbours stand [m].
+_MARGIN = 0.8
+# A smaller lot is a gap between houses [m^2].
+_SMALLEST = 40.0
+# Objects along the front and across the lot are this far apart [m].
+_PITCH = {
+    "car_park": (2.7, 8.5),
+    "market": (4.2, 5.0),
+    "garden": (3.6, 3.6),
+    "yard": (7.5, 5.5),
+}
+_OBJECTS: dict[str, Mapping[str, float]] = {
+    "market": {"market_stall": 6, "kiosk": 0.5, "cafe_table": 1},
+    "garden": {
+        "low_shrub": 3,
+        "flower_bed": 3,
+        "shrub": 1,
+        "picnic_table": 0.4,
+        "bench": 0.6,
+    },
+    "yard": {
+        "container": 2,
+        "site_cabin": 1,
+        "brick_pallets": 1,
+        "pipe_stack": 1,
+        "skip": 0.7,
+    },
+}
+# Part of the places that are taken.
+_FILL = {"car_park": 0.6, "market": 0.7, "garden": 0.5, "yard": 0.45}
+USES: tuple[LotUse, ...] = get_args(LotUse)
+
+
+def use_by_size(structure: Structure) -> LotUse:
+    """Returns the use that suits the size of a building's lot."""
+    area = structure.model.footprint.area
+    if area > 900:
+        return "car_park"
+    if area > 450:
+        return "market"
+    return "yard" if area > 250 else "garden"
+
+
+def lot_objects(
+    structure: Structure,
+    use: LotUse,
+    cars: Mapping[str, float],
+    rng: np.random.Generator,
+) -> Iterator[Structure]:
+    """Yields the structures on the lot of a building that is not built yet.
+
+    Args:
+        structure: the building.
+        use: one of `USES`.
+        cars: object -> weight of the parked cars.
+        rng: the only source of variation.
+
+    Yields:
+        Structures called after the building.
+    """
+    footprint = structure.model.footprint
+    if use == "empty" or footprint.area < _SMALLEST:
+        return
+    weights = cars if use == "car_park" else _OBJECTS[use]
+    taken = Occupancy()
+    count = 0
+    for x, y, yaw in _places(footprint, use, rng):
+        kind = pick(weights, rng)
+        builder = OBJECTS[kind]
+        model = builder.build(rng)
+        xyz = structure.p_WP((x, y, 0.0))
+        thing = Structure(
+            f"{structure.name}_lot_{count + 1:02d}_{kind}",
+            builder.semantic_class,
+            model,
+            (round(xyz[0], 3), round(xyz[1], 3), round(xyz[2], 3)),
+            structure.yaw + yaw,
+            (*structure.tags, "lot"),
+        )
+        area = thing.footprint_W
+        if structure.footprint_W.contains(area) and taken.is_free(area):
+            taken.add(area)
+            count += 1
+            yield thing
+
+
+def _places(
+    footprint: BaseGeometry, use: LotUse, rng: np.random.Generator
+) -> Iterator[tuple[float, float, float]]:
+    """Yields x, y and heading of the places that are taken, in S."""
+    x0, y0, x1, y1 = largest_rectangle(footprint).bounds
+    along, across = _PITCH[use]
+    columns = max(1, math.floor((x1 - x0 - 2 * _MARGIN) / along))
+    rows = max(1, math.floor((y1 - y0 - 2 * _MARGIN) / across))
+    for row in range(rows):
+        y = (y0 + y1) / 2 + (row - (rows - 1) / 2) * across
+        for column in range(columns):
+            x = (x0 + x1) / 2 + (column - (columns - 1) / 2) * along
+            taken = rng.random() < _FILL[use]
+            jitter = rng.uniform(-0.3, 0.3, 2)
+            turn = int(rng.integers(2)) * math.pi
+            if not taken:
+                continue
+            if use == "car_park":
+                yield x, y + float(jitter[1]), math.pi / 2 + turn
+            elif use == "market":
+                yield x, y, math.pi / 2 + turn
+            else:
+                yield x + float(jitter[0]), y + float(jitter[1]), turn
 
 
 class GrowingCity:

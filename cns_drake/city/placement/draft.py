@@ -13,13 +13,23 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.occupancy import Occupancy
-from cns_drake.city.geometry.polygons import HeightMap, snap
+from cns_drake.city.geometry.polygons import HeightMap, Occupancy, snap
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
 from cns_drake.city.ground.elevation import Ground, LevelGround
-from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.roads.street_areas import StreetAreas
+
+# Objects of one class that share one word in everyday use.
+_WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
+
+
+def name_stem(object_name: str) -> str:
+    """Returns what an object is called, e.g. `tree` for a `lime_tree`."""
+    if object_name in SPECIES:
+        return "tree"
+    return _WORDS.get(OBJECTS[object_name].semantic_class, object_name)
+
 
 # An object stands upright where the ground falls by at most this much below
 # it, half of it sunk in on the upper side [m].

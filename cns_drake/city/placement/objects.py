@@ -1,18 +1,34 @@
 """Every kind of small object that a city can place, by name."""
 
-from cns_drake.city.furniture.fences import FENCES
-from cns_drake.city.furniture.monuments import MONUMENTS
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.furniture.pavilions import PAVILIONS
-from cns_drake.city.furniture.playground import PLAYGROUND
-from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
-from cns_drake.city.furniture.street_furniture import STREET_FURNITURE
-from cns_drake.city.furniture.street_lights import STREET_LIGHTS
-from cns_drake.city.furniture.tower_crane import CRANES
-from cns_drake.city.furniture.traffic_signals import TRAFFIC_SIGNALS
-from cns_drake.city.geometry.object_parts import Builder
-from cns_drake.city.plants.shrubs import SHRUBS
-from cns_drake.city.plants.vegetation import TREES
+from cns_drake.city.furniture.pavilions import (
+    FENCES,
+    MONUMENTS,
+    PAVILIONS,
+    PLAYGROUND,
+)
+from cns_drake.city.furniture.site_equipment import CRANES, SITE_EQUIPMENT
+from cns_drake.city.furniture.street_furniture import (
+    STREET_FURNITURE,
+    STREET_LIGHTS,
+    TRAFFIC_SIGNALS,
+)
+from cns_drake.city.geometry.structures import Builder
+from cns_drake.city.plants.vegetation import SHRUBS, TREES
+
+
+def pick(weights: Mapping[str, float], rng: np.random.Generator) -> str:
+    """Returns a key, drawn with the given weights in their order."""
+    names = list(weights)
+    p = np.array([weights[name] for name in names])
+    return names[int(rng.choice(len(names), p=p / p.sum()))]
+
 
 OBJECTS: dict[str, Builder] = {
     **TREES,

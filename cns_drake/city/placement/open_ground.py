@@ -15,14 +15,13 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, station_at
-from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.city.plan.city_plan import (
     LinePlan,
     ObjectPlan,
     ParkingPlan,
     ScatterPlan,
 )
-from cns_drake.city.plan.weighted import pick
 
 # Least distance between two objects [m].
 _CLEARANCE = 0.15

@@ -1,17 +1,55 @@
-"""Single trees: a mesh variant of a species, scaled, turned and tinted."""
+"""Trees and low greenery."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 import string
 
 import numpy as np
 
-from cns_drake.city.geometry.object_meshes import object_mesh
-from cns_drake.city.geometry.object_parts import Builder, assemble, triple
-from cns_drake.city.geometry.structures import MeshShape, Model, Part
-from cns_drake.city.plants.tree_species import SPECIES
+from cns_drake.city.geometry.mesh import object_mesh
+from cns_drake.city.geometry.structures import (
+    Builder,
+    MeshShape,
+    Model,
+    Part,
+    assemble,
+    triple,
+)
 
+
+@dataclass(frozen=True)
+class Species:
+    """A kind of tree.
+
+    Attributes:
+        variants: how many different meshes there are.
+        height_range: heights that a planted tree may have [m].
+        leaf_rgb: mean colour of the leaves.
+        bark_rgb: colour of the wood.
+        street: whether people walk under the crown: it starts at 2.5 m or
+            higher.
+    """
+
+    variants: int
+    height_range: tuple[float, float]
+    leaf_rgb: tuple[float, float, float]
+    bark_rgb: tuple[float, float, float] = (0.42, 0.34, 0.26)
+    street: bool = True
+
+
+# By the stems of their meshes' names.
+SPECIES = {
+    "plane_tree": Species(5, (8.5, 13.0), (0.36, 0.50, 0.24)),
+    "lime_tree": Species(4, (7.8, 10.5), (0.30, 0.47, 0.22)),
+    "poplar": Species(3, (12.0, 18.0), (0.38, 0.52, 0.25)),
+    "spruce": Species(3, (8.0, 16.0), (0.20, 0.34, 0.22), street=False),
+    "pine": Species(3, (9.0, 14.0), (0.26, 0.39, 0.23), (0.48, 0.34, 0.25)),
+    "young_tree": Species(3, (5.2, 6.2), (0.42, 0.56, 0.28)),
+    "palm": Species(4, (6.5, 11.0), (0.38, 0.50, 0.26), (0.50, 0.42, 0.33)),
+    "willow": Species(3, (7.5, 11.0), (0.44, 0.54, 0.28), street=False),
+}
 # Species that may stand on a sidewalk.
 STREET_TREES = tuple(name for name, kind in SPECIES.items() if kind.street)
 
@@ -68,4 +106,120 @@ def tree(
 
 TREES = {
     name: Builder("vegetation", partial(tree, species=name)) for name in SPECIES
+}
+_SHRUB_VARIANTS = 4
+_STONE = (0.66, 0.64, 0.6)
+
+
+def shrub(rng: np.random.Generator, *, height: float | None = None) -> Model:
+    """Returns a shrub.
+
+    Args:
+        rng: draws variant, form and tint, and the height if not given.
+        height: [m].
+    """
+    drawn = float(rng.uniform(0.8, 1.6))
+    height = drawn if height is None else height
+    name = _draw_shrub(rng)
+    across = height**0.8 * rng.uniform(0.85, 1.2, 2)
+    part = _leafy(rng, "leaves", name, (*across, height), (0.0, 0.0, 0.0))
+    return assemble(part)
+
+
+def flower_bed(
+    rng: np.random.Generator, *, length: float = 4.0, width: float = 1.5
+) -> Model:
+    """Returns an edged bed along x with low plants.
+
+    Args:
+        rng: draws the plants.
+        length: along x [m].
+        width: along y [m].
+    """
+    scale = (round(length / 4.0, 4), round(width / 1.5, 4), 1.0)
+    colours = ((0.6, 0.35, 0.4), (0.65, 0.58, 0.3), (0.38, 0.5, 0.28))
+    return assemble(
+        Part("edge", MeshShape("flower_bed_edge", scale), rgb=_STONE),
+        Part(
+            "plants",
+            MeshShape("flower_bed_plants", scale),
+            rgb=colours[int(rng.integers(3))],
+        ),
+    )
+
+
+def round_planter(rng: np.random.Generator) -> Model:
+    """Returns a round concrete pot with a shrub."""
+    size = round(float(rng.uniform(0.9, 1.2)), 3)
+    name = _draw_shrub(rng)
+    tall = float(rng.uniform(0.7, 1.1))
+    return assemble(
+        Part("pot", MeshShape("round_pot", (size, size, size)), rgb=_STONE),
+        _leafy(
+            rng,
+            "leaves",
+            name,
+            (0.75 * size, 0.75 * size, tall),
+            (0.0, 0.0, round(0.5 * size, 3)),
+        ),
+    )
+
+
+def box_planter(
+    rng: np.random.Generator, *, length: float | None = None
+) -> Model:
+    """Returns a long planter box along x with a row of shrubs.
+
+    Args:
+        rng: draws the shrubs, and the length if it is not given.
+        length: [m].
+    """
+    drawn = float(rng.uniform(1.6, 3.0))
+    length = drawn if length is None else length
+    count = max(1, round(length / 0.8))
+    parts = [
+        Part(
+            "box",
+            MeshShape("planter_box", (round(length / 2.0, 4), 1.0, 1.0)),
+            rgb=(0.45, 0.38, 0.3),
+        )
+    ]
+    for k in range(count):
+        name = _draw_shrub(rng)
+        x = (k + 0.5) * length / count - length / 2
+        tall = float(rng.uniform(0.6, 1.0))
+        parts.append(
+            _leafy(rng, f"leaves_{k}", name, (0.6, 0.55, tall), (x, 0.0, 0.45))
+        )
+    return assemble(*parts)
+
+
+def _draw_shrub(rng: np.random.Generator) -> str:
+    variant = int(rng.integers(_SHRUB_VARIANTS))
+    return f"shrub_{string.ascii_lowercase[variant]}"
+
+
+def _leafy(
+    rng: np.random.Generator,
+    name: str,
+    mesh_name: str,
+    scale: tuple[float, float, float],
+    xyz: tuple[float, float, float],
+) -> Part:
+    green = np.array((0.3, 0.44, 0.22)) * rng.uniform(0.85, 1.15, 3)
+    return Part(
+        name,
+        MeshShape(mesh_name, triple(round(float(s), 3) for s in scale)),
+        xyz=triple(xyz),
+        rpy=(0.0, 0.0, round(float(rng.uniform(-np.pi, np.pi)), 3)),
+        rgb=triple(green.round(3)),
+    )
+
+
+SHRUBS = {
+    "shrub": Builder("vegetation", shrub),
+    "low_shrub": Builder("vegetation", partial(shrub, height=0.6)),
+    "flower_bed": Builder("vegetation", flower_bed),
+    "round_planter": Builder("vegetation", round_planter),
+    "box_planter": Builder("vegetation", box_planter),
 }

@@ -6,9 +6,12 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 import numpy as np
+from scipy.spatial import KDTree
 import shapely
-from shapely.geometry import MultiLineString
+from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.structures import (
@@ -16,27 +19,206 @@ from cns_drake.city.geometry.structures import (
     Model,
     Part,
 )
-from cns_drake.imports.dressing.bare_buildings import Bare, all_laid_bare
+from cns_drake.imports.dressing.dressed_city import Bare, all_laid_bare
 from cns_drake.imports.dressing.facade_pieces import Faces, add_facade
-from cns_drake.imports.dressing.facade_plan import (
+from cns_drake.imports.dressing.facade_pieces import (
     FacadePlan,
+    Faces,
+    add_facade,
+    is_flat_roof,
     plan_facade,
+    roof_pieces,
     with_doors,
     with_shops,
 )
-from cns_drake.imports.dressing.roof_pieces import roof_pieces
-from cns_drake.imports.dressing.upper_sides import (
-    UpperSides,
-    turned_up,
-)
-from cns_drake.imports.dressing.visible_walls import DriveViews
+from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.wall_panels import (
     Panel,
+    UpperSides,
     find_panels,
+    is_upright,
+    looks_up,
+    turned_up,
 )
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported, Street, lot_generator
 from cns_drake.imports.ground import Ground
+
+# A building whose feet are farther from the ground was sunk into it [m].
+_LET_IN = 2.0
+
+
+@dataclass(frozen=True)
+class Bare:
+    """A building by its surfaces, (M, 3, 3) each [m]."""
+
+    one: Imported
+    walls: np.ndarray
+    roof: np.ndarray
+    rest: np.ndarray
+    base: float
+    style: Style
+    is_flat: bool
+    rng: np.random.Generator
+
+
+def all_laid_bare(
+    buildings: Sequence[Imported], ground: Ground, seed: int
+) -> list[Bare]:
+    """Returns all buildings, lower variants in the style of the original."""
+    whole = [
+        _laid_bare(one, ground, seed) for one in buildings if not one.original
+    ]
+    styles = {some.one.lot_name: some.style for some in whole}
+    lower = [
+        _laid_bare(one, ground, seed, styles.get(one.original))
+        for one in buildings
+        if one.original
+    ]
+    return whole + lower
+
+
+def _laid_bare(
+    one: Imported, ground: Ground, seed: int, known: Style | None = None
+) -> Bare:
+    surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
+    for part in one.structure.model.parts:
+        if isinstance(part.shape, MeshShape):
+            mesh = one.structure.model.meshes[part.shape.mesh]
+            surfaces[part.name] = mesh.vertices[mesh.triangles()]
+    body = surfaces["body"]
+    upright, up = is_upright(body), looks_up(body)
+    roof = np.concatenate([surfaces["roof"], body[up]])
+    walls, rest = body[upright], body[~upright & ~up]
+    corners = one.triangles.reshape(-1, 3)
+    foot = float(corners[:, 2].min())
+    below = float(ground.height(corners[:, :2]).min())
+    base = foot if abs(foot - below) < _LET_IN else below
+    width, depth = np.ptp(corners[:, :2], axis=0)
+    top = walls if len(walls) else one.triangles
+    height = max(1.0, float(top[:, :, 2].max()) - base)
+    is_flat = bool(len(roof)) and is_flat_roof(roof)
+    rng = lot_generator(seed, "dressing", one.lot_name)
+    area = 0.8 * float(width * depth)
+    style = make_style(one.tags, one.year, area, height, is_flat, rng)
+    if known is not None:
+        storeys = max(1, round(height / known.storey))
+        style = replace(known, storey=height / storeys)
+    return Bare(one, walls, roof, rest, base, style, is_flat, rng)
+
+
+# Distance of the places on drives from which walls are looked at [m].
+_SPACING = 4.0
+# Height of the eyes above the ground [m].
+_EYES = 2.0
+# A wall is looked at from this many nearest places, and this many others.
+_NEAREST, _OTHERS = 8, 24
+# A wall is visible if a probe is: at these parts of its length and height, this
+# far in front, and a little below its top [m].
+_PARTS = np.array([(x, z) for x in (0.04, 0.5, 0.96) for z in (0.3, 1.0)])
+_BEFORE, _BELOW_TOP = 0.3, 0.3
+
+
+class DriveViews:
+    """Places on drives from which a city is seen."""
+
+    def __init__(
+        self,
+        drives: Sequence[WaypointDrive],
+        ground: Ground,
+        solids: np.ndarray,
+    ):
+        """Prepares the views.
+
+        Args:
+            drives: at least one.
+            ground: below them.
+            solids: (M, 3, 3) triangles that hide other things at all stages
+                [m].
+        """
+        paths = [LineString(drive.path) for drive in drives]
+        self._xy = shapely.get_coordinates(shapely.segmentize(paths, _SPACING))
+        z = ground.height(self._xy) + _EYES
+        self._eyes = np.column_stack([self._xy, z])
+        self._tree = KDTree(self._xy)
+        self._scene = None
+        # Embree computes in float32, about the middle of the views.
+        self._middle = np.array([*self._xy.mean(axis=0), 0.0])
+        if len(solids):
+            self._scene = EmbreeScene()
+            TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
+
+    def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
+        """Returns which (N,) boxes have a place nearby.
+
+        Args:
+            limits: (N, 2, 2) least and greatest x and y [m].
+            distance: from a place to the circle about a box, at most [m].
+        """
+        middles = limits.mean(axis=1)
+        reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
+        return np.asarray(self._tree.query(middles)[0] <= reach + distance)
+
+    def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
+        """Returns panels' distances (N,) from the nearest viewing place [m].
+
+        The distance is infinite if no place within `most` sees the panel.
+
+        Args:
+            panels: N walls.
+            most: the greatest distance [m].
+        """
+        pairs = [self._looks(panel, most) for panel in panels]
+        counts = [len(distance) for _, distance in pairs]
+        if not sum(counts):
+            return np.full(len(panels), np.inf)
+        number = np.repeat(np.arange(len(panels)), counts)
+        place = np.concatenate([some for some, _ in pairs])
+        distance = np.concatenate([some for _, some in pairs])
+        probes = np.stack([_probes(panel) for panel in panels])
+        is_seen = self._is_seen(probes[number], self._eyes[place])
+        found = np.full(len(panels), np.inf)
+        np.minimum.at(found, number[is_seen], distance[is_seen])
+        return found
+
+    def _looks(
+        self, panel: Panel, most: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns places (K,) in front of a panel, and distances (K,) [m]."""
+        middle = panel.origin[:2] + panel.along * panel.length / 2.0
+        near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
+        index = np.array(near, dtype=int)
+        from_start = self._xy[index] - panel.origin[:2]
+        out = from_start @ panel.outward
+        x = from_start @ panel.along
+        aside = np.maximum(np.maximum(-x, x - panel.length), 0.0)
+        distance = np.hypot(out, aside)
+        usable = np.flatnonzero((out > 0.0) & (distance <= most))
+        usable = usable[np.argsort(distance[usable], kind="stable")]
+        step = max(1, (len(usable) - _NEAREST) // _OTHERS)
+        usable = np.append(usable[:_NEAREST], usable[_NEAREST::step])
+        return index[usable], distance[usable]
+
+    def _is_seen(self, probes: np.ndarray, eyes: np.ndarray) -> np.ndarray:
+        """Returns (K,) bool: whether eyes (K, 3) see probes (K, P, 3)."""
+        if self._scene is None:
+            return np.ones(len(eyes), dtype=bool)
+        starts = np.repeat(eyes - self._middle, probes.shape[1], axis=0)
+        ways = (probes - self._middle).reshape(-1, 3) - starts
+        hits = self._scene.run(
+            starts.astype("f4"),
+            ways.astype("f4"),
+            np.ones(len(ways), dtype="f4"),
+            query="OCCLUDED",
+        )
+        return np.asarray((hits < 0).reshape(len(eyes), -1).any(axis=1))
+
+
+def _probes(panel: Panel) -> np.ndarray:
+    """Returns places (P, 3) before a panel [m]."""
+    top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
+    return panel.place(_PARTS[:, 0] * panel.length, _PARTS[:, 1] * top, _BEFORE)
+
 
 # Walls that are farther from all drives have no windows, and roofs no
 # equipment [m].

@@ -1,27 +1,24 @@
-"""The ground of a dressed city: kerbs, missing sidewalks, paved courts."""
+"""The ground of a dressed city: kerbs, sidewalks, streets, paving, marks."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import shapely
 from shapely import STRtree
-from shapely.geometry import LineString, MultiLineString, MultiPolygon
+from shapely.geometry import LineString, MultiLineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.facades.assembly import Rgb
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import (
-    MeshShape,
-    Part,
-    Structure,
-)
-from cns_drake.imports.dressing.upper_sides import looks_up, turned_up
+from cns_drake.city.geometry.structures import MeshShape, Part, Structure
+from cns_drake.imports.dressing.wall_panels import looks_up, turned_up
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.faces import flat_surface, parts_of
-from cns_drake.imports.foreign_city import Imported, Street, make_imported
+from cns_drake.imports.foreign_city import Imported, Rgb, Street, make_imported
+from cns_drake.imports.ground import Ground
 from cns_drake.imports.options import ImportFaults
 
 # Within this distance of drives, sidewalks get kerbs, and missing ones are
@@ -42,7 +39,8 @@ _WITH_SIDEWALKS = (
 # If buildings cover at least this part of a city's area, ground of unknown kind
 # is paved.
 _DENSE = 0.12
-_MM = 1000.0
+# Areas are cut on this grid [m].
+_GRID = 0.001
 
 
 def is_dense(structures: Sequence[Imported]) -> bool:
@@ -89,7 +87,7 @@ def with_kerb(one: Imported) -> Imported:
 
 def _outer_edges(triangles: np.ndarray) -> np.ndarray:
     """Returns the edges (N, 2, 3) that only one triangle (M, 3, 3) has."""
-    corners = np.rint(triangles.reshape(-1, 3) * _MM).astype(np.int64)
+    corners = np.rint(triangles.reshape(-1, 3) * 1000.0).astype(np.int64)
     _, number = np.unique(corners, axis=0, return_inverse=True)
     number = number.reshape(-1, 3)
     edges = np.stack([number, np.roll(number, -1, axis=1)], axis=2)
@@ -162,8 +160,8 @@ def missing_sidewalks(
             *taken[tree.query(strip, "intersects")],
             *(area for area in made if area.intersects(strip)),
         ]
-        covered = shapely.union_all(others, grid_size=1.0 / _MM)
-        area = areas_of(shapely.difference(strip, covered, grid_size=1.0 / _MM))
+        covered = shapely.union_all(others, grid_size=_GRID)
+        area = areas_of(shapely.difference(strip, covered, grid_size=_GRID))
         made.append(area)
         surface = [
             flat_surface(part, KERB_HEIGHT, street.name, ImportFaults())
@@ -183,3 +181,292 @@ def missing_sidewalks(
 def areas_of(geometry: BaseGeometry) -> MultiPolygon:
     """Returns the polygons of a geometry, without its lines and points."""
     return MultiPolygon(list(parts_of(geometry)))
+
+
+# Half of the width of a street of unknown width, and width of its sidewalks
+# [m].
+HALF_STREET = 3.9
+# A carriageway ends before walls; narrower sidewalks are left out [m].
+_FROM_WALL, _NARROWEST = 0.5, 0.6
+# Height of a carriageway above the ground, which it covers [m].
+_ABOVE = 0.02
+
+
+def guessed_streets(
+    structures: Sequence[Imported],
+    drives: Sequence[WaypointDrive],
+    ground: Ground,
+) -> Iterator[Imported]:
+    """Yields a carriageway and sidewalks on the ground below drives.
+
+    Args:
+        structures: those of all stages, without roads.
+        drives: through the city, in the middle of its streets.
+        ground: below it.
+    """
+    paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
+    near = near_drives(structures, drives)
+    walls = _area(
+        [one for one in near if one.structure.semantic_class == "building"],
+        paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL),
+    )
+    street = areas_of(
+        shapely.difference(
+            paths.buffer(HALF_STREET, 4),
+            walls.buffer(_FROM_WALL, 1),
+            grid_size=_GRID,
+        )
+    )
+    beside = areas_of(
+        shapely.difference(
+            paths.buffer(HALF_STREET + _SIDEWALK, 4),
+            street,
+            grid_size=_GRID,
+        )
+    )
+    beside = areas_of(shapely.difference(beside, walls, grid_size=_GRID))
+    half = _NARROWEST / 2.0
+    wide = beside.buffer(-half, 2).buffer(half, 2)
+    sidewalks = wide.intersection(beside)
+    terrain = [one.triangles for one in structures if one.kind == "TINRelief"]
+    if terrain:
+        below = turned_up(np.concatenate(terrain))
+    else:
+        mesh = ground.to_mesh()
+        below = mesh.vertices[mesh.triangles()]
+        heights = ground.height(below.reshape(-1, 3)[:, :2])
+        below[..., 2] = heights.reshape(below.shape[:2])
+    below = below[looks_up(below)]
+    outlines = np.asarray(shapely.polygons(below[:, [0, 1, 2, 0], :2]))
+    tree = shapely.STRtree(outlines)
+    for name, kind, semantic_class, area, above in (
+        ("carriageway", "Road", "road", street, _ABOVE),
+        ("sidewalk", "Sidewalk", "sidewalk", sidewalks, KERB_HEIGHT),
+    ):
+        for number, part in enumerate(parts_of(area)):
+            hit = np.sort(tree.query(part, "intersects"))
+            surface = _laid(part, below[hit], outlines[hit], above)
+            if len(surface):
+                yield make_imported(
+                    f"{name}_{number}",
+                    semantic_class,
+                    kind,
+                    {"surface": surface},
+                    {},
+                )
+
+
+def _area(structures: Sequence[Imported], near: BaseGeometry) -> BaseGeometry:
+    """Returns the area of structures near a place, from above."""
+    triangles = np.concatenate(
+        [np.zeros((0, 3, 3)), *(one.triangles for one in structures)]
+    )
+    triangles = triangles[looks_up(triangles)]
+    rings = np.round(triangles[:, [0, 1, 2, 0], :2], 3)
+    polygons = np.asarray(shapely.polygons(rings))
+    shapely.prepare(near)
+    return shapely.union_all(
+        polygons[shapely.intersects(near, polygons)],
+        grid_size=_GRID,
+    )
+
+
+def _laid(
+    area: BaseGeometry, ground: np.ndarray, outlines: np.ndarray, above: float
+) -> np.ndarray:
+    """Returns an area laid on a ground, as triangles (N, 3, 3) [m].
+
+    Args:
+        area: from above.
+        ground: triangles (M, 3, 3) that look upwards and meet it [m].
+        outlines: (M,) theirs from above.
+        above: height above it [m].
+    """
+    pieces = shapely.intersection(outlines, area, grid_size=_GRID)
+    whole = np.isclose(
+        shapely.area(pieces), shapely.area(shapely.convex_hull(pieces)), 1e-6
+    )
+    found = [np.zeros((0, 3, 3))]
+    for triangle, piece, is_convex in zip(ground, pieces, whole, strict=True):
+        a, b, c = triangle
+        normal = np.cross(b - a, c - a)
+        for part in parts_of(piece):
+            flat = _fan(part) if is_convex else _filled(part)
+            aside = (flat - a)[..., :2] @ normal[:2]
+            flat[..., 2] = a[2] - aside / normal[2] + above
+            found.append(flat)
+    return turned_up(np.concatenate(found))
+
+
+def _filled(area: Polygon) -> np.ndarray:
+    return flat_surface(area, 0.0, "street", ImportFaults())
+
+
+def _fan(area: Polygon) -> np.ndarray:
+    """Returns a convex area as triangles (N, 3, 3) at height 0 [m]."""
+    corners = np.array(area.exterior.coords)[:-1, :2]
+    fan = np.zeros((len(corners) - 2, 3, 3))
+    fan[:, 0, :2] = corners[0]
+    fan[:, 1, :2], fan[:, 2, :2] = corners[1:-1], corners[2:]
+    sides = fan[:, 1:, :2] - fan[:, :1, :2]
+    return fan[np.abs(np.linalg.det(sides)) > _GRID * _GRID]
+
+
+# Widest gap that is paved [m], and least area of one [m^2].
+_WIDEST, _LEAST_AREA = 3.0, 0.05
+# Narrower parts are left open; a gap is at most this far from a sidewalk [m].
+_NARROWEST_GAP, _BESIDE = 0.1, 0.1
+# Gaps in one square of this size are one structure [m].
+_SQUARE = 50.0
+
+
+def paved_gaps(
+    structures: Sequence[Imported], drives: Sequence[WaypointDrive]
+) -> Iterator[Imported]:
+    """Yields sidewalks in the gaps near drives.
+
+    Args:
+        structures: those of all stages, on level ground.
+        drives: through the city.
+    """
+    near = near_drives(
+        [one for one in structures if one.kind != "Tree"], drives
+    )
+    walks = [_flat_outline(one) for one in near if one.kind == "Sidewalk"]
+    if not walks:
+        return
+    roads = [_flat_outline(one) for one in near if one.kind == "Road"]
+    walks_tree = STRtree(walks)
+    houses = [one for one in near if one.structure.semantic_class == "building"]
+    roofs = _upper_sides(houses)
+    beside = walks_tree.query(roofs, "dwithin", _WIDEST)[0]
+    covered = shapely.union_all([*walks, *roads, *roofs[np.unique(beside)]])
+    half = _WIDEST / 2.0
+    closed = covered.buffer(half, 2).buffer(-half, 2)
+    gaps = shapely.difference(closed, covered, grid_size=_GRID)
+    other = _upper_sides(
+        [
+            one
+            for one in near
+            if one.kind not in ("Sidewalk", "Road", "Crossing")
+            and one not in houses
+        ]
+    )
+    other_tree = STRtree(other)
+    surfaces: dict[tuple[int, int], list[np.ndarray]] = {}
+    for part in parts_of(gaps):
+        if (
+            part.area < _LEAST_AREA
+            or not walks_tree.query(part, "dwithin", _BESIDE).size
+        ):
+            continue
+        taken = shapely.union_all(
+            other[other_tree.query(part, "intersects")],
+            grid_size=_GRID,
+        )
+        free = areas_of(shapely.difference(part, taken, grid_size=_GRID))
+        inside = free.buffer(-_NARROWEST_GAP / 2.0, 2)
+        wide = areas_of(inside.buffer(_NARROWEST_GAP / 2.0, 2))
+        open_ = shapely.intersection(wide, free, grid_size=_GRID)
+        square = (
+            int(part.centroid.x // _SQUARE),
+            int(part.centroid.y // _SQUARE),
+        )
+        surfaces.setdefault(square, []).extend(
+            flat_surface(one, KERB_HEIGHT, "gap", ImportFaults())
+            for one in parts_of(open_)
+        )
+    found = [some for some in surfaces.values() if some]
+    for number, some in enumerate(found):
+        yield make_imported(
+            f"sidewalk_gap_{number}",
+            "sidewalk",
+            "Sidewalk",
+            {"surface": turned_up(np.concatenate(some))},
+            {},
+        )
+
+
+def _upper_sides(structures: Sequence[Imported]) -> np.ndarray:
+    """Returns the triangles that look up, or down, as polygons from above."""
+    triangles = turned_up(
+        np.concatenate(
+            [np.zeros((0, 3, 3)), *(one.triangles for one in structures)]
+        )
+    )
+    rings = np.round(triangles[looks_up(triangles)][:, [0, 1, 2, 0], :2], 3)
+    return np.asarray(shapely.polygons(rings))
+
+
+def _flat_outline(one: Imported) -> BaseGeometry:
+    """Returns the area of a level structure from above."""
+    return shapely.coverage_union_all(_upper_sides([one]))
+
+
+# Streets get marks if they are this near to drives, and at least this wide [m].
+_MARKS_WITHIN, _LEAST_WIDTH = 80.0, 6.0
+_CLASSES = ("primary", "secondary", "tertiary")
+# Length of a dash, of its gap, its width, its height above the street, and the
+# free length before a junction besides half the street's width [m].
+_DASH, _GAP, _WIDTH, _HEIGHT, _BEFORE = 3.0, 6.0, 0.12, 0.01, 4.0
+_WHITE: Rgb = (0.86, 0.86, 0.84)
+
+
+def lane_marks(
+    streets: Sequence[Street], drives: Sequence[WaypointDrive]
+) -> Iterator[Imported]:
+    """Yields the middle lines of the larger streets near drives.
+
+    Args:
+        streets: of the file, on level ground.
+        drives: through the city, at least one.
+    """
+    paths = MultiLineString([drive.path for drive in drives])
+    junctions = _junctions(streets)
+    for street in streets:
+        line = LineString(street.line)
+        lanes = street.tags.get("lanes", "1")
+        if (
+            street.forward
+            and street.backward
+            and street.width >= _LEAST_WIDTH
+            and (street.tags.get("highway") in _CLASSES or lanes == "2")
+            and line.distance(paths) < _MARKS_WITHIN
+        ):
+            middles = np.arange(_GAP, line.length - _DASH, _DASH + _GAP)
+            places = shapely.line_interpolate_point(line, middles)
+            free = street.width / 2.0 + _BEFORE
+            # Without junctions the distance is NaN.
+            kept = ~(shapely.distance(places, junctions) <= free)
+            dashes = [_dash(line, s) for s in middles[kept].tolist()]
+            if dashes:
+                yield make_imported(
+                    f"marks_{street.name}",
+                    "road",
+                    "Lane mark",
+                    {"paint": np.concatenate(dashes)},
+                    {"paint": _WHITE},
+                )
+
+
+def _junctions(streets: Sequence[Street]) -> shapely.MultiPoint:
+    """Returns the places where more than two ends of streets meet."""
+    ends: Counter[int] = Counter()
+    places = {}
+    for street in streets:
+        last = len(street.nodes) - 1
+        for k, node in enumerate(street.nodes):
+            ends[node] += 1 if k in (0, last) else 2
+            places[node] = street.line[k]
+    return shapely.MultiPoint([places[n] for n in ends if ends[n] > 2])
+
+
+def _dash(line: LineString, s: float) -> np.ndarray:
+    """Returns a dash about a place of a line, (2, 3, 3) triangles [m]."""
+    ends = [line.interpolate(s + k * _DASH / 2.0) for k in (-1.0, 1.0)]
+    a, b = (np.array([end.x, end.y]) for end in ends)
+    along = (b - a) / np.hypot(*(b - a))
+    left = np.array([-along[1], along[0]]) * _WIDTH / 2.0
+    ring = np.array([a - left, b - left, b + left, a + left])
+    corners = np.column_stack([ring, np.full(4, _HEIGHT)])
+    return corners[[[0, 1, 2], [0, 2, 3]]]

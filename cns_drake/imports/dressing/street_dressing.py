@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from shapely.geometry import LineString, MultiLineString
+import shapely
+from shapely.geometry import LineString, MultiLineString, MultiPoint, Point
+from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.plan.weighted import pick
-from cns_drake.imports.dressing.guessed_streets import HALF_STREET
-from cns_drake.imports.dressing.roadside import (
-    FROM_EDGE,
-    beside_street,
-    place_along,
+from cns_drake.city.furniture.parked_cars import PARKED_CARS
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.polygons import Occupancy, placed
+from cns_drake.city.geometry.structures import (
+    CylinderShape,
+    MeshShape,
+    Model,
+    Part,
+    SphereShape,
+    Structure,
 )
-from cns_drake.imports.dressing.street_parking import (
-    ROWS_WITHIN,
-    fill_car_park,
-    may_park_on,
-    park_along,
-)
-from cns_drake.imports.dressing.street_room import (
-    StreetRoom,
-    StreetThings,
-    title_of,
-)
+from cns_drake.city.placement.frontage import station_at
+from cns_drake.city.placement.objects import OBJECTS, pick
+from cns_drake.imports.dressing.grounds import HALF_STREET
+from cns_drake.imports.dressing.wall_panels import UpperSides, turned_up
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import (
     Imported,
@@ -34,6 +34,379 @@ from cns_drake.imports.foreign_city import (
     lot_generator,
 )
 from cns_drake.imports.ground import Ground
+
+# A thing on a carriageway is moved beside it, to this distance from its edge
+# [m].
+FROM_EDGE = 0.6
+
+
+def beside_street(
+    xy: np.ndarray, streets: Sequence[Street], courses: Sequence[LineString]
+) -> tuple[np.ndarray, float]:
+    """Returns a place off the carriageway, and the heading to the street."""
+    point = Point(xy)
+    distances = shapely.distance(courses, point)
+    nearest = int(np.argmin(distances))
+    line, half = courses[nearest], streets[nearest].width / 2.0
+    station = station_at(line, line.project(point))
+    foot = np.array([station.x, station.y])
+    offset = xy - foot
+    distance = float(np.hypot(*offset))
+    if distance < 0.05:
+        # On the right of the street, as signs are.
+        offset = np.array([np.sin(station.yaw), -np.cos(station.yaw)])
+        distance = 1.0
+    outwards = offset / distance
+    if distances[nearest] < half + FROM_EDGE:
+        xy = foot + outwards * (half + FROM_EDGE)
+    return xy, float(np.arctan2(-outwards[1], -outwards[0]))
+
+
+def place_along(
+    line: LineString, s: float, side: float, offset: float
+) -> tuple[tuple[float, float], float]:
+    """Returns a place beside a line, right for side 1, and its heading."""
+    at = station_at(line, s)
+    x = at.x + side * offset * float(np.sin(at.yaw))
+    y = at.y - side * offset * float(np.cos(at.yaw))
+    return (x, y), at.yaw
+
+
+# Sides of posts and balls; discs, such as signs, must differ from octagons.
+_SIDES, _SIDES_OF_DISC = 8, 20
+_POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
+
+
+def without_curves(model: Model) -> Model:
+    """Returns a model with prisms and polyhedra for cylinders and spheres.
+
+    Their cross-sections have the same areas.
+    """
+    parts, meshes = [], dict(model.meshes)
+    for part in model.parts:
+        shape = part.shape
+        if isinstance(shape, CylinderShape):
+            r, is_disc = shape.radius, shape.length < shape.radius
+            name = _DISC if is_disc else _POST
+            sides = _SIDES_OF_DISC if is_disc else _SIDES
+            part = _with_mesh(part, name, (r, r, shape.length))
+            meshes[name] = _turned((1.0, 1.0), (-0.5, 0.5), sides)
+        elif isinstance(shape, SphereShape):
+            part = _with_mesh(part, _BALL, (shape.radius,) * 3)
+            low = np.sqrt(0.5)
+            meshes[_BALL] = _turned(
+                (low, 1.0, low), (-low, 0.0, low), _SIDES, 1.0
+            )
+        parts.append(part)
+    return replace(model, parts=tuple(parts), meshes=meshes)
+
+
+def _with_mesh(part: Part, name: str, scale: tuple[float, ...]) -> Part:
+    x, y, z = scale
+    return replace(part, shape=MeshShape(name, (x, y, z)))
+
+
+def _turned(
+    radii: tuple[float, ...],
+    heights: tuple[float, ...],
+    sides: int,
+    pole: float | None = None,
+) -> Mesh:
+    """Returns a profile turned about z.
+
+    Args:
+        radii: from below.
+        heights: at these radii.
+        sides: of the polygon, which has the area of the circle.
+        pole: where the axis is met, above and below; at the same heights as
+            the first and the last radius if None.
+    """
+    step = 2.0 * np.pi / sides
+    angle = step * np.arange(sides)
+    circle = np.sqrt(step / np.sin(step)) * np.column_stack(
+        [np.cos(angle), np.sin(angle)]
+    )
+    rings = [
+        np.column_stack([r * circle, np.full(sides, z)])
+        for r, z in zip(radii, heights, strict=True)
+    ]
+    low, high = (heights[0], heights[-1]) if pole is None else (-pole, pole)
+    vertices = np.concatenate([[(0.0, 0.0, low)], *rings, [(0.0, 0.0, high)]])
+    top = len(vertices) - 1
+    last = top - sides
+    faces: list[tuple[int, ...]] = []
+    for k in range(sides):
+        n = (k + 1) % sides
+        faces += [(0, 1 + n, 1 + k), (top, last + k, last + n)]
+        for start in range(1, last, sides):
+            above = start + sides
+            faces.append((start + k, start + n, above + n, above + k))
+    return Mesh(vertices, tuple(faces))
+
+
+# Least distance of all objects from the middle of a drive [m].
+_FROM_DRIVE = 1.7
+_FROM_WALL, _BETWEEN = 0.25, 0.2
+# Radius about the middle of a trunk that nothing else takes [m].
+_TRUNK = 0.4
+
+
+@dataclass
+class StreetThings:
+    """The placed things.
+
+    Attributes:
+        structures: in the world.
+        from_file: names of structures from the file.
+        moved: name of a tree of the file -> the same beside the carriageway.
+        sources: sources of the file's things that were placed.
+        by_file, by_lot: kind -> how many.
+        no_room: how many of the file's things would stand in the way of a
+            drive, in a wall or in each other.
+    """
+
+    structures: list[Imported] = field(default_factory=list)
+    from_file: set[str] = field(default_factory=set)
+    moved: dict[str, Imported] = field(default_factory=dict)
+    sources: set[str] = field(default_factory=set)
+    by_file: Counter[str] = field(default_factory=Counter)
+    by_lot: Counter[str] = field(default_factory=Counter)
+    no_room: int = 0
+
+
+class StreetRoom:
+    """The room for things: what is taken, and by what."""
+
+    def __init__(
+        self,
+        structures: Sequence[Imported],
+        drives: Sequence[WaypointDrive],
+        ground: Ground,
+        found: StreetThings,
+    ):
+        self.found = found
+        self._ground = ground
+        self.paths = MultiLineString([drive.path for drive in drives])
+        shapely.prepare(self.paths)
+        solids = [
+            one.triangles
+            for one in structures
+            if one.structure.semantic_class
+            in ("building", "fence", "other-structure")
+        ]
+        paved = [
+            one.triangles
+            for one in structures
+            if one.is_ground or one.kind == "Sidewalk"
+        ]
+        empty = np.zeros((0, 3, 3))
+        self._solids = UpperSides(np.concatenate([empty, *solids]))
+        roads = [one.triangles for one in structures if one.kind == "Road"]
+        self._roads = UpperSides(turned_up(np.concatenate([empty, *roads])))
+        self._paved = UpperSides(turned_up(np.concatenate([empty, *paved])))
+        self._taken = Occupancy()
+        self._names = {one.structure.name for one in structures}
+        self.lamps: list[tuple[float, float]] = []
+
+    def is_near(self, line: np.ndarray, distance: float) -> bool:
+        """Returns whether a line (N, 2) is near a drive."""
+        return bool(shapely.dwithin(LineString(line), self.paths, distance))
+
+    def keep_tree(self, tree: Imported) -> None:
+        """Keeps the place of a tree's trunk free."""
+        x, y, _ = tree.structure.xyz
+        self._taken.add(Point(x, y).buffer(_TRUNK, 4))
+
+    def has_tree_pit(self, xy: np.ndarray) -> bool:
+        """Returns whether a trunk at (2,) is off roads, walls and drives."""
+        pit = Point(xy).buffer(_TRUNK, 2)
+        around = shapely.get_coordinates(pit)
+        return not (
+            np.isfinite(self._roads.heights(around)).any()
+            or self.paths.distance(pit) < _FROM_DRIVE
+            or self._is_built(pit)
+        )
+
+    def place(
+        self,
+        name: str,
+        kind: str,
+        xy: tuple[float, float],
+        yaw: float,
+        rng: np.random.Generator,
+    ) -> bool:
+        """Places an object, if there is room for it.
+
+        Only cars stand on carriageways.
+        """
+        builder = OBJECTS[kind]
+        at = np.array([xy])
+        is_car = kind in PARKED_CARS
+        if not is_car and np.isfinite(self._roads.heights(at)[0]):
+            return False
+        model = without_curves(builder.build(rng))
+        footprint = placed(model.footprint, xy, yaw)
+        if (
+            self.paths.distance(footprint) < _FROM_DRIVE
+            or not self._taken.is_free(footprint, _BETWEEN)
+            or self._is_built(footprint)
+        ):
+            return False
+        self._taken.add(footprint)
+        while name in self._names:
+            name += "_"
+        self._names.add(name)
+        x, y = round(xy[0], 3), round(xy[1], 3)
+        at = np.array([[x, y]])
+        z = float(self._ground.height(at)[0])
+        paved = float(self._paved.heights(at)[0])
+        # A street far above the guessed ground is a bridge, or a roof.
+        z = round(paved if abs(paved - z) < 1.0 else z, 3)
+        structure = Structure(
+            name, builder.semantic_class, model, (x, y, z), round(yaw, 4)
+        )
+        self.found.structures.append(
+            Imported(structure, title_of(kind), None, _footing(footprint, z))
+        )
+        if kind == "lamp_post":
+            self.lamps.append((x, y))
+        return True
+
+    def _is_built(self, footprint: BaseGeometry) -> bool:
+        around = footprint.buffer(_FROM_WALL, quad_segs=1)
+        xy = shapely.get_coordinates(around.exterior)
+        xy = np.concatenate([xy, shapely.get_coordinates(footprint.centroid)])
+        z = self._ground.height(xy)
+        return bool(self._solids.hides(np.column_stack([xy, z + 0.5])).any())
+
+
+def title_of(kind: str) -> str:
+    return kind.replace("_", " ").capitalize()
+
+
+def _footing(footprint: BaseGeometry, z: float) -> np.ndarray:
+    """Returns the bounds of a footprint as triangles (2, 3, 3) [m]."""
+    x0, y0, x1, y1 = footprint.bounds
+    a, b, c, d = ((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
+    return np.array([(a, b, c), (a, c, d)])
+
+
+# Cars farther from all drives are left out [m].
+ROWS_WITHIN = 70.0
+# Cars: distances in a row, part of the places that are taken, distance of
+# their middle from the edge, and of rows from other streets [m].
+_CAR_EVERY, _CARS, _FROM_KERB, _FROM_CROSSING = (5.8, 7.2), 0.6, 1.05, 5.0
+# A car along a row; a bay across one, its width and length; between bays [m].
+_ROW_PITCH, _BAY, _AISLE = 6.2, (2.6, 5.0), 5.5
+# Weights of parked vehicles.
+_FORMS = {
+    "city_car": 3.0,
+    "hatchback": 4.0,
+    "saloon": 3.0,
+    "estate": 4.0,
+    "suv": 2.0,
+    "van": 2.0,
+    "box_truck": 0.3,
+}
+_NO_PARKING = (
+    "no",
+    "no_parking",
+    "no_stopping",
+    "separate",
+    "drawn_separately",
+    "street_side",
+    "lay_by",
+)
+_PARKING_KEYS = (
+    "parking:{}",
+    "parking:{}:restriction",
+    "parking:lane:{}",
+    "parking:condition:{}",
+)
+_WITHOUT_CARS = ("service", "track", "motorway", "trunk", "living_street")
+
+
+def may_park_on(side: str, street: Street) -> bool:
+    """Returns whether cars may park on the `left` or `right` of a street.
+
+    https://wiki.openstreetmap.org/wiki/Street_parking
+    """
+    if street.tags.get("highway", "") in _WITHOUT_CARS:
+        return False
+    values = {
+        street.tags.get(key.format(which))
+        for which in (side, "both")
+        for key in _PARKING_KEYS
+    }
+    return not values & set(_NO_PARKING)
+
+
+def park_along(
+    placing: StreetRoom,
+    name: str,
+    line: LineString,
+    half: float,
+    may_park: tuple[bool, bool],
+    lines: BaseGeometry,
+    rng: np.random.Generator,
+) -> None:
+    """Parks cars along the right and the left of a street."""
+    others = lines.difference(line.buffer(0.5)) if not lines.is_empty else lines
+    for side, is_allowed in zip((1.0, -1.0), may_park, strict=True):
+        if not is_allowed:
+            continue
+        s = float(rng.uniform(4.0, 9.0))
+        while s < line.length - 4.0:
+            xy, yaw = place_along(line, s, side, half - _FROM_KERB)
+            yaw += 0.0 if side > 0 else np.pi
+            is_taken = rng.random() < _CARS
+            yaw += float(rng.uniform(-0.02, 0.02))
+            form = pick(_FORMS, rng)
+            is_clear = (
+                others.is_empty or others.distance(Point(xy)) > _FROM_CROSSING
+            )
+            if is_taken and is_clear:
+                kind = f"car_{name}_{int(s)}_{'lr'[side > 0]}"
+                if placing.place(kind, form, xy, yaw, rng):
+                    placing.found.by_lot["Parked vehicles"] += 1
+            s += float(rng.uniform(*_CAR_EVERY))
+
+
+def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
+    """Parks cars along the longer sides of an area."""
+    outline = MultiPoint(one.triangles.reshape(-1, 3)[:, :2])
+    box = np.array(outline.minimum_rotated_rectangle.boundary.coords)
+    if len(box) != 5 or not placing.is_near(box, ROWS_WITHIN):
+        return
+    sides = np.diff(box, axis=0)[:2]
+    length, width = sorted(np.hypot(*sides.T).tolist(), reverse=True)
+    first = int(np.hypot(*sides[0]) < np.hypot(*sides[1]))
+    along = sides[first] / length
+    across = np.array([-along[1], along[0]])
+    middle = box[:4].mean(axis=0)
+    is_row = width < _BAY[1]
+    pitch = _ROW_PITCH if is_row else _BAY[0]
+    offsets = [0.0] if is_row else [width / 2.0 - _BAY[1] / 2.0 - 0.2]
+    if width > 2.0 * _BAY[1] + _AISLE:
+        offsets.append(-offsets[0])
+    heading = float(np.arctan2(along[1], along[0]))
+    heading += 0.0 if is_row else np.pi / 2.0
+    area = shapely.union_all(shapely.polygons(one.triangles[:, :, :2]))
+    name = one.structure.name
+    rng = lot_generator(seed, "car park", name)
+    count = int((length - 0.5) / pitch)
+    for row, offset in enumerate(offsets):
+        for k in range(count):
+            x = (k - (count - 1) / 2.0) * pitch + float(rng.uniform(-0.2, 0.2))
+            place = middle + x * along + offset * across
+            yaw = heading + float(rng.uniform(-0.02, 0.02))
+            form = pick(_FORMS, rng)
+            if rng.random() > _CARS or not area.contains(Point(place)):
+                continue
+            xy = (float(place[0]), float(place[1]))
+            if placing.place(f"car_{name}_{row}_{k}", form, xy, yaw, rng):
+                placing.found.by_lot["Parked vehicles"] += 1
+
 
 # Things farther from all drives are left out [m].
 _THINGS_WITHIN = 100.0

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.generation.structure_rows import MAX_STRUCTURES
+from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import plan_buildings
 from cns_drake.imports.dressing.grounds import (
+    guessed_streets,
     is_dense,
+    lane_marks,
     missing_sidewalks,
     near_drives,
     paved,
+    paved_gaps,
     with_kerb,
 )
-from cns_drake.imports.dressing.guessed_streets import guessed_streets
-from cns_drake.imports.dressing.lane_marks import lane_marks
-from cns_drake.imports.dressing.paved_gaps import paved_gaps
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.city.geometry.object_parts import part_triangles
+from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG, kerb_height
 from cns_drake.roads.road_surface import RoadSurface
 

@@ -25,7 +25,7 @@ import yaml
 
 from cns_drake.base.map_folder import STRUCTURES_NAME
 from cns_drake.city.generation import generate
-from cns_drake.city.geometry.object_parts import part_mesh
+from cns_drake.city.geometry.structures import part_mesh
 from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.city.growth.lowering import cut_at
 from cns_drake.city.growth.stage_structures import GrowingCity

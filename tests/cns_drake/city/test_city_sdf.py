@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city.generation.sdf import stage_sdf
+from cns_drake.city.generation.generate import stage_sdf
 from cns_drake.city.geometry.mesh import box_mesh
 from cns_drake.city.geometry.structures import (
     BoxShape,

@@ -13,16 +13,17 @@ from shapely.geometry import MultiPolygon, box
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.mesh import box_mesh
-from cns_drake.city.geometry.object_parts import part_mesh
-from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.growth.building_sites import (
+from cns_drake.city.geometry.structures import Structure, part_mesh
+from cns_drake.city.growth.lowering import cut_at, enclosed, lowered, top_of
+from cns_drake.city.growth.stage_structures import (
+    USES,
+    GrowingCity,
     building_site,
     largest_rectangle,
+    lot_objects,
+    use_by_size,
+    younger,
 )
-from cns_drake.city.growth.lot_uses import USES, lot_objects, use_by_size
-from cns_drake.city.growth.lowering import cut_at, enclosed, lowered, top_of
-from cns_drake.city.growth.stage_structures import GrowingCity
-from cns_drake.city.growth.young_plants import younger
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.stages import Growth, Stage, Stages
 

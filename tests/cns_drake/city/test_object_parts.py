@@ -4,21 +4,19 @@ import pytest
 from shapely.geometry import MultiPoint, Point
 
 from cns_drake.city.geometry.mesh import box_mesh
-from cns_drake.city.geometry.object_parts import (
+from cns_drake.city.geometry.structures import (
     HEADROOM,
     ROOT_DEPTH,
+    CylinderShape,
+    MeshShape,
+    Part,
+    SphereShape,
     assemble,
     bar,
     block,
     ground_footprint,
     post,
     rotation,
-)
-from cns_drake.city.geometry.structures import (
-    CylinderShape,
-    MeshShape,
-    Part,
-    SphereShape,
 )
 
 

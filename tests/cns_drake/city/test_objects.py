@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 from shapely.geometry import MultiPoint
 
-from cns_drake.city.furniture.fences import RUN_KINDS
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.object_meshes import FOLDER, object_mesh
+from cns_drake.city.furniture.pavilions import RUN_KINDS
+from cns_drake.city.geometry.mesh import FOLDER, Mesh, object_mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.plants.tree_species import SPECIES
+from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.scene.semantics import CLASS_IDS
 
 SEEDS = range(6)

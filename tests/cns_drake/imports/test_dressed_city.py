@@ -13,19 +13,24 @@ from shapely.geometry import LineString, Polygon
 from typer.testing import CliRunner
 import yaml
 
-from cns_drake.city.geometry.object_parts import part_triangles
+from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.command_line.cli import app
 from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing.dressed_city import plan_buildings
-from cns_drake.imports.dressing.facade_plan import plan_facade, with_doors
-from cns_drake.imports.dressing.reliefs import Openings, framed, open_wall
+from cns_drake.imports.dressing.facade_pieces import plan_facade, with_doors
 from cns_drake.imports.dressing.styles import (
     Use,
     building_use,
     make_style,
     tagged_colour,
 )
-from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
+from cns_drake.imports.dressing.wall_panels import (
+    Openings,
+    find_panels,
+    framed,
+    is_upright,
+    open_wall,
+)
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.ground import ground_of

@@ -13,10 +13,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.city.generation import generate
 from cns_drake.city.generation.city_structures import make_city
-from cns_drake.city.generation.generate import (
-    differing_files,
-    generate_city,
-)
+from cns_drake.city.generation.generate import differing_files, generate_city
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.roads.network import load_road_network
