@@ -20,7 +20,6 @@ from cns_drake.city.geometry.structures import (
     Part,
 )
 from cns_drake.imports.dressing.dressed_city import Bare, all_laid_bare
-from cns_drake.imports.dressing.facade_pieces import Faces, add_facade
 from cns_drake.imports.dressing.facade_pieces import (
     FacadePlan,
     Faces,
