@@ -19,7 +19,6 @@ from cns_drake.city.geometry.structures import (
     Model,
     Part,
 )
-from cns_drake.imports.dressing.dressed_city import Bare, all_laid_bare
 from cns_drake.imports.dressing.facade_pieces import (
     FacadePlan,
     Faces,
