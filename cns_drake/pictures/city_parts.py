@@ -22,7 +22,7 @@ class Part:
     """A part of a structure, of one colour.
 
     Attributes:
-        semantic_class: of the structure.
+        semantic_class: class of the structure.
         rgb: sRGB, each from 0 to 1.
         surface: in the world.
     """

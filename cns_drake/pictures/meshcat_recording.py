@@ -118,7 +118,7 @@ class MeshcatRecorder(LeafSystem):
 
         Args:
             name: unique in the page.
-            frames: of its geometry; the first one leads.
+            frames: frames of its geometry; the first one leads.
         """
         leading = frames[0]
         self.drive.X_WFs[leading] = []

@@ -44,7 +44,7 @@ class View(BaseModel):
     """A camera.
 
     Attributes:
-        position: of the camera in the world [m].
+        position: where the camera is in the world [m].
         target: a point in the middle of the picture [m].
         fov_y: vertical field of view [deg].
     """
@@ -72,7 +72,7 @@ class View(BaseModel):
 
         Args:
             p_WQset: (N, 3) points in the world [m].
-            width, height: of the picture [pixel].
+            width, height: size of the picture [pixel].
         """
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
@@ -90,7 +90,7 @@ class StageScene:
         """Loads an SDF world.
 
         Args:
-            path: of the world.
+            path: file of the world.
             without: names of structures to leave out.
 
         Raises:

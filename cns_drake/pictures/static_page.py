@@ -101,8 +101,8 @@ def save_meshcat_page(
 
     Args:
         meshcat: holds the scene.
-        path: of the page.
-        title: of the page, plain text.
+        path: file of the page.
+        title: title of the page, plain text.
 
     Raises:
         InputError: the page cannot be written.

@@ -25,7 +25,7 @@ def is_protocol(method: str, protocol: RetrievalProtocol) -> bool:
 
     Args:
         method: its name.
-        protocol: of the run, its number of scans included.
+        protocol: how it was run, its number of scans included.
     """
     scans = 10 if method == "btc" else 1
     compared = replace(protocol, exclude_recent=None)

@@ -31,7 +31,7 @@ def draw_pr_curves(
 
     Args:
         map_name: name of the city.
-        results: of its pairs and methods.
+        results: one for each of its pairs and methods.
         stem: path to write, without ending.
     """
     pairs = list(dict.fromkeys(result.pair for result in results))
@@ -71,7 +71,7 @@ def draw_auc_over_change(
     them are the reference's values, if there are any.
 
     Args:
-        results: of all pairs and methods.
+        results: one for each pair and method.
         changes: each pair's TCR_sym.
         stem: path to write, without ending.
         reference: published values to draw beside ours.

@@ -68,7 +68,8 @@ class View:
     Attributes:
         azimuth_deg: direction from the scene to the camera, seen from above
             [deg].
-        elevation_deg: of the camera above the horizon, up to 90 [deg].
+        elevation_deg: height of the camera above the horizon, up to 90
+            [deg].
         pixels_per_metre: scale.
     """
 
@@ -128,10 +129,10 @@ class Stage:
     """The drawn data of one drive.
 
     Attributes:
-        name: of the stage, e.g. `04`.
+        name: the stage, e.g. `04`.
         fine: (K, 3) cloud for pictures, in W [m].
         coarse: map on the grid of the TCR.
-        positions: (N, 3) of the sensor [m].
+        positions: (N, 3) where the sensor was [m].
     """
 
     name: str
@@ -145,9 +146,9 @@ class SeenRoute:
     """A route in its surroundings.
 
     Attributes:
-        name: of the stage, e.g. `04`.
-        view: of its surroundings from above.
-        positions: (N, 3) of the sensor [m].
+        name: the stage, e.g. `04`.
+        view: its surroundings from above.
+        positions: (N, 3) where the sensor was [m].
     """
 
     name: str
@@ -161,7 +162,7 @@ def judge_points(
     """Applies the two tests of the TCR to the points of a finer map.
 
     Args:
-        points: (N, 3) of one map, on any grid [m].
+        points: (N, 3) points in one map, on any grid [m].
         other: (M, 3) voxel centroids of the other map, M > 0 [m].
         tau: distance up to which a point has a counterpart [m].
 
@@ -181,7 +182,7 @@ def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
 
     Args:
         points: (K, 3) cloud for pictures, in W [m].
-        positions: (N, 3) of the sensor along the route [m].
+        positions: (N, 3) where the sensor was along the route [m].
     """
     low, high = positions[:, :2].min(axis=0), positions[:, :2].max(axis=0)
     near = (
@@ -226,7 +227,7 @@ def draw_change(
     orders and united; a point has the colour of its voxel.
 
     Args:
-        map_name: of the city.
+        map_name: name of the city.
         earlier: stage A.
         later: stage B.
         change: from A to B.
@@ -244,7 +245,7 @@ def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
     side. The occupied voxel with the nearest centre is taken therefore.
 
     Args:
-        points: (N, 3) of the points that made the map [m].
+        points: (N, 3) points that made the map [m].
         coarse: their map.
 
     Returns:

@@ -62,13 +62,13 @@ class LadderRung:
     """The change between two drives.
 
     Attributes:
-        map_name: of the city.
+        map_name: name of the city.
         database: name of the drive along the database's route.
         query: name of the query drive.
-        cause: of the change; `none` without one.
+        cause: what changes; `none` without a change.
         level: its strength, from 1 to 4; 0 without a change.
         strength: in words.
-        radius: of a match [m].
+        radius: greatest distance of a match [m].
     """
 
     map_name: str
@@ -85,8 +85,8 @@ class MeasuredRung:
     """The outcomes of all methods on a rung, with one random draw.
 
     Attributes:
-        rung: which.
-        seed: of the draw.
+        rung: the rung.
+        seed: number of the draw.
         drives: fingerprint of the drives.
         outcomes: one for each method, without and with the gate.
     """
@@ -102,7 +102,7 @@ class LadderRow:
     """A method on a rung: means over the draws.
 
     Attributes:
-        rung: which.
+        rung: the rung.
         method: its name.
         is_gated: whether it was gated by the radius.
         auc_interval: 95 % interval of AUC by bootstrap over queries; a sample
@@ -149,7 +149,7 @@ def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
     """Returns a row for each rung, method and gate.
 
     Args:
-        measured: of all maps; the rung `none` of a map comes first.
+        measured: rungs of all maps; the rung `none` of a map comes first.
     """
     groups: dict[tuple[LadderRung, str, bool], list[RungOutcome]] = {}
     drives: dict[LadderRung, list[str]] = {}
@@ -334,7 +334,7 @@ def ladder_text(rows: Sequence[LadderRow]) -> str:
     """Returns a paragraph for each map.
 
     Args:
-        rows: of all maps.
+        rows: rows for all maps.
     """
     maps = dict.fromkeys(row.rung.map_name for row in rows)
     return "\n\n".join(
@@ -457,7 +457,7 @@ def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
     that of the strongest level [%]. Without a change it is AUC itself.
 
     Args:
-        rows: of all maps.
+        rows: rows for all maps.
         stem: path to write, without ending.
     """
     maps = list(dict.fromkeys(row.rung.map_name for row in rows))

@@ -60,7 +60,7 @@ class PageDrive:
     """A drive as the page shows it.
 
     Attributes:
-        name: of the recording.
+        name: name of the recording.
         frames: (K,) frames that are places or queries, increasing.
         X_WS: (K, 4, 4) poses of the sensor there.
         route: (M, 2) the path of the sensor from above [m].
@@ -88,7 +88,7 @@ def make_drive(
     """Returns a drive as the page shows it.
 
     Args:
-        name: of the recording.
+        name: name of the recording.
         view: its surroundings from above.
         X_WS: (N, 4, 4) poses of the sensor at all frames.
         frames: K of these that are places or queries.
@@ -129,7 +129,7 @@ def browser_data(
     `evaluation.report.page_routes.route_picture`.
 
     Args:
-        recognitions: of all pairs and methods.
+        recognitions: one for each pair and method.
         drives: name -> drive, for all drives of a pair.
         changes: TCR_sym of each pair.
         pages: drive -> address of the page of its recording; drives without a

@@ -171,7 +171,8 @@ def draw_survival(survivals: Sequence[Survival], stem: Path) -> None:
     share stands beside them. Pairs without a control are left out.
 
     Args:
-        survivals: of all pairs and methods; at least one has a control.
+        survivals: one for each pair and method; at least one has a
+            control.
         stem: path to write, without ending.
     """
     groups = by_pair([one for one in survivals if one.unchanged is not None])
