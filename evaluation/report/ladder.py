@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 import math
 from operator import attrgetter
@@ -20,6 +20,7 @@ import numpy as np
 from cns_drake.base.jobs.fingerprint import fingerprint
 from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.resampling import (
     Interval,
     percentile_interval,
@@ -103,46 +104,58 @@ class LadderRow:
 
     Attributes:
         rung: the rung.
-        method: its name.
-        is_gated: whether it was gated by the radius.
+        drives: fingerprint of the drives of all draws.
+        draws: outcome of each draw.
+        unchanged: those on the rung `none` of the same map.
         auc_interval: 95 % interval of AUC by bootstrap over queries; a sample
             has the same queries in each draw.
-        r1: R@1.
-        kept: share of the AUC on the rung `none` of the same map.
-        queries: number of queries in each draw.
-        with_match: number of those with a match.
-        places: number of places of the database.
-        draws: number of random draws.
-        drives: fingerprints of the drives of all draws.
-        lost: mean number of queries that are right on the rung `none` and wrong
-            here.
-        found: mean number of queries that are wrong there and right here.
-        hidden: see `RungOutcome.num_hidden`; mean.
-        overlap: mean over queries, see `RungOutcome.overlaps`.
-        faults: fault -> mean number of queries with it. See
-            `RungOutcome.faults`.
+        kept: share of the AUC on the rung `none`.
     """
 
     rung: LadderRung
-    method: str
-    is_gated: bool
-    auc_interval: Interval
-    r1: float
-    kept: Kept
-    queries: int
-    with_match: int
-    places: int
-    draws: int
     drives: str
-    lost: float
-    found: float
-    hidden: float
-    overlap: float
-    faults: Mapping[str, float]
+    draws: Sequence[RungOutcome]
+    unchanged: Sequence[RungOutcome]
+    auc_interval: Interval
+    kept: Kept
 
     @property
-    def auc(self) -> float:
-        return self.kept.changed
+    def method(self) -> str:
+        return self.draws[0].method
+
+    @property
+    def is_gated(self) -> bool:
+        return self.draws[0].is_gated
+
+    @property
+    def outcomes(self) -> QueryOutcomes:
+        """The outcomes of the first draw; all have the same queries."""
+        return self.draws[0].outcomes
+
+    def mean(self, value: Callable[[RungOutcome], float]) -> float:
+        """Returns the mean of a number over the draws."""
+        return float(np.mean([value(one) for one in self.draws]))
+
+    def mean_turned(self, *, is_right: bool) -> float:
+        """Returns the mean number of queries that turn right, or wrong.
+
+        They are otherwise on the rung `none`; NaN if that has other queries.
+        """
+        before = self.unchanged[0].outcomes.is_right
+        if len(before) != len(self.outcomes):
+            return math.nan
+        return self.mean(
+            lambda one: np.count_nonzero(
+                (one.outcomes.is_right != before)
+                & (one.outcomes.is_right == is_right)
+            )
+        )
+
+    def mean_overlap(self) -> float:
+        """Returns the mean of `RungOutcome.overlaps`; NaN if all are."""
+        overlaps = np.concatenate([one.overlaps for one in self.draws])
+        known = overlaps[~np.isnan(overlaps)]
+        return float(known.mean()) if len(known) else math.nan
 
 
 def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
@@ -173,49 +186,28 @@ def _row(
     unchanged: Sequence[RungOutcome],
     draws: Sequence[RungOutcome],
 ) -> LadderRow:
-    first = draws[0]
-    num_queries = len(first.outcomes)
+    num_queries = len(draws[0].outcomes)
     weights = resampled_weights(num_queries)
     samples = _sampled_auc(draws, weights)
     share = Interval(math.nan, math.nan)
-    lost = found = math.nan
     if len(unchanged[0].outcomes) == num_queries:
         before = _sampled_auc(unchanged, weights)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = percentile_interval(
                 np.where(before > 0.0, samples / before, math.nan)
             )
-        right = unchanged[0].outcomes.is_right
-        lost, found = (
-            _mean([float((a & ~b).sum()) for a, b in pairs])
-            for pairs in (
-                [(right, one.outcomes.is_right) for one in draws],
-                [(one.outcomes.is_right, right) for one in draws],
-            )
-        )
-    faults = [fault for one in draws for fault in one.faults(rung.radius)]
-    return LadderRow(
-        rung=rung,
-        method=first.method,
-        is_gated=first.is_gated,
-        auc_interval=percentile_interval(samples),
-        r1=_mean([one.outcomes.recall_at(1) for one in draws]),
-        kept=Kept(_auc(unchanged), _auc(draws), share),
-        queries=num_queries,
-        with_match=int(first.outcomes.has_match.sum()),
-        places=first.outcomes.num_places,
-        draws=len(draws),
-        drives=drives,
-        lost=lost,
-        found=found,
-        hidden=_mean([one.num_hidden for one in draws]),
-        overlap=_mean_known(np.concatenate([one.overlaps for one in draws])),
-        faults={name: faults.count(name) / len(draws) for name in FAULTS},
+    none, changed = (
+        float(np.mean([pr_curve(one.outcomes).auc for one in outcomes]))
+        for outcomes in (unchanged, draws)
     )
-
-
-def _auc(draws: Sequence[RungOutcome]) -> float:
-    return _mean([pr_curve(one.outcomes).auc for one in draws])
+    return LadderRow(
+        rung,
+        drives,
+        draws,
+        unchanged,
+        percentile_interval(samples),
+        Kept(none, changed, share),
+    )
 
 
 def _sampled_auc(
@@ -225,15 +217,6 @@ def _sampled_auc(
     return np.mean(
         [resampled_metrics(one.outcomes, weights)[0] for one in draws], axis=0
     )
-
-
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values))
-
-
-def _mean_known(values: np.ndarray) -> float:
-    known = values[~np.isnan(values)]
-    return float(known.mean()) if len(known) else math.nan
 
 
 class _Answers(NamedTuple):
@@ -263,24 +246,29 @@ def _keys(path: str = "") -> Columns[Any]:
 
 _ROW_COLUMNS: Columns[LadderRow] = {
     **_keys(),
-    "auc": lambda row: row.auc,
-    "r1": lambda row: row.r1,
+    "auc": lambda row: row.kept.changed,
+    "r1": lambda row: row.mean(lambda one: one.outcomes.recall_at(1)),
     "kept": lambda row: row.kept.share,
     "kept_low": lambda row: row.kept.interval.low,
     "kept_high": lambda row: row.kept.interval.high,
     "auc_low": lambda row: row.auc_interval.low,
     "auc_high": lambda row: row.auc_interval.high,
     "auc_none": lambda row: row.kept.unchanged,
-    "queries": lambda row: row.queries,
-    "with_match": lambda row: row.with_match,
-    "places": lambda row: row.places,
-    "draws": lambda row: row.draws,
+    "queries": lambda row: len(row.outcomes),
+    "with_match": lambda row: int(row.outcomes.has_match.sum()),
+    "places": lambda row: row.outcomes.num_places,
+    "draws": lambda row: len(row.draws),
     "drives": lambda row: row.drives,
-    "lost": lambda row: row.lost,
-    "found": lambda row: row.found,
-    "hidden": lambda row: row.hidden,
-    "overlap": lambda row: row.overlap,
-    **keyed({name: name for name in FAULTS}, lambda row, k: row.faults[k]),
+    "lost": lambda row: row.mean_turned(is_right=False),
+    "found": lambda row: row.mean_turned(is_right=True),
+    "hidden": lambda row: row.mean(lambda one: one.num_hidden),
+    "overlap": lambda row: row.mean_overlap(),
+    **keyed(
+        {name: name for name in FAULTS},
+        lambda row, name: row.mean(
+            lambda one: one.faults(row.rung.radius).count(name)
+        ),
+    ),
     "strength": lambda row: row.rung.strength,
     "radius": lambda row: row.rung.radius,
 }
@@ -346,9 +334,9 @@ def ladder_text(rows: Sequence[LadderRow]) -> str:
 def _paragraph(rows: Sequence[LadderRow]) -> str:
     first = rows[0].rung
     parts = [
-        f"{first.map_name.capitalize()}, {rows[0].queries} queries of drive"
-        f" {first.query}: what each cause of change, at its strongest level,"
-        " leaves of the AUC without a change (95 % intervals)."
+        f"{first.map_name.capitalize()}, {len(rows[0].outcomes)} queries of"
+        f" drive {first.query}: what each cause of change, at its strongest"
+        " level, leaves of the AUC without a change (95 % intervals)."
     ]
     ungated, gated = (
         _strongest([row for row in rows if row.is_gated == is_gated])
@@ -541,6 +529,6 @@ def _draw_panel(
 
 def _label(row: LadderRow) -> str:
     if row.rung.level == 0:
-        return f"AUC {row.auc:.2f}"
+        return f"AUC {row.kept.changed:.2f}"
     share = row.kept.share
     return "–" if math.isnan(share) else f"{100.0 * share:.0f}"

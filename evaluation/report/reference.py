@@ -1,18 +1,14 @@
-"""The reference of a report: published numbers, and claims to judge.
-
-A study of a user's own city has no such numbers and uses `Reference` itself,
-which publishes and judges nothing. A study with published numbers gets an
-object of a subclass.
-"""
+"""The reference of a report: published numbers, and claims to judge."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.metrics import Mode
 from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.protocol import RetrievalProtocol
 
 
 @dataclass(frozen=True)
@@ -47,64 +43,88 @@ class Judgement:
     findings: Sequence[Finding]
 
 
+@dataclass(frozen=True, eq=False)
 class Reference:
-    """Published numbers and claims; this class has none.
+    """Published numbers and claims; without arguments it has none.
 
     Attributes:
         title: the source's name in the report.
         counting: the modes in which the source counted its methods, in words
             for a caption and in brief for a figure; used only if something is
             published.
+        changes: (map, earlier stage, later stage) -> TCR_sym.
+        further: changes elsewhere to compare with: label, stages and TCR_sym.
+        recognitions: (map, database, query, method, mode) -> numbers; each
+            method has one mode.
+        protocols: method -> how the source ran it, its number of scans
+            included.
+        judge: returns verdicts on all claims that our numbers can judge.
     """
 
     title: str = ""
     counting: tuple[str, str] = ("", "")
+    changes: Mapping[tuple[str, str, str], float] = field(default_factory=dict)
+    further: Sequence[tuple[str, str, float]] = ()
+    recognitions: Mapping[tuple[str, str, str, str, Mode], Published] = field(
+        default_factory=dict
+    )
+    protocols: Mapping[str, RetrievalProtocol] = field(default_factory=dict)
+    judge: Callable[
+        [Sequence[RecognitionResult], Sequence[ChangeResult]], list[Judgement]
+    ] = lambda results, changes: []
+
+    @property
+    def city_names(self) -> set[str]:
+        """The maps with published place recognition."""
+        return {key[0] for key in self.recognitions}
 
     def compares_back(self, map_name: str, earlier: str, last: str) -> bool:
         """Returns whether the earlier stage also asks the last one."""
-        del map_name, earlier, last
-        return False
+        pair = (map_name, last, earlier)
+        return any(key[:3] == pair for key in self.recognitions)
 
     def change(self, map_name: str, stages: Sequence[str]) -> float | None:
-        """Returns the published TCR_sym of a pair of stages."""
-        del map_name, stages
-        return None
+        """Returns the published TCR_sym of a pair of stages, in any order."""
+        first, second = sorted(stages)
+        return self.changes.get((map_name, first, second))
 
     def further_changes(
         self, map_names: Iterable[str]
-    ) -> list[tuple[str, str, float]]:
-        """Returns changes to compare with: label, stages and TCR_sym."""
-        del map_names
-        return []
+    ) -> Sequence[tuple[str, str, float]]:
+        """Returns `further`, for a report on one of the source's maps."""
+        return () if self.city_names.isdisjoint(map_names) else self.further
 
     def covers(self, result: RecognitionResult) -> bool:
-        """Returns whether the number is published."""
-        del result
-        return False
+        """Returns whether map, method and protocol are the source's."""
+        return result.pair[0] in self.city_names and self._ran(result)
 
     def mode(self, method: str) -> Mode:
         """Returns the mode in which a method was counted."""
-        del method
-        return "all"
+        modes = (key[4] for key in self.recognitions if key[3] == method)
+        return next(modes, "all")
 
     def values(self, result: RecognitionResult, mode: Mode) -> Published | None:
-        """Returns the published numbers, counted in a mode."""
-        del result, mode
-        return None
+        """Returns the published numbers, if they were counted in this mode.
+
+        None for numbers that were found by another protocol.
+        """
+        if not self._ran(result):
+            return None
+        return self.recognitions.get((*result.pair, result.method, mode))
 
     def auc_over_change(self, method: str) -> list[tuple[float, float]]:
         """Returns the published points (TCR_sym, AUC) of a method."""
-        del method
-        return []
+        return [
+            (change, value.auc)
+            for (city, *stages, name, _), value in self.recognitions.items()
+            if name == method
+            and (change := self.change(city, stages)) is not None
+        ]
 
-    def judge(
-        self,
-        results: Sequence[RecognitionResult],
-        changes: Sequence[ChangeResult],
-    ) -> list[Judgement]:
-        """Returns verdicts on all claims that our numbers can judge."""
-        del results, changes
-        return []
+    def _ran(self, result: RecognitionResult) -> bool:
+        """Returns whether the source ran the method by the same protocol."""
+        protocol = replace(result.outcome.protocol, exclude_recent=None)
+        return protocol == self.protocols.get(result.method)
 
 
 NO_REFERENCE = Reference()

@@ -24,15 +24,14 @@ QUERIES = np.array([0.0, 10.0, 20.0, 30.0, 100.0])
 MAP = "metropolis"
 
 
-class _Claims(Reference):
-    def judge(self, results, changes):
-        return [
-            Judgement(heading, [finding])
-            for heading, finding in (
-                ("Claims", Finding("A < B & C.", "does not hold", "1 of 2.")),
-                ("Aims", Finding("C > D.", "is missed", "3 of 4.")),
-            )
-        ]
+def _judge(results, changes):
+    return [
+        Judgement(heading, [finding])
+        for heading, finding in (
+            ("Claims", Finding("A < B & C.", "does not hold", "1 of 2.")),
+            ("Aims", Finding("C > D.", "is missed", "3 of 4.")),
+        )
+    ]
 
 
 def make_content(folder, **changed):
@@ -60,7 +59,7 @@ def make_content(folder, **changed):
     }
     without_change = _result("scan-context++", [0, 1, 4, 6, 3])
     values = {
-        "reference": _Claims(),
+        "reference": Reference(judge=_judge),
         "evidence": evidence,
         "costs": [Cost("ring++", 1, 2000.0, 1.5, 20.25, 10, 12345.0)],
         "illustrations": [

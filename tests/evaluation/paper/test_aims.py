@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from evaluation.paper import printed_values
-from evaluation.paper.paper_reference import MET, MISSED, aims
+from evaluation.paper.paper_reference import MET, MISSED, aims, paper
 from evaluation.recognition.protocol import RetrievalProtocol
 
 
@@ -17,7 +16,7 @@ def asked(method):
 def make_results(change=lambda key: 0.0):
     """Returns the paper's own values, each changed by some function."""
     results = []
-    for key, value in printed_values.recognition_values().items():
+    for key, value in paper().recognitions.items():
         metrics = SimpleNamespace(auc=value.auc + change(key))
         results.append(
             SimpleNamespace(
@@ -39,8 +38,8 @@ def make_changes(offset=0.0):
                 change=SimpleNamespace(symmetric=value + offset)
             ),
         )
-        for (city, *stages), value in printed_values.tcr_values().items()
-        if city in printed_values.city_names()
+        for (city, *stages), value in paper().changes.items()
+        if city in paper().city_names
     ]
 
 

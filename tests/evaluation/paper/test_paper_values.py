@@ -6,17 +6,18 @@ from types import SimpleNamespace
 
 import pytest
 
-from evaluation.paper import printed_values, reference_for
+from evaluation.paper import reference_for
+from evaluation.paper.paper_reference import paper
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE
 
 
 def test_paper_values():
-    change = printed_values.tcr_values()
+    change = paper().changes
     assert len(change) == 9
     # The first misprint: Table I prints 0.1120 here.
     assert change["downtown", "01", "04"] == 0.1674
-    recognition = printed_values.recognition_values()
+    recognition = paper().recognitions
     assert len(recognition) == 40
     # The second: R@1 is printed as 0.9626.
     value = recognition["riverside", "02", "01", "ring++", "filtered"]
