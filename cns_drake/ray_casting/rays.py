@@ -51,8 +51,24 @@ class Rays(NamedTuple):
 
     def d_Oset(self) -> np.ndarray:
         """Returns the (N, 3) float64 direction of each ray in O."""
-        turns = self.d_Sset.reshape(-1, len(self.R_OSset), 3)
-        return np.einsum("lij,nlj->nli", self.R_OSset, turns).reshape(-1, 3)
+        return rotate(self.R_OSset, self.d_Sset)
+
+
+def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
+    """Returns the (N, 3) directions of rays in a frame F.
+
+    Products are added in a fixed order: the result of a matrix library depends
+    on the processor.
+
+    Args:
+        R_FSset: (L, 3, 3) orientations of S, taken in turn.
+        d_Sset: (N, 3) directions.
+    """
+    x, y, z = d_Sset.reshape(-1, len(R_FSset), 3).transpose(2, 0, 1)
+    d_Fset = np.empty(d_Sset.shape)
+    for axis, (a, b, c) in enumerate(R_FSset.transpose(1, 2, 0)):
+        d_Fset[:, axis] = (a * x + b * y + c * z).ravel()
+    return d_Fset
 
 
 class Hits(NamedTuple):

@@ -11,25 +11,24 @@ from cns_drake.ray_casting.ray_casting_scene import (
     RayCastingScene,
     RayHits,
 )
+from cns_drake.ray_casting.rays import rotate
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
-from cns_drake.sensors.returns.counter_random import frame_key
-from cns_drake.sensors.returns.echo_choice import Echoes
 from cns_drake.sensors.returns.echoes import (
     Receiver,
     Reported,
-    choice_of,
     report_echoes,
 )
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides
-from cns_drake.sensors.returns.light import Light
-from cns_drake.sensors.returns.link_budget import LinkBudget
+from cns_drake.sensors.returns.light import BeamHits, join
 from cns_drake.sensors.returns.materials import Materials
-from cns_drake.sensors.returns.met import Met, rotate
-from cns_drake.sensors.returns.propagation import follow
-from cns_drake.sensors.returns.starting_rays import start_ways
-from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
+from cns_drake.sensors.returns.propagation import follow, start_ways
+from cns_drake.sensors.returns.random_numbers import frame_key
+from cns_drake.sensors.returns.unit_sheets import (
+    UNIT_SHEETS,
+    Echoes,
+    UnitSheet,
+)
 from cns_drake.sensors.returns.weather import (
-    Scattering,
     Weather,
     tabulate_scattering,
 )
@@ -104,34 +103,29 @@ class CalibratedReturns:
         return max_range + 8.0 * self.sheet.range_noise
 
     @cached_property
-    def _budget(self) -> LinkBudget:
-        return self.sheet.budget
-
-    @cached_property
     def _receivers(self) -> dict[tuple[float, float], Receiver]:
         return {}
 
     def _receiver(self, pattern: BeamPattern) -> Receiver:
-        """Returns the receiver of a pattern; earlier ones are kept."""
+        """Returns the receiver for a pattern; earlier ones are kept."""
         limits = pattern.min_range, pattern.max_range
         if limits not in self._receivers:
-            sheet = self.sheet
-            scattering = _no_scattering()
+            sheet, scattering = self.sheet, None
             if not self.weather.is_clear:
                 scattering = tabulate_scattering(
                     self.weather,
-                    self._budget,
+                    sheet.budget,
                     sheet.divergence,
                     sheet.resolution,
                     pattern.min_range,
                 )
             self._receivers[limits] = Receiver(
-                self._budget,
+                sheet.budget,
                 self.weather.extinction,
                 sheet.resolution,
                 *limits,
                 sheet.retro_from,
-                choice_of(self.echoes),
+                self.echoes,
                 scattering,
             )
         return self._receivers[limits]
@@ -171,7 +165,7 @@ class CalibratedReturns:
             with_normals=True,
         )
 
-        met = Met.of(rotate(R_WSset, turn.d_Sset), hits)
+        met = BeamHits.of(rotate(R_WSset, turn.d_Sset), hits)
 
         def cast(
             p_Wset: np.ndarray,
@@ -183,43 +177,34 @@ class CalibratedReturns:
                 p_Wset, d_Wset, reaches, times=when, with_normals=True
             )
 
+        receiver = self._receiver(pattern)
         divergence = self.sheet.divergence
         sides = find_sides(key, turn.beam, turn.orders, met, divergence, reach)
         # A single place for all is faster.
-        rows = sides.ray
+        rows = sides.row
         origins = p_WSset[rows % len(p_WSset)] if len(p_WSset) > 1 else p_WSset
         times = np.asarray(times, np.float32)
         when = times[rows % len(times)]
-        side_met = Met.of(
+        side_met = BeamHits.of(
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
         )
-        rest = np.ones(len(turn.beam))
-        meet_sides(sides, side_met, met, rest)
-        axes, at_sides, ways, ways_met = start_ways(
-            turn.beam,
-            turn.orders[1],
-            p_WSset,
-            times,
-            rest,
-            met,
-            sides,
-            side_met,
-            materials,
+        rest, side_met = meet_sides(sides, side_met, met)
+        light, ways, ways_met = start_ways(
+            turn.beam, p_WSset, times, rest, met, sides, side_met, materials
         )
         followed = follow(
             key,
             ways,
             ways_met,
             materials,
-            self._budget,
+            receiver.budget,
             divergence,
             reach,
             cast,
         )
         return report_echoes(
-            axes,
-            Light.sorted([at_sides, *followed]),
-            self._receiver(pattern),
+            join([light, *followed]),
+            receiver,
             key,
             len(turn.beam),
         )
@@ -242,8 +227,3 @@ class CalibratedTurn:
         self.orders = np.stack(
             [np.arange(len(self.beam)), np.argsort(self.beam)]
         )
-
-
-def _no_scattering() -> Scattering:
-    nothing = np.zeros(0)
-    return Scattering(nothing, nothing, np.zeros((0, 1)), nothing, nothing)

@@ -1,53 +1,54 @@
-"""Makes a unit's reported points from the returning light of each beam."""
+"""Echoes: what a unit reports of the returning light of each beam."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
-from cns_drake.sensors.returns.echo_choice import Echoes
-from cns_drake.sensors.returns.echo_detection import (
-    FIRST_ECHO_DRAW,
-    MOST_ECHOES,
-    detect,
-    is_detected,
-    measured_range,
-    merge,
-    reported_intensity,
-)
-from cns_drake.sensors.returns.light import Light
+from cns_drake.sensors.returns.light import Light, join, select
 from cns_drake.sensors.returns.link_budget import (
+    CERTAIN_SNR,
+    HOPELESS_SNR,
     LinkBudget,
+    detection_probability,
     echo_energy,
+    range_deviation,
     target_snr,
 )
+from cns_drake.sensors.returns.random_numbers import normal, uniform
+from cns_drake.sensors.returns.unit_sheets import Echoes
 from cns_drake.sensors.returns.weather import Scattering
-from cns_drake.sensors.returns.weather_echoes import (
-    MOST_DROPS,
-    SCATTERED,
-    add_drops,
-    first_drop,
-    fog_echo,
-)
 
-_CHOICE = {one: number for number, one in enumerate(Echoes)}
-_FIRST, _STRONGEST, _LAST, _DUAL = range(4)
+# The index of the weather, in place of a geometry's.
+SCATTERED = -2
+# Numbers of a beam's draws; lower ones serve the sub-rays and the leaves.
+_FIRST_ECHO_DRAW = 128
+_DRAWS_PER_ECHO = 4
+_FIRST_DROP_DRAW = 200
+# The most echoes of surfaces, and drops, of a beam that are processed.
+_MOST_ECHOES = 12
+_MOST_DROPS = 8
+# Energy of a retro-reflector that makes the intensity full: 10,000 times that
+# of a white target.
+_FULL_RETRO = 1e4
+_FULL_INTENSITY = 255.0
 
 
-class Receiver(NamedTuple):
+@dataclass(frozen=True)
+class Receiver:
     """The receiver of a unit.
 
     Attributes:
-        budget: its `LinkBudget`.
-        extinction: of the weather [1/m].
+        budget: its link budget.
+        extinction: the weather's [1/m].
         resolution: echoes nearer to each other are one [m].
         min_range, max_range: limits of reported ranges [m].
         retro_from: see `UnitSheet`.
-        choice: index of one of `Echoes`.
-        scattering: by the weather; empty in clear air.
+        choice: the echoes that it reports.
+        scattering: by the weather; None in clear air.
     """
 
     budget: LinkBudget
@@ -56,8 +57,8 @@ class Receiver(NamedTuple):
     min_range: float
     max_range: float
     retro_from: float
-    choice: int
-    scattering: Scattering
+    choice: Echoes
+    scattering: Scattering | None
 
 
 class Reported(NamedTuple):
@@ -77,17 +78,30 @@ class Reported(NamedTuple):
     geometry: np.ndarray
 
 
-def choice_of(echoes: Echoes) -> int:
-    """Returns the number of a choice in compiled code."""
-    return _CHOICE[echoes]
+class _Pulses(NamedTuple):
+    """N echoes of beams.
+
+    Attributes:
+        beam: (N,) number of the beam.
+        number: (N,) number of the echo in its beam.
+        distance: (N,) [m].
+        snr: (N,)
+        energy: (N,) as the unit infers it for clear air.
+        geometry: (N,) see `Reported`.
+        is_sure: (N,) whether it is detected in any case.
+    """
+
+    beam: np.ndarray
+    number: np.ndarray
+    distance: np.ndarray
+    snr: np.ndarray
+    energy: np.ndarray
+    geometry: np.ndarray
+    is_sure: np.ndarray
 
 
 def report_echoes(
-    axes: Light,
-    others: Light,
-    receiver: Receiver,
-    key: np.uint64,
-    num_beams: int,
+    light: Light, receiver: Receiver, key: np.uint64, num_beams: int
 ) -> Reported:
     """Returns the reported points of the light.
 
@@ -96,218 +110,238 @@ def report_echoes(
     has the standard deviation that belongs to that.
 
     Args:
-        axes: light sorted by beam, at most one part for each.
-        others: more light, sorted.
-        receiver: of the unit.
-        key: of the frame; see `frame_key`.
-        num_beams: of the turn.
+        light: all of the turn.
+        receiver: the unit's.
+        key: the frame's; see `frame_key`.
+        num_beams: number of beams of the turn.
     """
-    most = num_beams * (2 if receiver.choice == _DUAL else 1)
-    reported = Reported(
-        np.zeros(most, np.int64),
-        np.zeros(most, np.float32),
-        np.zeros(most, np.float32),
-        np.zeros(most, np.int32),
+    count = np.bincount(light.beam, minlength=num_beams)
+    is_alone = count[light.beam] == 1
+    alone = _single(select(light, is_alone), receiver)
+    merged = _merge(select(light, ~is_alone), receiver)
+    pulses = join([alone, merged])
+    scattering = receiver.scattering
+    if scattering is not None and scattering.counts[-1] > 0.0:
+        drops = _drops(pulses, receiver, scattering, key, num_beams)
+        pulses = join([pulses, drops])
+    pulses = _detect(pulses, receiver, key)
+    if scattering is not None and scattering.fog_energies[-1] > 0.0:
+        # A unit reports the broad echo of fog only without any other.
+        nearest = np.full(num_beams, np.inf)
+        np.minimum.at(nearest, light.beam, light.distance)
+        nearest[pulses.beam] = -np.inf
+        fog = _fog(nearest, receiver, scattering, key)
+        pulses = join([pulses, _detect(fog, receiver, key)])
+    chosen = select(pulses, _choose(pulses, receiver.choice, num_beams))
+    return Reported(
+        chosen.beam,
+        chosen.distance.astype(np.float32),
+        _intensity(receiver.retro_from, chosen.energy).astype(np.float32),
+        chosen.geometry,
     )
-    count = _report(axes, others, receiver, key, num_beams, reported)
-    return Reported(*(values[:count] for values in reported))
 
 
-@compiled
-def _report(
-    axes: Light,
-    others: Light,
+def _single(light: Light, receiver: Receiver) -> _Pulses:
+    """Returns the echo of each part of light."""
+    budget, extinction = receiver.budget, receiver.extinction
+    energy = light.energy
+    if extinction > 0.0:
+        energy = energy * np.exp(-2.0 * extinction * light.distance)
+    return _Pulses(
+        light.beam,
+        np.zeros_like(light.beam),
+        light.distance,
+        target_snr(budget, extinction, light.energy, light.distance),
+        energy,
+        light.geometry,
+        np.zeros(len(energy), bool),
+    )
+
+
+def _merge(light: Light, receiver: Receiver) -> _Pulses:
+    """Returns the echoes of beams with several parts of light each."""
+    budget = receiver.budget
+    light = select(light, np.lexsort((light.distance, light.beam)))
+    distance = light.distance
+    # An echo begins where a part is farther than a pulse from the beginning of
+    # the last one: the first part of each beam, then the second one, and so on.
+    first = np.flatnonzero(np.diff(light.beam, prepend=-1))
+    count = np.diff(first, append=len(distance))
+    start = np.full(len(first), -np.inf)
+    number = np.full(len(distance), -1)
+    for k in range(count.max(initial=0)):
+        row = np.flatnonzero(count > k)
+        part = first[row] + k
+        is_new = distance[part] - start[row] > receiver.resolution
+        start[row[is_new]] = distance[part[is_new]]
+        number[part] = is_new + (number[part - 1] if k else -1)
+    kept = number < _MOST_ECHOES
+    light, distance, number = select(light, kept), distance[kept], number[kept]
+
+    snr = target_snr(budget, receiver.extinction, light.energy, distance)
+    is_first = np.diff(light.beam, prepend=-1) | np.diff(number, prepend=-1)
+    echo = np.cumsum(is_first != 0) - 1
+    total = np.bincount(echo, snr)
+    mean = np.bincount(echo, snr * distance)
+    mean = np.divide(mean, total, out=np.zeros(len(total)), where=total > 0.0)
+    brightest = np.lexsort((-snr, echo))[np.flatnonzero(is_first)]
+    return _Pulses(
+        light.beam[brightest],
+        number[brightest],
+        mean,
+        total,
+        echo_energy(budget, total, mean),
+        light.geometry[brightest],
+        np.zeros(len(mean), bool),
+    )
+
+
+def _drops(
+    surfaces: _Pulses,
     receiver: Receiver,
+    scattering: Scattering,
     key: np.uint64,
     num_beams: int,
-    reported: Reported,
-) -> int:
-    """Fills in the reported points; returns their number."""
-    echo = np.zeros((MOST_ECHOES + MOST_DROPS + 1, 3))
-    source = np.zeros(len(echo), np.int32)
-    # All parts of the light of one beam: distance and energy, and from where.
-    most = _longest_run(others.beam) + 1
-    light, origin = np.zeros((most, 2)), np.zeros(most, np.int32)
-    budget, extinction = receiver.budget, receiver.extinction
-    min_range, max_range = receiver.min_range, receiver.max_range
-    resolution, choice = receiver.resolution, receiver.choice
-    retro_from = receiver.retro_from
-    # As names of their own, fields are fast.
-    axis_beam, other_beam = axes.beam, others.beam
-    axis_distance, other_distance = axes.distance, others.distance
-    axis_energy, other_energy = axes.energy, others.energy
-    axis_geometry, other_geometry = axes.geometry, others.geometry
-    to_beam, to_distance = reported.beam, reported.distance
-    to_intensity, to_geometry = reported.intensity, reported.geometry
-    distances, counts, energies, fog_energies, fog_counts = receiver.scattering
-    is_clear = len(distances) == 0
-    is_fog = not is_clear and fog_energies[-1] > 0.0
-    all_drops = 0.0 if is_clear else counts[-1]
-    count, axis, other = 0, 0, 0
-    for beam in range(num_beams):
-        first_axis, first_other = axis, other
-        if axis < len(axis_beam) and axis_beam[axis] == beam:
-            axis += 1
-        while other < len(other_beam) and other_beam[other] == beam:
-            other += 1
-        number = axis - first_axis + other - first_other
-        # Most beams have at most a single echo: the first drop is beyond the
-        # farthest end of a beam.
-        if number <= 1 and (
-            all_drops == 0.0 or first_drop(key, beam) >= all_drops
-        ):
-            near, energy, geometry = math.inf, 0.0, SCATTERED
-            if axis > first_axis:
-                near = axis_distance[first_axis]
-                energy = axis_energy[first_axis]
-                geometry = axis_geometry[first_axis]
-            elif other > first_other:
-                near = other_distance[first_other]
-                energy = other_energy[first_other]
-                geometry = other_geometry[first_other]
-            elif not is_fog:
-                continue
-            snr = target_snr(budget, extinction, energy, near)
-            distance = near
-            if is_fog:
-                # Rounded like the mean of several parts.
-                distance = snr * near / snr if snr > 0.0 else 0.0
-            is_seen = min_range <= distance <= max_range and is_detected(
-                key, beam, FIRST_ECHO_DRAW, snr
-            )
-            if is_fog and not is_seen:
-                # A unit reports the broad echo of fog only without any other.
-                distance, snr = fog_echo(
-                    budget,
-                    extinction,
-                    distances,
-                    fog_energies,
-                    fog_counts,
-                    key,
-                    beam,
-                )
-                geometry = SCATTERED
-                is_seen = (
-                    distance <= near
-                    and min_range <= distance <= max_range
-                    and is_detected(key, beam, FIRST_ECHO_DRAW, snr)
-                )
-            if not is_seen:
-                continue
-            if is_fog:
-                energy = echo_energy(budget, snr, distance)
-            elif extinction > 0.0:
-                energy *= np.exp(-2.0 * extinction * distance)
-            to_beam[count] = beam
-            to_distance[count] = measured_range(
-                budget,
-                min_range,
-                max_range,
-                key,
+) -> _Pulses:
+    """Returns the echoes of drops in front of surfaces.
+
+    Args:
+        surfaces: their echoes.
+        receiver: the unit's.
+        scattering: its detected echoes of drops.
+        key: the frame's.
+        num_beams: number of beams of the turn.
+    """
+    distances, counts = scattering.distances, scattering.counts
+    end = np.full(num_beams, receiver.max_range)
+    # A surface that sends no light back counts as the nearest.
+    near = np.where(surfaces.snr > 0.0, surfaces.distance, 0.0)
+    np.minimum.at(end, surfaces.beam, near)
+    mean = np.interp(end, distances, counts)
+    number = np.bincount(surfaces.beam, minlength=num_beams)
+    # Drops are arrivals of a Poisson process, in units of their mean number.
+    beam, arrived = np.arange(num_beams), np.zeros(num_beams)
+    found = [select(surfaces, np.zeros(0, np.int64))]
+    for k in range(_MOST_DROPS):
+        draw = _FIRST_DROP_DRAW + 2 * k
+        arrived = arrived - np.log(1.0 - uniform(key, beam, draw))
+        is_near = arrived < mean[beam]
+        beam, arrived = beam[is_near], arrived[is_near]
+        if not len(beam):
+            break
+        distance = np.interp(arrived, counts, distances)
+        row = np.searchsorted(distances, distance)
+        row = np.minimum(row, len(distances) - 1)
+        column = uniform(key, beam, draw + 1) * scattering.energies.shape[1]
+        energy = scattering.energies[row, column.astype(int)]
+        snr = target_snr(receiver.budget, receiver.extinction, energy, distance)
+        found.append(
+            _Pulses(
                 beam,
-                FIRST_ECHO_DRAW,
+                number[beam] + k,
                 distance,
                 snr,
+                echo_energy(receiver.budget, snr, distance),
+                np.full(len(beam), SCATTERED, np.int32),
+                # Drops in the table are detected already.
+                np.ones(len(beam), bool),
             )
-            to_intensity[count] = reported_intensity(retro_from, energy)
-            to_geometry[count] = geometry
-            count += 1
-            continue
-        number = 0
-        while first_axis < axis or first_other < other:
-            if first_axis < axis and (
-                first_other == other
-                or axis_distance[first_axis] <= other_distance[first_other]
-            ):
-                light[number, 0] = axis_distance[first_axis]
-                light[number, 1] = axis_energy[first_axis]
-                origin[number] = axis_geometry[first_axis]
-                first_axis += 1
-            else:
-                light[number, 0] = other_distance[first_other]
-                light[number, 1] = other_energy[first_other]
-                origin[number] = other_geometry[first_other]
-                first_other += 1
-            number += 1
-        size = merge(
-            light, origin, number, budget, extinction, resolution, echo, source
         )
-        if not is_clear:
-            size = add_drops(
-                budget,
-                extinction,
-                max_range,
-                distances,
-                counts,
-                energies,
-                key,
-                beam,
-                echo,
-                source,
-                size,
-            )
-        size = detect(
-            budget, min_range, max_range, key, beam, echo, source, size
-        )
-        if size == 0 and is_fog:
-            distance, snr = fog_echo(
-                budget,
-                extinction,
-                distances,
-                fog_energies,
-                fog_counts,
-                key,
-                beam,
-            )
-            if number == 0 or distance <= light[0, 0]:
-                echo[0, 0], echo[0, 1], echo[0, 2] = distance, snr, 0.0
-                source[0] = SCATTERED
-                size = detect(
-                    budget, min_range, max_range, key, beam, echo, source, 1
-                )
-        if size == 0:
-            continue
-        best, first, farthest = 0, 0, 0
-        for i in range(1, size):
-            if echo[i, 1] > echo[best, 1]:
-                best = i
-            if echo[i, 0] < echo[first, 0]:
-                first = i
-            if echo[i, 0] > echo[farthest, 0]:
-                farthest = i
-        if choice == _FIRST:
-            best = first
-        elif choice == _LAST:
-            best = farthest
-        to_beam[count] = beam
-        to_distance[count] = echo[best, 0]
-        to_intensity[count] = reported_intensity(retro_from, echo[best, 2])
-        to_geometry[count] = source[best]
-        count += 1
-        if choice == _DUAL and size > 1:
-            # The last one as well, or the second strongest if the last is the
-            # strongest.
-            second = farthest
-            if second == best:
-                second = 0 if best != 0 else 1
-                for i in range(size):
-                    if i != best and echo[i, 1] > echo[second, 1]:
-                        second = i
-            to_beam[count] = beam
-            to_distance[count] = echo[second, 0]
-            to_intensity[count] = reported_intensity(
-                retro_from, echo[second, 2]
-            )
-            to_geometry[count] = source[second]
-            count += 1
-    return count
+    return join(found)
 
 
-@compiled
-def _longest_run(numbers: np.ndarray) -> int:
-    """Returns how many equal numbers follow each other at most."""
-    longest, length = 0, 0
-    for i in range(len(numbers)):
-        length = length + 1 if i and numbers[i] == numbers[i - 1] else 1
-        longest = max(longest, length)
-    return longest
+def _fog(
+    nearest: np.ndarray,
+    receiver: Receiver,
+    scattering: Scattering,
+    key: np.uint64,
+) -> _Pulses:
+    """Returns the echoes of fog in front of the nearest light of beams.
+
+    Args:
+        nearest: (num_beams,) distance of that light [m].
+        receiver: the unit's.
+        scattering: its echoes of fog.
+        key: the frame's.
+    """
+    beam = np.flatnonzero(nearest > 0.0)
+    share = uniform(key, beam, _FIRST_DROP_DRAW + 2 * _MOST_DROPS)
+    distance = np.interp(share, scattering.fog_counts, scattering.distances)
+    is_near = distance <= nearest[beam]
+    beam, distance = beam[is_near], distance[is_near]
+    energy = np.interp(distance, scattering.distances, scattering.fog_energies)
+    snr = target_snr(receiver.budget, receiver.extinction, energy, distance)
+    return _Pulses(
+        beam,
+        np.zeros_like(beam),
+        distance,
+        snr,
+        echo_energy(receiver.budget, snr, distance),
+        np.full(len(beam), SCATTERED, np.int32),
+        np.zeros(len(beam), bool),
+    )
+
+
+def _detect(pulses: _Pulses, receiver: Receiver, key: np.uint64) -> _Pulses:
+    """Returns the echoes that are detected, with errors of their ranges."""
+    # Where a surface lies decides; an error of its range does not.
+    is_seen = pulses.is_sure | (pulses.snr >= HOPELESS_SNR)
+    is_seen &= receiver.min_range <= pulses.distance
+    is_seen &= pulses.distance <= receiver.max_range
+    seen = select(pulses, is_seen)
+    draw = np.minimum(seen.number, _MOST_ECHOES)
+    draw = _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * draw
+    unsure = np.flatnonzero(~seen.is_sure & (seen.snr <= CERTAIN_SNR))
+    is_missed = uniform(
+        key, seen.beam[unsure], draw[unsure]
+    ) >= detection_probability(seen.snr[unsure])
+    kept = np.ones(len(draw), bool)
+    kept[unsure[is_missed]] = False
+    seen, draw = select(seen, kept), draw[kept]
+    error = range_deviation(receiver.budget, seen.snr)
+    error *= normal(key, seen.beam, draw + 1)
+    return seen._replace(
+        distance=np.clip(
+            seen.distance + error, receiver.min_range, receiver.max_range
+        )
+    )
+
+
+def _choose(pulses: _Pulses, choice: Echoes, num_beams: int) -> np.ndarray:
+    """Returns the rows of the reported echoes, in the order of their beams."""
+    beam = pulses.beam
+    count = np.bincount(beam, minlength=num_beams)[beam]
+    chosen = [np.flatnonzero(count == 1)]
+    several = np.flatnonzero(count > 1)
+
+    def sort_by(values: np.ndarray) -> np.ndarray:
+        keys = (pulses.number[several], values[several], beam[several])
+        return several[np.lexsort(keys)]
+
+    by_snr = sort_by(-pulses.snr)
+    # Where the echoes of each of these beams begin.
+    first = np.flatnonzero(np.diff(beam[by_snr], prepend=-1))
+    if choice == Echoes.FIRST:
+        chosen.append(sort_by(pulses.distance)[first])
+    elif choice == Echoes.LAST:
+        chosen.append(sort_by(-pulses.distance)[first])
+    else:
+        strongest = by_snr[first]
+        chosen.append(strongest)
+    if choice == Echoes.DUAL:
+        # The second strongest if the last is the strongest.
+        last = sort_by(-pulses.distance)[first]
+        chosen.append(np.where(last == strongest, by_snr[first + 1], last))
+    rows = np.concatenate(chosen)
+    return rows[np.argsort(beam[rows], kind="stable")]
+
+
+def _intensity(retro_from: float, energy: np.ndarray) -> np.ndarray:
+    """Returns the calibrated reflectivity in the scale of the unit.
+
+    It is a whole number: linear up to a reflectivity of 1, logarithmic above.
+    """
+    rest = _FULL_INTENSITY - retro_from
+    part = np.log(np.maximum(energy, 1.0)) / math.log(_FULL_RETRO)
+    above = np.minimum(retro_from + rest * part, _FULL_INTENSITY)
+    return np.rint(np.where(energy <= 1.0, retro_from * energy, above))

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.sensors.returns.counter_random import uniform
-from cns_drake.sensors.returns.met import Met
+from cns_drake.sensors.returns.light import BeamHits, dot, select
+from cns_drake.sensors.returns.random_numbers import uniform
 
 # Numbers of a beam's draws for the rays at its sides, two each.
 _SIDE_DRAW = 0
@@ -31,7 +31,7 @@ class Sides(NamedTuple):
     """P rays in those parts of beams that are next to an edge.
 
     Attributes:
-        ray: (P,) row of the beam.
+        row: (P,) row of the beam.
         neighbour: (P,) row of the beam beyond the edge.
         number: (P,) number of the side of the beam: 0 and 1 in the first order
             of beams, 2 and 3 in the second one.
@@ -40,7 +40,7 @@ class Sides(NamedTuple):
         reach: (P,) float32: beyond the nearer of both surfaces [m].
     """
 
-    ray: np.ndarray
+    row: np.ndarray
     neighbour: np.ndarray
     number: np.ndarray
     share: np.ndarray
@@ -52,7 +52,7 @@ def find_sides(
     key: np.uint64,
     beam: np.ndarray,
     orders: np.ndarray,
-    met: Met,
+    hits: BeamHits,
     divergence: float,
     max_range: float,
 ) -> Sides:
@@ -63,200 +63,180 @@ def find_sides(
     between them: within one of their beams, or in the gap.
 
     Args:
-        key: of the frame; see `frame_key`.
+        key: the frame's; see `frame_key`.
         beam: (N,) number of each beam.
         orders: (2, N) orders of the rays in which neighbours follow.
-        met: by the axes of the beams.
+        hits: by the axes of the beams.
         divergence: half angle of a beam [rad].
-        max_range: of the rays [m].
+        max_range: range of the rays [m].
     """
-    ray = np.empty(2 * orders.size, np.int64)
-    neighbour, number = np.empty_like(ray), np.empty_like(ray)
-    side_of = np.full((len(beam), 2 * len(orders)), -1, np.int32)
-    count = _find_jumps(
-        orders, met, divergence, side_of, ray, neighbour, number
+    farthest = _NEIGHBOURS * divergence
+    edges = [_find_edges(order, hits, farthest) for order in orders]
+    row = np.concatenate([pairs.ravel() for pairs in edges])
+    neighbour = np.concatenate([pairs[:, ::-1].ravel() for pairs in edges])
+    number = np.concatenate(
+        [np.tile([2 * k, 2 * k + 1], len(edges[k])) for k in range(len(edges))]
     )
-    sides = Sides(
-        ray[:count],
-        neighbour[:count],
-        number[:count],
-        np.empty(count),
-        np.empty((count, 3)),
-        np.empty(count, np.float32),
+    # Unit vectors across the beams, to the neighbours.
+    d, d_j = hits.d_Wset[row], hits.d_Wset[neighbour]
+    toward = d_j - dot(d, d_j)[:, None] * d
+    toward /= np.sqrt(dot(toward, toward))[:, None]
+    share = _share(len(beam), row, number, toward)
+    kept = share > 0.0
+    row, neighbour, number = row[kept], neighbour[kept], number[kept]
+    d, toward, share = d[kept], toward[kept], share[kept]
+
+    # Random places of the sides.
+    draw = _SIDE_DRAW + 2 * number
+    rest = 1.0 - uniform(key, beam[row], draw)
+    radius = divergence * np.sqrt(-0.5 * np.log(rest))
+    turn = uniform(key, beam[row], draw + 1) - 0.5
+    angle = 2.0 * np.pi * share * turn
+    d_Wset = (
+        d
+        + (radius * np.cos(angle))[:, None] * toward
+        + (radius * np.sin(angle))[:, None] * np.cross(d, toward)
     )
-    _face_neighbours(met, sides)
-    _share(side_of, sides)
-    is_twin = sides.share == 0.0
-    if is_twin.any():
-        sides = Sides(*(values[~is_twin] for values in sides))
-    _aim(key, beam, met, divergence, max_range, sides)
-    return sides
+    d_Wset /= np.sqrt(dot(d_Wset, d_Wset))[:, None]
+    is_nearer = hits.ranges[row] <= hits.ranges[neighbour]
+    near = select(hits, np.where(is_nearer, row, neighbour))
+    far_range = hits.ranges[np.where(is_nearer, neighbour, row)]
+    reach = np.maximum(_range_on(near, d_Wset), near.ranges)
+    reach = np.minimum(reach, far_range) + (_JUMP + _JUMP_PART * near.ranges)
+    reach = np.minimum(reach, max_range).astype(np.float32)
+    return Sides(row, neighbour, number, share, d_Wset, reach)
 
 
-@compiled
-def _find_jumps(
-    orders: np.ndarray,
-    met: Met,
-    divergence: float,
-    side_of: np.ndarray,
-    ray: np.ndarray,
-    neighbour: np.ndarray,
-    number: np.ndarray,
-) -> int:
-    """Fills in the first fields of `Sides`; returns the number of sides."""
-    # Chord and angle are the same at this size.
-    farthest = (_NEIGHBOURS * divergence) ** 2
-    count = 0
-    for way in range(len(orders)):
-        for k in range(orders.shape[1] - 1):
-            i, j = orders[way, k], orders[way, k + 1]
-            if met.geometry[i] < 0 and met.geometry[j] < 0:
-                continue
-            apart = 0.0
-            for axis in range(3):
-                apart += (met.d_Wset[i, axis] - met.d_Wset[j, axis]) ** 2
-            if apart > farthest or apart == 0.0 or _touch(met, i, met, j):
-                continue
-            side_of[i, 2 * way], side_of[j, 2 * way + 1] = count, count + 1
-            ray[count], neighbour[count], number[count] = i, j, 2 * way
-            count += 1
-            ray[count], neighbour[count], number[count] = j, i, 2 * way + 1
-            count += 1
-    return count
-
-
-@compiled
-def _face_neighbours(met: Met, sides: Sides) -> None:
-    """Sets directions to unit vectors across the beams, to the neighbours."""
-    for side in range(len(sides.ray)):
-        d = met.d_Wset[sides.ray[side]]
-        d_j = met.d_Wset[sides.neighbour[side]]
-        along = d[0] * d_j[0] + d[1] * d_j[1] + d[2] * d_j[2]
-        square = 0.0
-        for axis in range(3):
-            sides.d_Wset[side, axis] = d_j[axis] - along * d[axis]
-            square += sides.d_Wset[side, axis] ** 2
-        length = np.sqrt(square)
-        for axis in range(3):
-            sides.d_Wset[side, axis] /= length
-
-
-@compiled
-def _share(side_of: np.ndarray, sides: Sides) -> None:
-    """Fills in the parts of the light, after `_face_neighbours`.
+def _share(
+    num_beams: int, row: np.ndarray, number: np.ndarray, toward: np.ndarray
+) -> np.ndarray:
+    """Returns the (P,) part of the light at each side.
 
     A side has half of the beam, or a quarter if there are edges at other sides,
     too. A second neighbour on the same side has no part.
+
+    Args:
+        num_beams: the number of beams.
+        row, number: see `Sides`.
+        toward: (P, 3) directions to the neighbours.
     """
-    for side in range(len(sides.ray)):
-        share = 0.5
-        for other in side_of[sides.ray[side]]:
-            if other < 0 or other == side:
-                continue
-            along = 0.0
-            for axis in range(3):
-                along += sides.d_Wset[side, axis] * sides.d_Wset[other, axis]
-            if abs(along) < 0.5:
-                share = min(share, 0.25)
-            elif along > 0.0 and other < side:
-                share = 0.0
-        sides.share[side] = share
+    sides = np.arange(len(row))
+    side_of = np.full((num_beams, 4), -1)
+    side_of[row, number] = sides
+    share = np.full(len(row), 0.5)
+    is_twin = np.zeros(len(row), bool)
+    for others in side_of[row].T:
+        side = np.flatnonzero((others >= 0) & (others != sides))
+        other = others[side]
+        along = dot(toward[side], toward[other])
+        share[side[np.abs(along) < 0.5]] = 0.25
+        is_twin[side[(along >= 0.5) & (other < side)]] = True
+    share[is_twin] = 0.0
+    return share
 
 
-@compiled
-def _aim(
-    key: np.uint64,
-    beam: np.ndarray,
-    met: Met,
-    divergence: float,
-    max_range: float,
-    sides: Sides,
-) -> None:
-    """Turns directions to random places of the sides; fills in the reach."""
-    u = np.empty(3)
-    for side in range(len(sides.ray)):
-        i, j = sides.ray[side], sides.neighbour[side]
-        d, d_W = met.d_Wset[i], sides.d_Wset[side]
-        for axis in range(3):
-            u[axis] = d_W[axis]
-        draw = _SIDE_DRAW + 2 * sides.number[side]
-        rest = 1.0 - uniform(key, beam[i], draw)
-        radius = divergence * np.sqrt(-0.5 * np.log(rest))
-        turn = uniform(key, beam[i], draw + 1) - 0.5
-        angle = 2.0 * np.pi * sides.share[side] * turn
-        toward, across = radius * np.cos(angle), radius * np.sin(angle)
-        d_W[0] = d[0] + toward * u[0] + across * (d[1] * u[2] - d[2] * u[1])
-        d_W[1] = d[1] + toward * u[1] + across * (d[2] * u[0] - d[0] * u[2])
-        d_W[2] = d[2] + toward * u[2] + across * (d[0] * u[1] - d[1] * u[0])
-        length = np.sqrt(d_W[0] ** 2 + d_W[1] ** 2 + d_W[2] ** 2)
-        for axis in range(3):
-            d_W[axis] /= length
-        near, far = (i, j) if met.ranges[i] <= met.ranges[j] else (j, i)
-        reach = _range_on(met, near, d_W)
-        reach = min(max(reach, met.ranges[near]), met.ranges[far])
-        sides.reach[side] = min(reach + _limit(met.ranges[near]), max_range)
-
-
-@compiled
-def meet_sides(sides: Sides, side_met: Met, met: Met, rest: np.ndarray) -> None:
-    """Subtracts from beams the light of other surfaces at their sides.
+def meet_sides(
+    sides: Sides, side_hits: BeamHits, hits: BeamHits
+) -> tuple[np.ndarray, BeamHits]:
+    """Divides the light of beams among their axes and their sides.
 
     A ray that passes the nearer of two surfaces has met the farther one, on its
     plane.
 
     Args:
         sides: see `find_sides`.
-        side_met: by their rays within their reach. Rays that meet the surface
-            of their beam become misses, those that pass the nearer surface
-            become hits.
-        met: by the axes of the beams.
-        rest: (N,) part of each beam's light, to lessen.
+        side_hits: by their rays within their reach.
+        hits: by the axes of N beams.
+
+    Returns:
+        The (N,) part of each beam's light that its axis stands for; and the
+        hits by the rays of sides. Those that meet the surface of their beam
+        become misses, those that pass the nearer surface become hits.
     """
-    for side in range(len(sides.ray)):
-        i, j = sides.ray[side], sides.neighbour[side]
-        if side_met.geometry[side] < 0:
-            if met.ranges[i] > met.ranges[j]:
-                continue
-            rest[i] -= sides.share[side]
-            if met.geometry[j] < 0:
-                continue
-            distance = _range_on(met, j, sides.d_Wset[side])
-            if not sides.reach[side] < distance < 2.0 * met.ranges[j]:
-                distance = met.ranges[j]
-            side_met.ranges[side] = distance
-            side_met.geometry[side] = met.geometry[j]
-            side_met.is_outside[side] = met.is_outside[j]
-            side_met.cosine[side] = met.cosine[j]
-            for axis in range(3):
-                side_met.normals_W[side, axis] = met.normals_W[j, axis]
-        elif met.geometry[i] >= 0 and _touch(met, i, side_met, side):
-            side_met.geometry[side] = -1
-        else:
-            rest[i] -= sides.share[side]
+    beyond = select(hits, sides.neighbour)
+    is_miss = side_hits.geometry < 0
+    passes = is_miss & (hits.ranges[sides.row] <= beyond.ranges)
+    is_own = _find_touching(sides.row, hits, side_hits)
+    is_lit = np.where(is_miss, passes, ~is_own)
+    rest = np.ones(len(hits.ranges))
+    np.subtract.at(rest, sides.row[is_lit], sides.share[is_lit])
+
+    distance = _range_on(beyond, sides.d_Wset)
+    is_far = (sides.reach < distance) & (distance < 2.0 * beyond.ranges)
+    distance = np.where(is_far, distance, beyond.ranges)
+    met = beyond._replace(
+        d_Wset=sides.d_Wset, ranges=distance.astype(np.float32)
+    )
+    passes &= beyond.geometry >= 0
+    shown = BeamHits(
+        *(
+            np.where(passes if new.ndim == 1 else passes[:, None], new, old)
+            for new, old in zip(met, side_hits, strict=True)
+        )
+    )
+    shown.geometry[is_own] = -1
+    return rest, shown
 
 
-@compiled
-def _limit(distance: float) -> float:
-    """Returns the greatest difference of ranges on one surface [m]."""
-    return _JUMP + _JUMP_PART * distance
+def _range_on(hits: BeamHits, d_Wset: np.ndarray) -> np.ndarray:
+    """Returns the (N,) ranges of rays at the planes of hits [m].
 
+    It is inf where a ray does not meet the plane, or there is no hit.
 
-@compiled
-def _range_on(met: Met, i: int, d_W: np.ndarray) -> float:
-    """Returns a ray's range at the plane of the i-th ray's hit [m].
-
-    It is inf if the ray does not meet the plane, or the i-th ray is a miss.
+    Args:
+        hits: N of them.
+        d_Wset: (N, 3) directions of the rays.
     """
-    along = 0.0
-    for axis in range(3):
-        along -= met.normals_W[i, axis] * d_W[axis]
-    if met.geometry[i] < 0 or along <= 0.0:
-        return np.inf
-    return met.cosine[i] * met.ranges[i] / along
+    along = -dot(hits.normals_W, d_Wset)
+    result = np.full(len(along), np.inf)
+    k = np.flatnonzero((hits.geometry >= 0) & (along > 0.0))
+    result[k] = hits.cosine[k] * hits.ranges[k] / along[k]
+    return result
 
 
 @compiled
-def _touch(a: Met, i: int, b: Met, j: int) -> bool:
+def _find_edges(
+    order: np.ndarray, hits: BeamHits, farthest: float
+) -> np.ndarray:
+    """Returns the (E, 2) rows of neighbours with an edge between them.
+
+    NumPy takes five times as long, a tenth of a frame.
+
+    Args:
+        order: (N,) rows of the beams, neighbours beside each other.
+        hits: by the axes of the beams.
+        farthest: greatest angle between neighbours [rad].
+    """
+    edges, count = np.empty((len(order), 2), np.int64), 0
+    for k in range(len(order) - 1):
+        i, j = order[k], order[k + 1]
+        square = 0.0
+        for axis in range(3):
+            # Chord and angle are the same at this size.
+            square += (hits.d_Wset[i, axis] - hits.d_Wset[j, axis]) ** 2
+        if (
+            0.0 < square <= farthest**2
+            and (hits.geometry[i] >= 0 or hits.geometry[j] >= 0)
+            and not _touch(hits, i, hits, j)
+        ):
+            edges[count, 0], edges[count, 1] = i, j
+            count += 1
+    return edges[:count]
+
+
+@compiled
+def _find_touching(
+    rows: np.ndarray, hits: BeamHits, side_hits: BeamHits
+) -> np.ndarray:
+    """Returns the (P,) bool whether each side meets its beam's surface."""
+    touch = np.empty(len(rows), np.bool_)
+    for side in range(len(rows)):
+        touch[side] = _touch(hits, rows[side], side_hits, side)
+    return touch
+
+
+@compiled
+def _touch(a: BeamHits, i: int, b: BeamHits, j: int) -> bool:
     """Returns whether the planes of two places are one, or meet in between.
 
     Args:
@@ -271,10 +251,10 @@ def _touch(a: Met, i: int, b: Met, j: int) -> bool:
         ij -= a.normals_W[i, axis] * b.d_Wset[j, axis]
         ji -= b.normals_W[j, axis] * a.d_Wset[i, axis]
     ii, jj = a.cosine[i], b.cosine[j]
-    range_i, range_j = a.ranges[i], b.ranges[j]
-    after = ij * range_j - ii * range_i
-    before = jj * range_j - ji * range_i
-    if min(abs(after), abs(before)) <= _limit(min(range_i, range_j)):
+    after = ij * b.ranges[j] - ii * a.ranges[i]
+    before = jj * b.ranges[j] - ji * a.ranges[i]
+    limit = _JUMP + _JUMP_PART * min(a.ranges[i], b.ranges[j])
+    if min(abs(after), abs(before)) <= limit:
         return True
     # The inverse of the distance to a plane is linear from i to j. At a corner,
     # the nearer plane changes in between.

@@ -1,20 +1,80 @@
-"""The light that comes back along the beams of a turn."""
+"""What the rays of beams have met, and the light that comes back along them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
+from cns_drake.ray_casting.ray_casting_scene import RayHits
+from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
+
+# The sheeting of signs and plates works up to this angle of incidence.
+_RETRO_COSINE = np.cos(np.deg2rad(60.0))
+
+# A named tuple of arrays with as many rows each.
+_Table = TypeVar("_Table", bound=Any)
+
+
+def select(table: _Table, rows: np.ndarray) -> _Table:
+    """Returns some rows of a table, by their numbers or a mask."""
+    if rows.dtype == bool:
+        rows = np.flatnonzero(rows)
+    return table._make(values.take(rows, axis=0) for values in table)
+
+
+def join(tables: Sequence[_Table]) -> _Table:
+    """Returns the rows of several tables, one table after the other."""
+    return tables[0]._make(map(np.concatenate, zip(*tables, strict=True)))
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Returns the scalar products of vectors, (N, 3) each.
+
+    They are added in a fixed order: the result of a matrix library depends on
+    the processor.
+    """
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
+class BeamHits(NamedTuple):
+    """The hits of N rays.
+
+    Attributes:
+        d_Wset: (N, 3) float64 directions.
+        ranges: (N,) float64, single precision [m]; inf for a miss.
+        geometry: (N,) int32, -1 for a miss.
+        normals_W: (N, 3) float32 towards the origin, zero for a miss.
+        is_outside: (N,) bool, whether the outside of a surface was met.
+        cosine: (N,) float64 cosine of the angle of incidence.
+    """
+
+    d_Wset: np.ndarray
+    ranges: np.ndarray
+    geometry: np.ndarray
+    normals_W: np.ndarray
+    is_outside: np.ndarray
+    cosine: np.ndarray
+
+    @classmethod
+    def of(cls, d_Wset: np.ndarray, hits: RayHits) -> BeamHits:
+        """Returns the hits of rays that were cast with normals."""
+        return cls(
+            d_Wset,
+            hits.ranges.astype(float),
+            hits.geometry,
+            hits.normals_W,
+            hits.is_outside,
+            np.clip(-dot(hits.normals_W, d_Wset), 0.0, 1.0),
+        )
 
 
 class Light(NamedTuple):
-    """N parts of the returning light, sorted by beam and distance.
+    """N parts of the returning light.
 
     Attributes:
-        beam: (N,) int32.
+        beam: (N,) int64 number of its beam.
         distance: (N,) float64, from the time of flight [m].
         energy: (N,) float64: reflectivity, cosine of incidence, and the part of
             the beam that got there and back.
@@ -26,48 +86,27 @@ class Light(NamedTuple):
     energy: np.ndarray
     geometry: np.ndarray
 
-    @classmethod
-    def room_for(cls, count: int) -> Light:
-        """Returns parts to fill in."""
-        return cls(
-            np.empty(count, np.int32),
-            np.empty(count),
-            np.empty(count),
-            np.empty(count, np.int32),
-        )
 
-    def first(self, count: int) -> Light:
-        """Returns the first parts."""
-        return Light(*(values[:count] for values in self))
+def reflect(
+    beam: np.ndarray,
+    share: np.ndarray,
+    distance: np.ndarray,
+    geometry: np.ndarray,
+    cosine: np.ndarray,
+    materials: Materials,
+) -> Light:
+    """Returns the light that surfaces reflect.
 
-    @classmethod
-    def sorted(cls, parts: Sequence[Light]) -> Light:
-        """Returns all parts in order."""
-        unsorted = cls(
-            *(np.concatenate(values) for values in zip(*parts, strict=True))
-        )
-        order = np.zeros(len(unsorted.beam), np.int64)
-        _sort(unsorted.beam, unsorted.distance, order)
-        return cls(*(values[order] for values in unsorted))
-
-
-@compiled
-def _sort(beam: np.ndarray, distance: np.ndarray, order: np.ndarray) -> None:
-    """Fills in the order by beam and distance; equal ones keep theirs."""
-    if not len(beam):
-        return
-    begin = np.zeros(beam.max() + 2, np.int64)
-    for one in beam:
-        begin[one + 1] += 1
-    begin = np.cumsum(begin)
-    size = np.zeros(len(begin), np.int64)
-    for i in range(len(beam)):
-        # The few parts of a beam are sorted by insertion.
-        place = begin[beam[i]] + size[beam[i]]
-        size[beam[i]] += 1
-        while (
-            place > begin[beam[i]] and distance[order[place - 1]] > distance[i]
-        ):
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = i
+    Args:
+        beam: (N,) number of each ray's beam.
+        share: (N,) part of the beam that each ray stands for.
+        distance: (N,) whole way of the light to the surface [m].
+        geometry: (N,) index of the surface.
+        cosine: (N,) cosine of the angle of incidence.
+        materials: of all geometries.
+    """
+    kind = materials.kind[geometry]
+    factor = np.where(kind == BEADS, 1.0, cosine)
+    factor = np.where(kind == RETRO, cosine > _RETRO_COSINE, factor)
+    energy = share * materials.reflectivity[geometry] * factor
+    return Light(beam, distance, energy, geometry)

@@ -19,8 +19,8 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-
-from cns_drake.base.compiled import compiled
+from numpy.typing import ArrayLike
+from scipy.special import erf
 
 # The SNR that a unit detects in half of all cases: Ouster's sheet of the OS1
 # (first generation) states 10 cm of range noise at an SNR of 12, its lowest.
@@ -89,49 +89,48 @@ def fit_link_budget(
     return LinkBudget(scale, extinction, range_noise, range_floor)
 
 
-@compiled
 def target_snr(
-    budget: LinkBudget, extinction: float, energy: float, distance: float
-) -> float:
-    """Returns the SNR of a target.
+    budget: LinkBudget,
+    extinction: float,
+    energy: np.ndarray,
+    distance: np.ndarray,
+) -> np.ndarray:
+    """Returns the SNR of targets.
 
     Args:
-        budget: a `LinkBudget`.
-        extinction: of the weather [1/m].
+        budget: the unit's.
+        extinction: the weather's [1/m].
         energy: reflectivity times cosine of incidence.
-        distance: to the target, positive [m].
+        distance: distances to the targets, positive [m].
     """
     loss = 2.0 * (extinction + budget.own_extinction) * distance
     return budget.scale * energy * np.exp(-loss) / (distance * distance)
 
 
-@compiled
-def detection_probability(snr: float) -> float:
+def detection_probability(snr: ArrayLike) -> np.ndarray:
     """Returns the probability that an echo of an SNR is detected.
 
     The count of photons, whose mean is the SNR and whose spread is the root
     of that (shot noise), is compared with a threshold.
     """
-    if snr <= 0.0:
-        return 0.0
-    if snr > CERTAIN_SNR:
-        return 1.0
-    deviation = (snr - THRESHOLD_SNR) / np.sqrt(snr)
-    return 0.5 * (1.0 + math.erf(deviation / np.sqrt(2.0)))
+    snr = np.asarray(snr)
+    deviation = (snr - THRESHOLD_SNR) / np.sqrt(np.maximum(snr, 1e-9))
+    probability = 0.5 * (1.0 + erf(deviation / np.sqrt(2.0)))
+    return np.where(snr > CERTAIN_SNR, 1.0, probability)
 
 
-@compiled
-def range_deviation(budget: LinkBudget, snr: float) -> float:
-    """Returns the standard deviation of a range [m].
+def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
+    """Returns the standard deviation of ranges [m].
 
     It falls with the root of the SNR (Wagner et al., 2006), down to a limit by
     the unit's clock and the shape of its pulses.
     """
-    return max(budget.range_noise / np.sqrt(snr), budget.range_floor)
+    return np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
 
 
-@compiled
-def echo_energy(budget: LinkBudget, snr: float, distance: float) -> float:
-    """Returns the energy of an echo as the unit infers it for clear air."""
+def echo_energy(
+    budget: LinkBudget, snr: np.ndarray, distance: np.ndarray
+) -> np.ndarray:
+    """Returns the energy of echoes as the unit infers it for clear air."""
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale

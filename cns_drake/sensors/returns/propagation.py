@@ -12,23 +12,22 @@ directly, and so does mirrored light if the beam meets the pane at right angles.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.ray_casting_scene import RayHits
-from cns_drake.sensors.returns.counter_random import uniform
-from cns_drake.sensors.returns.light import Light
-from cns_drake.sensors.returns.link_budget import LinkBudget
-from cns_drake.sensors.returns.materials import (
-    BEADS,
-    GLASS,
-    LEAVES,
-    RETRO,
-    Materials,
+from cns_drake.sensors.returns.footprint import Sides
+from cns_drake.sensors.returns.light import (
+    BeamHits,
+    Light,
+    join,
+    reflect,
+    select,
 )
-from cns_drake.sensors.returns.met import Met
+from cns_drake.sensors.returns.link_budget import LinkBudget
+from cns_drake.sensors.returns.materials import GLASS, LEAVES, Materials
+from cns_drake.sensors.returns.random_numbers import uniform
 
 # Refractive index of window glass near 900 nm.
 _GLASS_INDEX = 1.52
@@ -41,15 +40,12 @@ _SKIN = 1e-3
 # Light is not followed if a white target right behind would give less than this
 # SNR.
 _FAINT_SNR = 3.0
-# The sheeting of signs and plates works up to this angle of incidence.
-_RETRO_COSINE = np.cos(np.deg2rad(60.0))
 # Panes are flat to this angle: within it and the beam's own they send the
 # mirrored light back to the unit [rad].
 _FLATNESS = 2e-3
 # Numbers of a beam's draws for leaves, one for each of its rays.
 _LEAF_DRAW = 8
 
-_Numbers = TypeVar("_Numbers", float, np.ndarray)
 # Casts rays of origins (N, 3), directions (N, 3) and times (N,), each no
 # farther than its own reach (N,).
 Cast = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], RayHits]
@@ -63,7 +59,7 @@ class Ways(NamedTuple):
         sub: (N,) number of the ray among those of its beam; 0 for its axis.
         p_Wset: (N, 3) present origins.
         d_Wset: (N, 3) directions.
-        time: (N,) part of the turn at which it was sent.
+        time: (N,) float32 part of the turn at which it was sent.
         length: (N,) distance of the light so far [m].
         energy: (N,) part of the beam that gets here and back.
         depth: (N,) leaf area that is still to pass; inf before the first
@@ -83,33 +79,78 @@ class Ways(NamedTuple):
     inside: np.ndarray
     reach: np.ndarray
 
-    @classmethod
-    def room_for(cls, count: int) -> Ways:
-        """Returns rays to fill in."""
-        return cls(
-            np.empty(count, np.int64),
-            np.empty(count, np.int64),
-            np.empty((count, 3)),
-            np.empty((count, 3)),
-            np.empty(count, np.float32),
-            np.empty(count),
-            np.empty(count),
-            np.empty(count),
-            np.empty(count, np.int32),
-            np.empty(count, np.float32),
+
+def start_ways(
+    beam: np.ndarray,
+    p_WSset: np.ndarray,
+    times: np.ndarray,
+    rest: np.ndarray,
+    hits: BeamHits,
+    sides: Sides,
+    side_hits: BeamHits,
+    materials: Materials,
+) -> tuple[Light, Ways, BeamHits]:
+    """Returns what opaque surfaces send back, and the rays that meet others.
+
+    Args:
+        beam: (N,) number of each beam.
+        p_WSset: (K, 3) positions of S, taken in turn.
+        times: (T,) float32 parts of the turn, taken in turn.
+        rest: (N,) part of the light that its axis represents.
+        hits: by the axes of the beams.
+        sides: rays at the sides of beams.
+        side_hits: by those; misses do not count.
+        materials: of all geometries.
+
+    Returns:
+        The light, the rays that meet panes or leaves, and what they meet.
+    """
+    is_open = np.isin(materials.kind, (GLASS, LEAVES))
+    axes = np.flatnonzero((hits.geometry >= 0) & (rest > 0.0))
+    lit = np.flatnonzero(side_hits.geometry >= 0)
+    onto_open = is_open[hits.geometry[axes]]
+    side_onto_open = is_open[side_hits.geometry[lit]]
+    k, n = axes[~onto_open], lit[~side_onto_open]
+    share, distance, geometry, cosine = (
+        np.concatenate([of_axes[k], of_sides[n]])
+        for of_axes, of_sides in (
+            (rest, sides.share),
+            (hits.ranges, side_hits.ranges),
+            (hits.geometry, side_hits.geometry),
+            (hits.cosine, side_hits.cosine),
         )
+    )
+    light = reflect(
+        beam[np.concatenate([k, sides.row[n]])],
+        share,
+        distance,
+        geometry,
+        cosine,
+        materials,
+    )
+    k, n = axes[onto_open], lit[side_onto_open]
+    row = np.concatenate([k, sides.row[n]])
+    met = join([select(hits, k), select(side_hits, n)])
+    ways = Ways(
+        beam[row],
+        np.concatenate([np.zeros_like(k), 1 + sides.number[n]]),
+        p_WSset[row % len(p_WSset)],
+        met.d_Wset,
+        times[row % len(times)],
+        np.zeros(len(row)),
+        np.concatenate([rest[k], sides.share[n]]),
+        np.full(len(row), np.inf),
+        np.full(len(row), -1, np.int32),
+        np.full(len(row), np.inf, np.float32),
+    )
+    return light, ways, met
 
-    def first(self, count: int) -> Ways:
-        """Returns the first rays."""
-        return Ways(*(values[:count] for values in self))
 
-
-@compiled
-def pane_shares(cosine: _Numbers) -> tuple[_Numbers, _Numbers]:
+def pane_shares(cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns the reflected and the transmitted part of light at a pane.
 
     Args:
-        cosine: of the angle of incidence, one or many.
+        cosine: cosines of angles of incidence.
     """
     n = _GLASS_INDEX
     sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / n
@@ -125,7 +166,7 @@ def pane_shares(cosine: _Numbers) -> tuple[_Numbers, _Numbers]:
 def follow(
     key: np.uint64,
     ways: Ways,
-    met: Met,
+    met: BeamHits,
     materials: Materials,
     budget: LinkBudget,
     divergence: float,
@@ -135,194 +176,132 @@ def follow(
     """Returns the light that comes back.
 
     Args:
-        key: of the frame; see `frame_key`.
+        key: the frame's; see `frame_key`.
         ways: the rays of the beams.
         met: their hits.
         materials: of all geometries.
-        budget: of the unit.
+        budget: the unit's.
         divergence: half angle of a beam [rad].
         max_range: greatest distance of followed light [m].
         cast: casts the continued rays.
     """
     found: list[Light] = []
-    for step in range(_MOST_STEPS):
-        count = len(met.geometry)
-        light, next_ways = Light.room_for(count), Ways.room_for(2 * count)
-        num_parts, num_ways = _step(
-            key,
-            ways,
-            met,
-            materials,
-            budget.scale,
-            divergence,
-            max_range,
-            light,
-            next_ways,
+    for _ in range(_MOST_STEPS - 1):
+        light, ways = _step(
+            key, ways, met, materials, budget.scale, divergence, max_range
         )
-        found.append(light.first(num_parts))
-        if num_ways == 0 or step + 1 == _MOST_STEPS:
-            break
-        ways = next_ways.first(num_ways)
+        found.append(light)
+        if not len(ways.beam):
+            return found
         hits = cast(ways.p_Wset, ways.d_Wset, ways.time, ways.reach)
-        met = Met.of(ways.d_Wset, hits)
-    return found
+        met = BeamHits.of(ways.d_Wset, hits)
+    light, _ = _step(
+        key, ways, met, materials, budget.scale, divergence, max_range
+    )
+    return [*found, light]
 
 
-@compiled
 def _step(
     key: np.uint64,
     ways: Ways,
-    met: Met,
+    met: BeamHits,
     materials: Materials,
     scale: float,
     divergence: float,
     max_range: float,
-    light: Light,
-    next_ways: Ways,
-) -> tuple[int, int]:
+) -> tuple[Light, Ways]:
     """Takes each ray to its hit.
 
     Args:
         key, ways, met, materials, divergence, max_range: see `follow`.
-        scale: of the budget.
-        light: to fill with returning light.
-        next_ways: to fill with continued rays.
+        scale: see `LinkBudget`.
 
     Returns:
-        The numbers of parts of light, and of rays.
+        The returning light, and the continued rays.
     """
+    # Beyond the reach of a ray in leaves there is a leaf in any case.
+    is_in = np.flatnonzero(ways.inside >= 0)
+    per_metre = _LEAF_PROJECTION * materials.leaf_area_density
+    passed = per_metre[ways.inside[is_in]]
+    left = ways.depth[is_in] - passed * met.ranges[is_in]
+    is_caught = left < 0.0
+    caught = is_in[is_caught]
+    leaf = ways.inside[caught]
+    depth = ways.depth.copy()
+    in_leaves = Light(
+        ways.beam[caught],
+        ways.length[caught] + depth[caught] / passed[is_caught],
+        ways.energy[caught] * materials.reflectivity[leaf],
+        leaf,
+    )
+    depth[is_in] = left
+
+    is_hit = met.geometry >= 0
+    is_hit[caught] = False
+    length = ways.length + met.ranges
+    kind = materials.kind[met.geometry]
+
+    # Into leaves, or out of them.
+    into = np.flatnonzero(is_hit & (kind == LEAVES))
+    inside = np.where(met.is_outside[into], met.geometry[into], -1)
+    entered = np.flatnonzero(inside >= 0)
+    first = into[entered][np.isinf(depth[into[entered]])]
+    drawn = uniform(key, ways.beam[first], _LEAF_DRAW + ways.sub[first])
+    # The leaf area before the first leaf is exponential with a mean of 1.
+    depth[first] = -np.log(1.0 - drawn)
+
+    solid = np.flatnonzero(is_hit & (kind != LEAVES))
+    light = reflect(
+        ways.beam[solid],
+        ways.energy[solid],
+        length[solid],
+        met.geometry[solid],
+        met.cosine[solid],
+        materials,
+    )
+    is_pane = kind[solid] == GLASS
+    panes = solid[is_pane]
+    d_W, cosine, energy = (
+        met.d_Wset[panes],
+        met.cosine[panes],
+        ways.energy[panes],
+    )
+    reflected, through = pane_shares(cosine)
+    # The mirrored light fills a cone of the beam's width; a Lambertian target
+    # spreads its own over pi.
     flat = _FLATNESS + divergence
-    num_parts, num_ways = 0, 0
-    mirrored = np.empty(3)
-    for i in range(len(met.geometry)):
-        geometry, way = met.geometry[i], met.ranges[i]
-        depth, inside = ways.depth[i], ways.inside[i]
-        if inside >= 0:
-            # Beyond the reach of the ray there is a leaf in any case.
-            per_metre = _LEAF_PROJECTION * materials.leaf_area_density[inside]
-            left = depth - per_metre * way
-            if left < 0.0:
-                light.beam[num_parts] = ways.beam[i]
-                light.distance[num_parts] = ways.length[i] + depth / per_metre
-                light.energy[num_parts] = (
-                    ways.energy[i] * materials.reflectivity[inside]
-                )
-                light.geometry[num_parts] = inside
-                num_parts += 1
-                continue
-            depth = left
-        if geometry < 0:
-            continue
-        length = ways.length[i] + way
-        kind = materials.kind[geometry]
-        d_W, normal_W = met.d_Wset[i], met.normals_W[i]
-        if kind == LEAVES:
-            inside = -1
-            if met.is_outside[i]:
-                inside = geometry
-                if depth == np.inf:
-                    depth = leaf_depth(key, ways.beam[i], ways.sub[i])
-            _go_on(ways, i, way, d_W, 1.0, next_ways, num_ways)
-            next_ways.depth[num_ways] = depth
-            next_ways.inside[num_ways] = inside
-            next_ways.reach[num_ways] = max_range - length
-            if inside >= 0:
-                per_metre = (
-                    _LEAF_PROJECTION * materials.leaf_area_density[inside]
-                )
-                next_ways.reach[num_ways] = min(
-                    depth / per_metre, max_range - length
-                )
-            num_ways += 1
-            continue
-        cosine = met.cosine[i]
-        add_light(
-            light,
-            num_parts,
-            ways.beam[i],
-            length,
-            materials,
-            geometry,
-            cosine,
-            ways.energy[i],
-        )
-        if kind == GLASS:
-            reflected, through = pane_shares(cosine)
-            if cosine > np.cos(flat):
-                # The mirrored light fills a cone of the beam's width; a
-                # Lambertian target spreads its own over pi.
-                light.energy[num_parts] += ways.energy[i] * reflected / flat**2
-            for axis in range(3):
-                mirrored[axis] = d_W[axis] + 2.0 * cosine * normal_W[axis]
-            # Light passes the pane there and back.
-            for is_mirrored in (False, True):
-                share = (reflected if is_mirrored else through) ** 2
-                d_on = mirrored if is_mirrored else d_W
-                seen = np.sqrt(scale * share * ways.energy[i] / _FAINT_SNR)
-                reach = min(seen, max_range) - length
-                if reach > 0.0:
-                    _go_on(ways, i, way, d_on, share, next_ways, num_ways)
-                    next_ways.depth[num_ways] = depth
-                    next_ways.inside[num_ways] = inside
-                    next_ways.reach[num_ways] = reach
-                    num_ways += 1
-        num_parts += 1
-    return num_parts, num_ways
+    blinding = np.where(cosine > np.cos(flat), energy * reflected / flat**2, 0)
+    light.energy[is_pane] += blinding
+    mirrored = d_W + (2.0 * cosine)[:, None] * met.normals_W[panes]
 
-
-@compiled
-def add_light(
-    light: Light,
-    part: int,
-    beam: int,
-    distance: float,
-    materials: Materials,
-    geometry: int,
-    cosine: float,
-    share: float,
-) -> None:
-    """Fills in the light that a surface reflects of a part of a beam."""
-    light.beam[part] = beam
-    light.distance[part] = distance
-    energy = share * materials.reflectivity[geometry]
-    kind = materials.kind[geometry]
-    if kind == RETRO:
-        energy *= cosine > _RETRO_COSINE
-    elif kind != BEADS:
-        energy *= cosine
-    light.energy[part] = energy
-    light.geometry[part] = geometry
-
-
-@compiled
-def _go_on(
-    ways: Ways,
-    i: int,
-    way: float,
-    d_Wset: np.ndarray,
-    share: float,
-    next_ways: Ways,
-    row: int,
-) -> None:
-    """Continues a ray behind the surface, in a new direction."""
-    next_ways.beam[row] = ways.beam[i]
-    next_ways.sub[row] = ways.sub[i]
-    next_ways.time[row] = ways.time[i]
-    next_ways.length[row] = ways.length[i] + way
-    next_ways.energy[row] = share * ways.energy[i]
-    for axis in range(3):
-        next_ways.d_Wset[row, axis] = d_Wset[axis]
-        next_ways.p_Wset[row, axis] = (
-            ways.p_Wset[i, axis]
-            + way * ways.d_Wset[i, axis]
-            + _SKIN * d_Wset[axis]
-        )
-
-
-@compiled
-def leaf_depth(key: np.uint64, beam: int, sub: int) -> float:
-    """Returns the leaf area that a ray passes before it meets a leaf.
-
-    It is exponential with a mean of 1.
-    """
-    return -np.log(1.0 - uniform(key, beam, _LEAF_DRAW + sub))
+    rows = np.concatenate([into, panes, panes])
+    d_Wset = np.concatenate([met.d_Wset[into], d_W, mirrored])
+    inside = np.concatenate([inside, ways.inside[panes], ways.inside[panes]])
+    # Light passes the pane there and back.
+    share = np.concatenate([np.ones(len(into)), through**2, reflected**2])
+    seen = np.sqrt(scale * share * ways.energy[rows] / _FAINT_SNR)
+    seen[: len(into)] = np.inf
+    reach = np.minimum(seen, max_range) - length[rows]
+    reach[entered] = np.minimum(
+        depth[into[entered]] / per_metre[inside[entered]], reach[entered]
+    )
+    goes_on = reach > 0.0
+    goes_on[: len(into)] = True
+    # Rays of a beam stay together, which makes casting them cheap.
+    kept = np.flatnonzero(goes_on)
+    kept = kept[np.argsort(rows[kept], kind="stable")]
+    rows, d_Wset = rows[kept], d_Wset[kept]
+    begin = ways.p_Wset[rows] + met.ranges[rows, None] * ways.d_Wset[rows]
+    next_ways = Ways(
+        ways.beam[rows],
+        ways.sub[rows],
+        begin + _SKIN * d_Wset,
+        d_Wset,
+        ways.time[rows],
+        length[rows],
+        share[kept] * ways.energy[rows],
+        depth[rows],
+        inside[kept],
+        reach[kept].astype(np.float32),
+    )
+    return join([in_leaves, light]), next_ways

@@ -24,7 +24,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
 from cns_drake.sensors.returns.link_budget import (
     LinkBudget,
     detection_probability,
@@ -177,7 +176,8 @@ def tabulate_scattering(
             (_DIAMETERS_MM * 1e-3 / (2.0 * radius[:, None])) ** 2, 1.0
         )
         energy = reflectivity * part * overlap[:, None]
-        detected = _detected(budget, alpha, energy, distances)
+        snr = target_snr(budget, alpha, energy, distances[:, None])
+        detected = detection_probability(snr)
         density = number * steps * detected * np.pi * radius[:, None] ** 2
         rate += density.sum(axis=1)
         weights = np.hstack([weights, density])
@@ -195,22 +195,6 @@ def tabulate_scattering(
         fog_energies,
         fog_counts / max(fog_counts[-1], 1e-300),
     )
-
-
-@compiled
-def _detected(
-    budget: LinkBudget,
-    extinction: float,
-    energy: np.ndarray,
-    distances: np.ndarray,
-) -> np.ndarray:
-    """Returns the probability of detection of each (distance, diameter)."""
-    result = np.empty_like(energy)
-    for i in range(energy.shape[0]):
-        for j in range(energy.shape[1]):
-            snr = target_snr(budget, extinction, energy[i, j], distances[i])
-            result[i, j] = detection_probability(snr)
-    return result
 
 
 def _integral(x: np.ndarray, y: np.ndarray) -> np.ndarray:

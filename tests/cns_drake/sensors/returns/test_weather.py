@@ -8,7 +8,7 @@ from scipy import integrate
 
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.sensors.returns.counter_random import frame_key, normal, uniform
+from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
 
@@ -173,15 +173,11 @@ def test_each_beam_has_a_draw_of_its_own():
 
 def test_numbers_by_counter_are_uniform_and_independent():
     key = frame_key(3, "lidar", -5)
-    values = np.array(
-        [
-            [uniform(key, beam, draw) for draw in range(4)]
-            for beam in range(9000)
-        ]
-    )
+    beams = np.arange(9000)
+    values = uniform(key, beams[:, None], np.arange(4))
     assert abs(values.mean() - 0.5) < 0.005
     np.testing.assert_allclose(np.cov(values.T), np.eye(4) / 12.0, atol=0.003)
-    normals = np.array([normal(key, beam, 4) for beam in range(9000)])
+    normals = normal(key, beams, 4)
     assert abs(normals.mean()) < 0.04
     assert normals.std() == pytest.approx(1.0, abs=0.03)
     assert frame_key(3, "lidar", 5) != key != frame_key(3, "rear", -5)
