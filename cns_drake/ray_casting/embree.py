@@ -14,6 +14,11 @@ import importlib
 import importlib.util
 from pathlib import Path
 
+from numba import types
+
+# Numba then takes functions as arguments of compiled ones.
+import numba.experimental.function_type  # noqa: F401
+
 TRIANGLE, CONE, ROUND_SEGMENT, SPHERE, DISC, INSTANCE = (
     0, 15, 16, 50, 52, 121,
 )  # fmt: skip
@@ -92,22 +97,37 @@ def load() -> ctypes.CDLL:
     return embree
 
 
-def address_of(function: object) -> int:
-    """Returns the address of a function of Embree, for compiled code."""
-    address = ctypes.cast(function, ctypes.c_void_p).value  # type: ignore[arg-type]  # A function is a pointer.
-    assert address is not None
-    return address
+class PacketFunction(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has no hints.
+    """A C function that casts a packet of rays, for compiled code.
+
+    It takes addresses: of the mask of lanes, the scene, the packet, and the
+    arguments. As an argument of a compiled function, it lets numba keep the
+    machine code on disk, which a ctypes function does not.
+    """
+
+    def __init__(self, function: object):
+        """Takes rtcIntersect4, rtcIntersect8 or rtcIntersect16."""
+        self._address = ctypes.cast(function, ctypes.c_void_p).value  # type: ignore[arg-type]  # A function is a pointer.
+
+    def __wrapper_address__(self) -> int | None:
+        return self._address
+
+    def signature(self) -> object:
+        own, given = types.uintp, types.intp
+        return types.void(own, given, own, given)
 
 
-def native_packet(embree: ctypes.CDLL, device: int) -> tuple[int, int]:
+def native_packet(
+    embree: ctypes.CDLL, device: int
+) -> tuple[int, PacketFunction]:
     """Returns the number of rays in a packet, and the function that casts it.
 
     The packet is the largest that fills the processor's vectors, such as 16
     rays with AVX-512 and 8 with AVX2: Embree casts the rays of a larger one
-    one by one. The function is given by its address.
+    one by one.
     """
     lanes = 4
     for more, supported in _NATIVE_PACKETS:
         if embree.rtcGetDeviceProperty(device, supported):
             lanes = more
-    return lanes, address_of(getattr(embree, f"rtcIntersect{lanes}"))
+    return lanes, PacketFunction(getattr(embree, f"rtcIntersect{lanes}"))

@@ -1,4 +1,4 @@
-"""Groups of primitives as one Embree scene."""
+"""Groups of primitives as one Embree scene, and rays through it in packets."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from typing import NamedTuple
 import weakref
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.embree_motion import decompose_motion
-from cns_drake.ray_casting.embree_packets import (
-    BLOCK,
-    Tree,
-    cast_packets,
-)
-from cns_drake.ray_casting.embree_placing import Setters, place_instances
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
+
+# Embree takes smaller components for positive, of either sign. A packet that
+# mixes such rays with truly positive ones loses hits.
+_TINY = 1e-18
+# The least rays that a thread takes at once: whole packets of any size, and
+# enough that the call costs little.
+_BLOCK = 1024
 
 
 class _Built(NamedTuple):
@@ -35,6 +37,34 @@ class _Built(NamedTuple):
 
     scene: int
     owners: tuple[np.ndarray, ...]
+
+
+class _Tree(NamedTuple):
+    """Scenes of Embree's, with the owners of their primitives.
+
+    Attributes:
+        lanes: the number of rays in a packet.
+        fixed: address of the RTCScene of static geometry, or 0.
+        instances: address of the RTCScene of I instances, or 0.
+        arguments: address of the RTCIntersectArguments.
+        first_primitive: (1 + I, G) int64, the index in `owner_of_primitive` of
+            the first primitive of geometry g in the fixed scene (first row) and
+            in each instance.
+        owner_of_primitive: (P,) int32.
+        steps: (1 + I,) int64, from one primitive to the next in
+            `owner_of_primitive`: 1, or 0 where all have the same owner.
+        groups: (1 + I,) int32 row of the group of the fixed scene and of each
+            instance.
+    """
+
+    lanes: int
+    fixed: int
+    instances: int
+    arguments: int
+    first_primitive: np.ndarray
+    owner_of_primitive: np.ndarray
+    steps: np.ndarray
+    groups: np.ndarray
 
 
 class EmbreeHierarchy:
@@ -72,8 +102,6 @@ class EmbreeHierarchy:
         # Threads start at their first use.
         self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
         self._lib = embree.load()
-        # Finding these addresses takes longer than placing ten instances.
-        self._setters = Setters.of(self._lib)
         if previous is None:
             self._device = self._lib.rtcNewDevice(embree.ALONE)
         else:
@@ -105,10 +133,11 @@ class EmbreeHierarchy:
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top = 0
-        # Instances of groups, if they have one, and the states of these.
-        self._instances = np.zeros(len(groups), np.uintp)
-        self._is_disabled = np.zeros(len(groups), bool)
-        self._in_motion = np.zeros(len(groups), bool)
+        # Row of a group -> its instance; the rows of those that are disabled,
+        # and of those that move during a cast.
+        self._instances: dict[int, int] = {}
+        self._disabled: set[int] = set()
+        self._in_motion: set[int] = set()
         if moving:
             self._top = self._new_scene()
             for row in moving:
@@ -118,16 +147,15 @@ class EmbreeHierarchy:
         error = self._lib.rtcGetDeviceError(self._device)
         if error:
             raise MemoryError(f"Embree cannot build the scene: error {error}")
-        # Rows of groups in the order of `Tree.first_primitive`.
+        # Rows of groups in the order of `_Tree.first_primitive`.
         rows = [fixed[0] if fixed else -1, *moving]
         self._arguments = embree.IntersectArguments(
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
         nothing = _Built(0, ())
         copies = {row for row, group in enumerate(groups) if group.is_copy}
-        lanes, intersect = embree.native_packet(self._lib, self._device)
-        self._tree = Tree(
-            intersect,
+        lanes, self._intersect = embree.native_packet(self._lib, self._device)
+        self._tree = _Tree(
             lanes,
             self._built[fixed[0]].scene if fixed else 0,
             self._top,
@@ -154,30 +182,47 @@ class EmbreeHierarchy:
         }
 
     def place(self, placed: Placed) -> None:
-        """Moves groups to their places, if they are in sight."""
-        for row in placed.rows[placed.in_sight & placed.moves]:
-            if self._instances[row]:
-                self._set_motion(row)
-        has_changed = place_instances(
-            self._setters,
-            placed,
-            self._instances,
-            self._is_disabled,
-            self._in_motion,
-        )
-        if has_changed:
-            self._lib.rtcJoinCommitScene(self._top)
+        """Gives instances in sight their places, and disables the others.
 
-    def _set_motion(self, row: int) -> None:
-        """Gives Embree the motion of a group during a cast."""
-        steps = decompose_motion(self._groups[row])
-        handle = int(self._instances[row])
-        self._lib.rtcSetGeometryTimeStepCount(handle, len(steps))
-        for k, step in enumerate(steps):
-            self._lib.rtcSetGeometryTransformQuaternion(
-                handle, k, step.ctypes.data
-            )
-        self._lib.rtcCommitGeometry(handle)
+        Fewer instances are faster to build and to cast on.
+        """
+        lib = self._lib
+        places = np.ascontiguousarray(placed.X_OLs, np.float32)
+        has_changed = False
+        for k, row in enumerate(placed.rows.tolist()):
+            handle = self._instances.get(row)
+            if handle is None:
+                continue
+            has_changed = True
+            if not placed.in_sight[k]:
+                if row not in self._disabled:
+                    lib.rtcDisableGeometry(handle)
+                    self._disabled.add(row)
+                continue
+            if row in self._disabled:
+                lib.rtcEnableGeometry(handle)
+                self._disabled.remove(row)
+            if placed.moves[k]:
+                self._in_motion.add(row)
+                steps = _decompose_motion(self._groups[row])
+                lib.rtcSetGeometryTimeStepCount(handle, len(steps))
+                for step in range(len(steps)):
+                    lib.rtcSetGeometryTransformQuaternion(
+                        handle, step, steps[step].ctypes.data
+                    )
+            else:
+                if row in self._in_motion:
+                    lib.rtcSetGeometryTimeStepCount(handle, 1)
+                    self._in_motion.remove(row)
+                lib.rtcSetGeometryTransform(
+                    handle,
+                    0,
+                    embree.FLOAT3X4_ROW_MAJOR,
+                    places.ctypes.data + k * places.strides[0],
+                )
+            lib.rtcCommitGeometry(handle)
+        if has_changed:
+            lib.rtcJoinCommitScene(self._top)
 
     def cast(
         self,
@@ -200,9 +245,11 @@ class EmbreeHierarchy:
 
         def cast() -> None:
             for first, last in parts:
-                cast_packets(self._tree, mask, rays, hits, first, last)
+                _cast_packets(
+                    self._intersect, self._tree, mask, rays, hits, first, last
+                )
 
-        num_helpers = min(self._num_threads, -(-num_rays // BLOCK)) - 1
+        num_helpers = min(self._num_threads, -(-num_rays // _BLOCK)) - 1
         helpers = [self._helpers.submit(cast) for _ in range(num_helpers)]
         cast()
         for helper in helpers:
@@ -253,7 +300,7 @@ def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
     parts, first = [], 0
     while first < num_rays:
         share = (num_rays - first) // (2 * num_threads)
-        size = max(share // BLOCK, 1) * BLOCK if num_threads > 1 else num_rays
+        size = max(share // _BLOCK, 1) * _BLOCK if num_threads > 1 else num_rays
         parts.append((first, min(first + size, num_rays)))
         first += size
     return parts
@@ -262,7 +309,7 @@ def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
 def _list_owners(
     scenes: Collection[Sequence[np.ndarray]],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns `Tree.first_primitive` and `Tree.owner_of_primitive`."""
+    """Returns `_Tree.first_primitive` and `_Tree.owner_of_primitive`."""
     first = np.zeros((len(scenes), max(1, *map(len, scenes))), np.int64)
     owners = [np.zeros(0, np.int32)]
     count = 0
@@ -278,3 +325,124 @@ def _release(lib: ctypes.CDLL, device: int, scenes: Sequence[int]) -> None:
     for scene in reversed(scenes):
         lib.rtcReleaseScene(scene)
     lib.rtcReleaseDevice(device)
+
+
+def _decompose_motion(group: RayGroup) -> np.ndarray:
+    """Returns the poses of a moving group at even times of the turn.
+
+    Embree turns from one orientation to the next at a constant rate about F's
+    origin, which moves in a straight line. That is the motion of a frame with
+    constant velocities.
+
+    Returns:
+        (T, 16) float32, an RTCQuaternionDecomposition each: 3 scales, 3
+        skews, shift, quaternion (real part first), translation. A point is
+        scaled, shifted, turned, and translated.
+    """
+    assert group.motion is not None
+    num_steps = group.motion.num_steps
+    R_OO, way_F = group.motion.at(np.linspace(0.0, 1.0, num_steps))
+    # The columns of both maps are rotated and stretched axes of L.
+    scale = np.linalg.norm(group.X_FL[:3, :3], axis=0)
+    R_OL = group.X_OL[:, :3] / scale
+    p_FL_L = (group.X_FL[:3, :3] / scale).T @ group.X_FL[:3, 3]
+    quaternion = Rotation.from_matrix(R_OO @ R_OL).as_quat()
+    steps = np.zeros((num_steps, 16))
+    steps[:, 0:3] = scale
+    steps[:, 6:9] = p_FL_L
+    steps[:, 9:13] = quaternion[:, [3, 0, 1, 2]]
+    steps[:, 13:16] = group.X_OL[:, 3] - R_OL @ p_FL_L + way_F
+    return np.ascontiguousarray(steps, np.float32)
+
+
+@compiled
+def _cast_packets(
+    intersect: embree.PacketFunction,
+    tree: _Tree,
+    mask: int,
+    rays: Rays,
+    hits: Hits,
+    first: int,
+    last: int,
+) -> None:
+    """Casts the rays from `first` to before `last`.
+
+    Directions are rotated here, in double precision and in a fixed order: the
+    result of a matrix library depends on the processor.
+
+    One Python call per packet would cost more than its rays.
+
+    Args:
+        intersect: casts a packet.
+        tree: what to cast on.
+        mask: the geometries that rays can hit.
+        rays: all rays.
+        hits: their hits, to fill.
+        first, last: select the rays.
+    """
+    # A packet is an RTCRayHit16, or one of fewer lanes: 12 ray fields and 9 hit
+    # fields (10 with room for the primitive of an instance array). It and the
+    # mask of lanes are aligned to 64 bytes, as Embree's vector loads demand.
+    lanes = tree.lanes
+    storage = np.zeros((12 + 10 + 1) * lanes + 16, np.float32)
+    start = (-storage.ctypes.data % 64) // 4
+    aligned = storage[start : start + 23 * lanes].reshape(23, lanes)
+    packet, valid = aligned[:22], aligned[22].view(np.int32)
+    packet_id = packet.view(np.uint32)
+    num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
+    num_ranges = len(rays.max_ranges)
+    # Indices are counted along: remainders would cost a tenth of the casting.
+    origin, rotation = first % num_origins, first % num_rotations
+    reach, time = first % num_ranges, first % len(rays.times)
+    for begin in range(first, last, lanes):
+        count = min(lanes, last - begin)
+        valid[:] = 0
+        for lane in range(count):
+            p = rays.p_OSset[origin]
+            R = rays.R_OSset[rotation]
+            d = rays.d_Sset[begin + lane]
+            valid[lane] = -1
+            for axis in range(3):
+                packet[axis, lane] = p[axis]
+                along = (
+                    R[axis, 0] * d[0] + R[axis, 1] * d[1] + R[axis, 2] * d[2]
+                )
+                packet[4 + axis, lane] = along if abs(along) >= _TINY else 0.0
+            packet[7, lane] = rays.times[time]
+            packet[8, lane] = rays.max_ranges[reach]
+            origin = origin + 1 if origin + 1 < num_origins else 0
+            rotation = rotation + 1 if rotation + 1 < num_rotations else 0
+            reach = reach + 1 if reach + 1 < num_ranges else 0
+            time = time + 1 if time + 1 < len(rays.times) else 0
+        packet[3] = 0.0
+        packet_id[9] = mask
+        packet_id[10:12] = 0
+        packet_id[18:20] = embree.INVALID_ID
+        # Two calls are faster than one scene of two levels: the second call
+        # keeps a hit unless it finds a nearer one.
+        for scene in (tree.fixed, tree.instances):
+            if scene != 0:
+                intersect(
+                    valid.ctypes.data,
+                    scene,
+                    packet.ctypes.data,
+                    tree.arguments,
+                )
+        for lane in range(count):
+            ray = begin + lane
+            hit = packet_id[18, lane]
+            if hit == embree.INVALID_ID:
+                hits.ranges[ray] = np.inf
+                hits.owner[ray] = hits.group[ray] = -1
+                for axis in range(hits.normals.shape[1]):
+                    hits.normals[ray, axis] = 0.0
+                continue
+            hits.ranges[ray] = packet[8, lane]
+            instance = packet_id[19, lane]
+            row = 0 if instance == embree.INVALID_ID else 1 + np.int64(instance)
+            primitive = np.int64(packet_id[17, lane]) * tree.steps[row]
+            primitive += tree.first_primitive[row, hit]
+            hits.owner[ray] = tree.owner_of_primitive[primitive]
+            hits.group[ray] = tree.groups[row]
+            for axis in range(hits.normals.shape[1]):
+                hits.normals[ray, axis] = packet[12 + axis, lane]

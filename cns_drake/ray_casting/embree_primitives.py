@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.curved_proxies import circumscribe
+from cns_drake.ray_casting.curved_shapes import circumscribe
 from cns_drake.ray_casting.ray_groups import Member, RayGroup
 from cns_drake.scene.surface_merging import merge_triangles
 from cns_drake.scene.surfaces import (

@@ -7,7 +7,7 @@ the unit sphere. A curved shape in a scene slows down all its rays by a third
 therefore have a second hierarchy. Polyhedra about them in the first one select
 the few rays to cast on it. Those that move are instances, which few rays enter:
 they are in the first hierarchy themselves. Embree loses rays along the axis of
-a rounded segment, which are therefore cast in closed form (`capsule_axes`).
+a rounded segment, which are therefore cast in closed form (`CapsuleAxes`).
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.capsule_axes import CapsuleAxes
-from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
+from cns_drake.ray_casting.curved_shapes import (
+    CapsuleAxes,
+    NearCurvedShapes,
+)
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
     PROXY_OWNER,
@@ -80,8 +81,10 @@ class EmbreeScene:
     def _cast_again(self, rays: Rays, hits: Hits, with_normals: bool) -> None:
         """Updates the hits of rays that may meet curved shapes that stay."""
         is_near = self._near.contain(rays.p_OSset)
-        again = np.empty(len(hits.owner), np.int64)
-        again = again[: _find_unsure(hits.owner, is_near, again)]
+        is_unsure = hits.owner == PROXY_OWNER
+        if is_near.any():  # Origins are taken in turn.
+            is_unsure |= np.resize(is_near, len(is_unsure))
+        again = np.flatnonzero(is_unsure)
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))
             in_second = self._second.cast(rest, with_normals=with_normals)
@@ -98,23 +101,3 @@ class EmbreeScene:
             ):
                 second[is_first] = first[is_first]
                 result[again] = second
-
-
-@compiled
-def _find_unsure(
-    owner: np.ndarray, is_near: np.ndarray, rows: np.ndarray
-) -> int:
-    """Fills in the rays that may meet curved shapes; returns how many.
-
-    Args:
-        owner: (N,) of what each has met in the first hierarchy.
-        is_near: (K,) whether the origins, taken in turn, are near a shape.
-        rows: (N,) to fill.
-    """
-    count, origin = 0, -1
-    for ray in range(len(owner)):
-        origin = origin + 1 if origin + 1 < len(is_near) else 0
-        if owner[ray] == PROXY_OWNER or is_near[origin]:
-            rows[count] = ray
-            count += 1
-    return count

@@ -9,9 +9,12 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.group_motion import Motion
-from cns_drake.ray_casting.ray_groups import NO_MOTIONS, Member, RayGroup
+from cns_drake.ray_casting.ray_groups import (
+    NO_MOTIONS,
+    Member,
+    Motion,
+    RayGroup,
+)
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
@@ -161,10 +164,21 @@ class MovingGroups:
             for k in np.flatnonzero(moves):
                 motion = motions[frames[k]]
                 reaches[k] += np.linalg.norm(motion.v) * motion.duration
-        placed, changed = _place_all(
-            X_WFs, rows, self._X_FLs, self._p_WO, seen, reaches,
-            moves | self._was_in_motion, self._in_sight, self._X_OLs,
-        )  # fmt: skip
+        away = X_WFs[rows, :3, 3] - seen.p_W
+        sees = np.linalg.norm(away, axis=1) <= seen.radius + reaches
+        shown = sees != self._in_sight
+        self._in_sight = sees
+        near = np.flatnonzero(sees | shown)
+        # Whether each is placed even if it has not moved.
+        anew = (shown | moves | self._was_in_motion)[near]
+        X_WF, X_FL = X_WFs[rows[near], :3], self._X_FLs[near]
+        # In a fixed order: the result of a matrix library depends on the
+        # processor.
+        X_OLs = sum(X_WF[:, :, n, None] * X_FL[:, n, None] for n in range(4))
+        X_OLs[:, :, 3] -= self._p_WO
+        has_moved = (X_OLs != self._X_OLs[near]).any(axis=(1, 2))
+        self._X_OLs[near] = X_OLs
+        placed, changed = near[anew | has_moved], near[anew]
         for k in changed:
             group = self._groups[self._rows[k]]
             group.motion = motions[frames[k]] if moves[k] else None
@@ -197,69 +211,6 @@ class MovingGroups:
             calc_X_WF(self._frames[k]).GetAsMatrix4() for k in self._unknown
         ]
         return np.concatenate([known.X_WFs, others]), rows
-
-
-@compiled
-def _place_all(
-    X_WFs: np.ndarray,
-    rows: np.ndarray,
-    X_FLs: np.ndarray,
-    p_WO: np.ndarray,
-    seen: Ball,
-    reaches: np.ndarray,
-    anew: np.ndarray,
-    in_sight: np.ndarray,
-    X_OLs: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Places G groups that are in sight, or were.
-
-    NumPy takes five times as long, for passes over many small matrices.
-
-    Args:
-        X_WFs: (M, 4, 4) poses of frames.
-        rows: (G,) rows of those of the groups.
-        X_FLs: (G, 4, 4) places of the groups on their frames.
-        p_WO: the scene's origin.
-        seen: the ball in which rays can meet geometry.
-        reaches: (G,) radii of balls about the groups [m].
-        anew: (G,) whether each is placed even if it has not moved.
-        in_sight: (G,) whether each was in sight, to update.
-        X_OLs: (G, 3, 4) their places, to update.
-
-    Returns:
-        The groups that are placed; and those of them that have come in sight,
-        have left it, or are placed even if they have not moved.
-    """
-    placed = np.empty(len(rows), np.int64)
-    changed = np.empty(len(rows), np.int64)
-    num_placed = num_changed = 0
-    for k in range(len(rows)):
-        X_WF, X_FL = X_WFs[rows[k]], X_FLs[k]
-        square = 0.0
-        for i in range(3):
-            square += (X_WF[i, 3] - seen.p_W[i]) ** 2
-        sees = np.sqrt(square) <= seen.radius + reaches[k]
-        shown = sees != in_sight[k]
-        in_sight[k] = sees
-        if not (sees or shown):
-            continue
-        is_changed = differs = shown or anew[k]
-        for i in range(3):
-            for j in range(4):
-                value = 0.0
-                for n in range(4):
-                    value += X_WF[i, n] * X_FL[n, j]
-                if j == 3:
-                    value -= p_WO[i]
-                differs |= value != X_OLs[k, i, j]
-                X_OLs[k, i, j] = value
-        if differs:
-            placed[num_placed] = k
-            num_placed += 1
-        if is_changed:
-            changed[num_changed] = k
-            num_changed += 1
-    return placed[:num_placed], changed[:num_changed]
 
 
 def _radius_about_F(group: RayGroup) -> float:

@@ -16,9 +16,7 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.ray_casting.facing import face_origins
-from cns_drake.ray_casting.group_motion import Motion
-from cns_drake.ray_casting.half_spaces import cast_on_planes
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.moving_groups import (
     EVERYWHERE,
     NOTHING_KNOWN,
@@ -28,6 +26,7 @@ from cns_drake.ray_casting.moving_groups import (
 )
 from cns_drake.ray_casting.ray_groups import (
     NO_MOTIONS,
+    Motion,
     RayGroup,
     group_geometries,
     take_over,
@@ -118,7 +117,7 @@ class RayCastingScene:
             solid, num_threads, None if previous is None else previous._scene
         )
         self._moving = MovingGroups(self._groups, self._p_WO)
-        self._normal_maps: np.ndarray | None = None
+        self._normal_matrices: np.ndarray | None = None
 
     def set_frame_poses(
         self,
@@ -140,7 +139,7 @@ class RayCastingScene:
             if self._planes:  # They are the last groups, beyond the scene's.
                 placed = placed.below(min(self._planes))
             self._scene.place(placed)
-            self._normal_maps = None
+            self._normal_matrices = None
 
     def cast_rays(
         self,
@@ -190,7 +189,7 @@ class RayCastingScene:
         )
         hits = self._scene.cast_rays(rays, with_normals)
         if self._planes:
-            cast_on_planes(self._planes, rays, hits)
+            _cast_on_planes(self._planes, rays, hits)
         is_outside = np.zeros(0, bool)
         if with_normals:
             is_outside = self._face_rays(hits, rays)
@@ -202,18 +201,18 @@ class RayCastingScene:
         )
 
     def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
-        """Turns normals towards the rays' origins; see `face_origins`.
+        """Turns normals towards the rays' origins; see `_face_origins`.
 
         Returns:
             (N,) whether each ray has met the outside of a surface.
         """
         is_outside = np.zeros(len(hits.group), bool)
-        if self._normal_maps is None:
-            self._normal_maps = _map_normals(self._groups)
-        face_origins(
+        if self._normal_matrices is None:
+            self._normal_matrices = _calc_normal_matrices(self._groups)
+        _face_origins(
             hits.normals,
             hits.group,
-            self._normal_maps,
+            self._normal_matrices,
             rays.R_OSset,
             rays.d_Sset,
             is_outside,
@@ -221,7 +220,94 @@ class RayCastingScene:
         return is_outside
 
 
-def _map_normals(groups: Sequence[RayGroup]) -> np.ndarray:
+def _cast_on_planes(
+    groups: Mapping[int, RayGroup], rays: Rays, hits: Hits
+) -> None:
+    """Updates `hits` where rays meet a half space's plane first.
+
+    Rays meet a plane from both sides, like any other surface.
+
+    Args:
+        groups: row -> group of one half space, placed.
+        rays: N of them.
+        hits: their hits so far.
+    """
+    p, d, ray = rays.p_Oset(), rays.d_Oset(), np.arange(len(rays.d_Sset))
+    for row, group in groups.items():
+        times = _AT_ONCE if group.motion is None else rays.times
+        X_OLs = group.X_OL_at(times)[ray % len(times)]
+        # In L, the plane is z = 0.
+        normal, origin = X_OLs[:, :, 2], X_OLs[:, :, 3]
+        height = (normal * (origin - p)).sum(axis=1)
+        # A ray along the plane does not meet it.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = height / (normal * d).sum(axis=1)
+        nearer = (distance >= 0.0) & (distance <= rays.max_ranges_of(ray))
+        nearer &= distance < hits.ranges
+        hits.ranges[nearer] = distance[nearer]
+        hits.owner[nearer] = group.members[0][0]
+        hits.group[nearer] = row
+        if hits.normals.shape[1]:
+            hits.normals[nearer] = (0.0, 0.0, 1.0)
+
+
+@compiled
+def _face_origins(
+    normals: np.ndarray,
+    group: np.ndarray,
+    normal_matrices: np.ndarray,
+    R_OSset: np.ndarray,
+    d_Sset: np.ndarray,
+    is_outside: np.ndarray,
+) -> None:
+    """Makes normals unit vectors that face the origins of their rays.
+
+    Args:
+        normals: (N, 3) float32 in the frame of each group, to change; zero
+            for a miss.
+        group: (N,) row of each hit's group, -1 for a miss.
+        normal_matrices: (G, 3, 3) from a group's frame to O: the inverse
+            transpose of its X_OL's linear part.
+        R_OSset: (L, 3, 3) orientations of S, taken in turn.
+        d_Sset: (N, 3) directions.
+        is_outside: (N,) bool to fill: whether the ray has met the outside of
+            the surface, by its winding.
+    """
+    n = np.empty(3)
+    turn = -1
+    for ray in range(len(normals)):
+        # Counted along: remainders would take a third of the time.
+        turn = turn + 1 if turn + 1 < len(R_OSset) else 0
+        row = group[ray]
+        if row < 0:
+            continue
+        M = normal_matrices[row]
+        R = R_OSset[turn]
+        length = 0.0
+        along = 0.0
+        for i in range(3):
+            n[i] = (
+                M[i, 0] * normals[ray, 0]
+                + M[i, 1] * normals[ray, 1]
+                + M[i, 2] * normals[ray, 2]
+            )
+            length += n[i] * n[i]
+            along += n[i] * (
+                R[i, 0] * d_Sset[ray, 0]
+                + R[i, 1] * d_Sset[ray, 1]
+                + R[i, 2] * d_Sset[ray, 2]
+            )
+        is_outside[ray] = along <= 0.0
+        scale = np.sqrt(length)
+        if along > 0.0:
+            scale = -scale
+        if scale == 0.0:
+            scale = 1.0
+        for i in range(3):
+            normals[ray, i] = n[i] / scale
+
+
+def _calc_normal_matrices(groups: Sequence[RayGroup]) -> np.ndarray:
     """Returns what takes normals from each group's frame to O, (G, 3, 3)."""
     turns = [
         np.eye(3) if group.is_merged_world else group.X_OL[:, :3]

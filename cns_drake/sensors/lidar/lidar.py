@@ -20,7 +20,6 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.moving_groups import (
     EVERYWHERE,
     NOTHING_KNOWN,
@@ -28,6 +27,7 @@ from cns_drake.ray_casting.moving_groups import (
     KnownPoses,
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.lidar.measurement import (

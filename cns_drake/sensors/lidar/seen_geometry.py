@@ -16,7 +16,6 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
-from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.moving_groups import (
     EVERYWHERE,
     NOTHING_KNOWN,
@@ -24,7 +23,7 @@ from cns_drake.ray_casting.moving_groups import (
     KnownPoses,
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.ray_casting.ray_groups import NO_MOTIONS
+from cns_drake.ray_casting.ray_groups import NO_MOTIONS, Motion
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,

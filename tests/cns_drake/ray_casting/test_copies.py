@@ -6,8 +6,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting import ray_groups
-from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles
 from cns_drake.scene.perception_geometry import PerceptionGeometry

@@ -7,7 +7,7 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.curved_proxies import (
+from cns_drake.ray_casting.curved_shapes import (
     NearCurvedShapes,
     circumscribe,
 )

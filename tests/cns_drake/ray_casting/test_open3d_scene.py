@@ -12,8 +12,8 @@ from cns_drake.ray_casting import (
 from cns_drake.ray_casting import (
     ray_casting_scene as ray_casting,
 )
-from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,

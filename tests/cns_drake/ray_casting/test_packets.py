@@ -27,7 +27,7 @@ def test_hits_of_packets_of_each_size(monkeypatch, lanes, num_rays):
 
     def packet(library, device):
         taken.append(lanes)
-        return lanes, embree.address_of(intersect)
+        return lanes, embree.PacketFunction(intersect)
 
     monkeypatch.setattr(embree, "native_packet", packet)
     p_WFo = np.array([6.0, 2.0, -1.0])
@@ -71,7 +71,7 @@ def test_packets_fill_the_vectors_of_the_processor(most):
     lanes, address = embree.native_packet(processor, 0)
     assert lanes == most
     function = getattr(library, f"rtcIntersect{most}")
-    assert address == ctypes.cast(function, ctypes.c_void_p).value
+    assert address.__wrapper_address__() == ctypes.cast(function, ctypes.c_void_p).value
 
 
 def test_embree_supports_the_packets_taken_here():

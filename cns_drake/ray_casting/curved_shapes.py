@@ -1,0 +1,306 @@
+"""What Embree does not do for curved shapes.
+
+Polyhedra about them: a ray that misses the polyhedron misses the shape, unless
+it starts between the two. Few rays then have to be cast on the shapes
+themselves.
+
+Rays along the axes of capsules, in closed form: Embree's rounded segments lose
+most rays that point along their axis, up to an angle of 1e-3 rad. Only rays
+that start in line with a capsule can be of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+from cns_drake.ray_casting.ray_groups import RayGroup
+from cns_drake.scene.surface_merging import tessellate
+from cns_drake.scene.surfaces import (
+    CapsuleSurface,
+    CylinderSurface,
+    EllipsoidSurface,
+    HalfSpaceSurface,
+    TriangleSurface,
+)
+
+if TYPE_CHECKING:
+    from cns_drake.ray_casting.moving_groups import Placed
+    from cns_drake.ray_casting.rays import Hits, Rays
+
+CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
+
+# Sides of a circle.
+_SIDES = 16
+# Least distance between shape and polyhedron, above errors of single precision:
+# a part of the radius, and [m].
+_MARGIN = 0.005
+_GAP = 1e-3
+# Sine of the angle to a capsule's axis up to which rays are cast here.
+_ALONG = 5e-3
+# What is nearer by less than this is the same hit [m].
+_SAME = 1e-4
+
+
+@lru_cache(maxsize=1000)
+def circumscribe(surface: CurvedSurface) -> TriangleSurface:
+    """Returns a polyhedron that contains a curved shape.
+
+    It lies within 1.1 radii + 2 mm of the shape's axis, or centre.
+    """
+    # The faces of an inscribed ball are nearest to its centre at the equator.
+    side = np.cos(np.pi / _SIDES)
+    scale = (1.0 + _MARGIN) / side**2
+    if isinstance(surface, EllipsoidSurface):
+        wide = tuple(scale * a + _GAP for a in surface.semi_axes)
+        return tessellate(EllipsoidSurface(wide), _SIDES)
+    radius = scale * surface.radius + _GAP
+    if isinstance(surface, CapsuleSurface):
+        return tessellate(CapsuleSurface(radius, surface.length), _SIDES)
+    length = surface.length + 2.0 * _GAP
+    return tessellate(CylinderSurface(radius, length), _SIDES)
+
+
+class NearCurvedShapes:
+    """Finds the rays that start near curved shapes of groups that stay."""
+
+    def __init__(self, groups: Sequence[RayGroup]):
+        """Takes the curved shapes of groups, which are placed."""
+        rows: list[int] = []
+        X_LGs, sizes = [], []
+        for row, group in enumerate(groups):
+            for _, X_LG, surface in group.members:
+                if isinstance(surface, TriangleSurface | HalfSpaceSurface):
+                    continue
+                if isinstance(surface, EllipsoidSurface):
+                    half, radius = 0.0, max(surface.semi_axes)
+                else:
+                    half, radius = surface.length / 2.0, surface.radius
+                rows.append(row)
+                X_LGs.append(X_LG.GetAsMatrix4())
+                sizes.append((half, 1.1 * radius + 2.0 * _GAP))
+        X_LGset = np.reshape(X_LGs, (-1, 4, 4))
+        halves, radii = np.reshape(sizes, (-1, 2)).T
+        # Greatest stretch of a vector from G to O.
+        stretches = np.array(
+            [np.linalg.norm(group.X_FL[:3, :3], 2) for group in groups]
+        )
+        X_OLs = np.tile(np.eye(4), (len(groups), 1, 1))
+        for row, group in enumerate(groups):
+            X_OLs[row, :3] = group.X_OL
+        places = (X_OLs[rows] @ X_LGset[:, :, 3:])[:, :3, 0]
+        reaches = stretches[rows] * (halves + radii)
+        X_GOs = np.linalg.inv(X_LGset) @ np.linalg.inv(X_OLs[rows])
+        begins = places[:, 0] - reaches
+        order = np.argsort(begins)
+        self._near = _Sorted(
+            places[order],
+            reaches[order],
+            X_GOs[order],
+            halves[order],
+            radii[order],
+            begins[order],
+            np.maximum.accumulate((begins + 2.0 * reaches)[order]),
+        )
+
+    def contain(self, p_OSset: np.ndarray) -> np.ndarray:
+        """Returns which of (K, 3) places are near a shape, (K,) bool.
+
+        A place is near if it is in the shape's polyhedron.
+        """
+        result = np.zeros(len(p_OSset), bool)
+        _find_near(self._near, p_OSset, result)
+        return result
+
+
+class _Sorted(NamedTuple):
+    """M placed shapes, sorted by the start of their balls along x.
+
+    Attributes:
+        places: (M, 3) middles in O.
+        reaches: (M,) radii of balls about them [m].
+        X_GOs: (M, 4, 4) from O to their own frames; not rigid for an ellipsoid,
+            which is a ball there.
+        halves: (M,) half of the length along z.
+        radii: (M,) around that line.
+        begins: (M,) starts of their balls along x [m].
+        ends: (M,) the farthest end along x of this ball and those before [m].
+    """
+
+    places: np.ndarray
+    reaches: np.ndarray
+    X_GOs: np.ndarray
+    halves: np.ndarray
+    radii: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
+
+
+@compiled
+def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
+    """Fills in the places near a shape; see `contain`."""
+    p_GS = np.empty(3)
+    for i in range(len(p_OSset)):
+        p = p_OSset[i]
+        k = np.searchsorted(near.begins, p[0], side="right")
+        while k > 0 and not result[i]:
+            k -= 1
+            if near.ends[k] < p[0]:
+                break
+            square = 0.0
+            for axis in range(3):
+                square += (p[axis] - near.places[k, axis]) ** 2
+            if square > near.reaches[k] ** 2:
+                continue
+            for axis in range(3):
+                p_GS[axis] = near.X_GOs[k, axis, 3]
+                for column in range(3):
+                    p_GS[axis] += near.X_GOs[k, axis, column] * p[column]
+            # Distance to the nearest place on the line.
+            p_GS[2] -= min(max(p_GS[2], -near.halves[k]), near.halves[k])
+            square = p_GS[0] ** 2 + p_GS[1] ** 2 + p_GS[2] ** 2
+            result[i] = square <= near.radii[k] ** 2
+
+
+class CapsuleAxes:
+    """The capsules of groups, for rays along their axes."""
+
+    def __init__(self, groups: Sequence[RayGroup]):
+        """Takes groups that are placed."""
+        found = [
+            (row, index, X_LG, surface)
+            for row, group in enumerate(groups)
+            for index, X_LG, surface in group.members
+            if isinstance(surface, CapsuleSurface)
+        ]
+        self._groups = np.array([row for row, *_ in found], np.int32)
+        self._owners = np.array([index for _, index, *_ in found], np.int32)
+        self._p_LCs = np.reshape(
+            [X.translation() for *_, X, _ in found], (-1, 3)
+        )
+        self._axes = np.reshape(
+            [X.rotation().matrix()[:, 2] for *_, X, _ in found], (-1, 3)
+        )
+        self._halves = np.array([one.length / 2.0 for *_, one in found])
+        self._radii = np.array([one.radius for *_, one in found])
+        self._X_OLs = np.reshape([group.X_OL for group in groups], (-1, 3, 4))
+        self._is_still = np.array(
+            [group.in_sight and group.motion is None for group in groups], bool
+        )
+
+    def place(self, placed: Placed) -> None:
+        """Moves groups to their places."""
+        self._X_OLs[placed.rows] = placed.X_OLs
+        self._is_still[placed.rows] = placed.in_sight & ~placed.moves
+
+    def cast(self, rays: Rays, hits: Hits) -> None:
+        """Updates `hits` where rays along an axis meet its capsule first.
+
+        Capsules that move during the turn are left out.
+        """
+        capsules = np.flatnonzero(self._is_still[self._groups])
+        if not (len(capsules) and len(rays.d_Sset)):
+            return
+        X_OLs = self._X_OLs[self._groups[capsules]]
+        p_OCs = _map(X_OLs[:, :, :3], self._p_LCs[capsules]) + X_OLs[:, :, 3]
+        axes = _map(X_OLs[:, :, :3], self._axes[capsules])
+        # Rays along an axis start in a cone about it.
+        low, high = rays.p_OSset.min(axis=0), rays.p_OSset.max(axis=0)
+        spread = np.linalg.norm((high - low) / 2.0)
+        away = (low + high) / 2.0 - p_OCs
+        distance = np.linalg.norm(away, axis=1)
+        along = (away * axes).sum(axis=1)
+        reach = distance + spread + self._halves[capsules]
+        reach = self._radii[capsules] + spread + 2.0 * _ALONG * reach
+        near = np.flatnonzero(distance**2 - along**2 <= reach**2)
+        if not len(near):
+            return
+        p_Oset, d_Oset = rays.p_Oset(), rays.d_Oset()
+        for k in near:
+            d_along = (d_Oset * axes[k]).sum(axis=1)
+            ray = np.flatnonzero(1.0 - d_along**2 <= _ALONG**2)
+            if not len(ray):
+                continue
+            capsule = capsules[k]
+            ranges, normals = _meet_capsule(
+                p_Oset[ray] - p_OCs[k],
+                d_Oset[ray],
+                axes[k],
+                self._halves[capsule],
+                self._radii[capsule],
+            )
+            is_nearer = ranges <= rays.max_ranges_of(ray)
+            is_nearer &= ranges < hits.ranges[ray] - _SAME
+            ray = ray[is_nearer]
+            hits.ranges[ray] = ranges[is_nearer]
+            hits.owner[ray] = self._owners[capsule]
+            hits.group[ray] = self._groups[capsule]
+            if hits.normals.shape[1]:
+                R_LO = X_OLs[k, :, :3].T
+                hits.normals[ray] = _map(R_LO, normals[is_nearer])
+
+
+def _map(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Returns products of (N, 3, 3) or (3, 3) matrices and (N, 3) vectors.
+
+    Terms are added in a fixed order: the result of a matrix library depends on
+    the processor.
+    """
+    return (matrices * vectors[:, None, :]).sum(axis=2)
+
+
+def _meet_capsule(
+    away: np.ndarray,
+    d: np.ndarray,
+    axis: np.ndarray,
+    half: float,
+    radius: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns where rays meet a capsule, in closed form.
+
+    Args:
+        away: (N, 3) origins, from the capsule's middle [m].
+        d: (N, 3) directions.
+        axis: (3,) the capsule's.
+        half: half of the length of its straight part [m].
+        radius: [m].
+
+    Returns:
+        (N,) ranges, inf for a miss [m]; and (N, 3) normals of any length.
+    """
+    along, d_along = (away * axis).sum(axis=1), (d * axis).sum(axis=1)
+    square, toward = (away**2).sum(axis=1), (away * d).sum(axis=1)
+    nearest = np.full(len(d), np.inf)
+
+    def take(distance: np.ndarray, end: float) -> None:
+        """Takes distances at the half ball of an end, or between both (0)."""
+        place = along + distance * d_along
+        fits = np.abs(place) <= half
+        if end:
+            fits = (np.abs(place) >= half) & (place * end >= 0.0)
+        fits &= (distance >= 0.0) & (distance < nearest)
+        nearest[fits] = distance[fits]
+
+    # NaN, where there is no root, fits nowhere.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for end in (-1.0, 1.0):
+            b = toward - end * half * d_along
+            c = square - 2.0 * along * end * half + half**2 - radius**2
+            root = np.sqrt(b * b - c)
+            take(-b - root, end)
+            take(-b + root, end)
+        side, turn = (
+            v - np.outer(v_along, axis)
+            for v, v_along in ((away, along), (d, d_along))
+        )
+        across, slant = (side * turn).sum(axis=1), (turn**2).sum(axis=1)
+        root = np.sqrt(across**2 - slant * (square - along**2 - radius**2))
+        take((-across - root) / slant, 0.0)
+        take((-across + root) / slant, 0.0)
+        reached = away + nearest[:, None] * d
+        place = np.clip(along + nearest * d_along, -half, half)
+        return nearest, reached - np.outer(place, axis)
