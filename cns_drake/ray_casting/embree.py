@@ -97,7 +97,7 @@ def load() -> ctypes.CDLL:
     return embree
 
 
-class PacketFunction(types.WrapperAddressProtocol):  # type: ignore[misc]  # numba has no hints.
+class PacketFunction(types.WrapperAddressProtocol):
     """A C function that casts a packet of rays, for compiled code.
 
     It takes addresses: of the mask of lanes, the scene, the packet, and the

@@ -14,7 +14,6 @@ from pydantic import (
 
 from cns_drake.base.drives.point_layouts import LayoutName
 from cns_drake.base.errors import InputError, describe_validation_error
-<<<<<<< HEAD:cns_drake/sensors/lidar/config.py
 from cns_drake.sensors.lidar.measurement import MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
@@ -50,13 +49,6 @@ class WeatherConfig(Section):
         from cns_drake.sensors.returns.weather import Weather
 
         return Weather(self.visibility, self.rain, self.snowfall)
-=======
-from cns_drake.base.recordings.point_layouts import LayoutName
-from cns_drake.scenarios.mount import Mount, Triple
-from cns_drake.scenarios.section import field_off_by_default
-from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
-from cns_drake.sensors.returns.unit_sheets import Echoes
->>>>>>> db5b5a5e (Calibrated returns: NumPy over arrays of rays instead of compiled loops):cns_drake/scenarios/lidar_config.py
 
 
 class LidarConfig(Mount):

@@ -68,10 +68,13 @@ def test_packets_fill_the_vectors_of_the_processor(most):
             for name in (f"rtcIntersect{lanes}" for lanes in NATIVE)
         },
     )
-    lanes, address = embree.native_packet(processor, 0)
+    lanes, packet = embree.native_packet(processor, 0)
     assert lanes == most
     function = getattr(library, f"rtcIntersect{most}")
-    assert address.__wrapper_address__() == ctypes.cast(function, ctypes.c_void_p).value
+    assert (
+        packet.__wrapper_address__()
+        == ctypes.cast(function, ctypes.c_void_p).value
+    )
 
 
 def test_embree_supports_the_packets_taken_here():
