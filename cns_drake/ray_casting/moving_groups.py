@@ -35,7 +35,7 @@ class KnownPoses(NamedTuple):
     X_WFs: np.ndarray
 
     def __deepcopy__(self, memo: dict) -> KnownPoses:
-        # A Context is cloned with it; nobody changes it, nor can frames be
+        # A Context is cloned with it. It never changes, and frames cannot be
         # copied.
         return self
 

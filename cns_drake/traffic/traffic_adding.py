@@ -163,14 +163,16 @@ def connect_traffic(
     Args:
         builder: of the diagram.
         traffic: the traffic.
-        lidar: labels moving bodies as moving.
+        lidar: labels moving bodies as moving; its port `frame_poses` may be
+            connected already.
         goes_on: whether traffic moves during its turn; the LiDAR then has the
             `moving_frames` of `traffic` as `moving_bodies`.
     """
     for name in ("moving_instances", "frame_poses", "body_spatial_velocities"):
         if goes_on or name != "body_spatial_velocities":
             port = lidar.GetInputPort(name)
-            builder.Connect(traffic.GetOutputPort(name), port)
+            if not builder.IsConnectedOrExported(port):
+                builder.Connect(traffic.GetOutputPort(name), port)
 
 
 def _register(

@@ -33,6 +33,7 @@ def test_systems_and_ports_have_their_names(scenario):
         "scene_graph",
         "vehicle_motion",
         "geometry_pose",
+        "frame_poses",
         "lidar",
         "imu_accelerometer",
         "imu_gyroscope",
