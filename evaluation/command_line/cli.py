@@ -5,44 +5,527 @@ Each command imports its slow modules itself, so that the help comes at once.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
-from evaluation.command_line.measuring import pr, ranking, scores, tcr
-from evaluation.command_line.reporting import report, trend
+from evaluation.command_line.options import (
+    Align,
+    AlignName,
+    Costs,
+    Gate,
+    Jobs,
+    Json,
+    LidarName,
+    MethodName,
+    ModeName,
+    OwnMethods,
+    Parameters,
+    Radius,
+    Scheduler,
+    SensorHeight,
+    Settings,
+    overlap_of,
+    with_protocol,
+)
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+
+if TYPE_CHECKING:
+    from evaluation.change.drive_change import ChangeReport
+    from evaluation.methods.method import Method
+    from evaluation.recognition.place_recognition import PlaceRecognition
+    from evaluation.recognition.resampling import Interval
 
 app = terminal.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
 )
-app.command(
+
+
+@app.command(
     epilog=example("cns-eval tcr drives/metropolis_01 drives/metropolis_04")
-)(tcr)
-app.command(
+)
+def tcr(
+    source: Annotated[Path, typer.Argument(metavar="A")],
+    target: Annotated[Path, typer.Argument(metavar="B")],
+    control: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="C",
+            help="A recording of A's route in B's stage, or of B's route in "
+            "A's stage. It gives the TCR_sym that the routes alone cause.",
+        ),
+    ] = None,
+    align: Align = AlignName.AUTO,
+    lidar: LidarName = None,
+    json: Json = False,
+) -> None:
+    """Temporal change ratio of two drives or maps.
+
+    A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
+    CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
+    the directed ratios. Drives in different world frames are aligned.
+    """
+    from evaluation.change import drive_change as change
+    from evaluation.drives import Drive
+
+    paths = [path for path in (source, target, control) if path is not None]
+    surveys, alignments = change.survey_in_one_world(
+        paths, align.value, terminal.track, lidar
+    )
+    report = change.compare(
+        surveys[0],
+        surveys[1],
+        control=None if control is None else surveys[2],
+        alignment=alignments[0] if alignments else None,
+    )
+    for one in surveys:
+        if isinstance(one.drive, Drive):
+            for note in one.drive.notes:
+                terminal.note(note)
+        ignored = one.voxels.num_ignored
+        if ignored:
+            terminal.note(
+                f"{one.name}: {ignored} points are not finite, and left out"
+            )
+    for alignment in alignments:
+        terminal.note(alignment.to_text())
+    if json:
+        terminal.print_json(report.to_json())
+    else:
+        terminal.print_rows(_change_rows(report))
+
+
+@app.command(
     epilog=example(
         "cns-eval pr drives/metropolis_01 drives/metropolis_04 \\",
         "    --method scan-context++",
     )
-)(pr)
-app.command(
+)
+@with_protocol
+def pr(
+    database: Annotated[Path, typer.Argument(metavar="DATABASE")],
+    query: Annotated[Path, typer.Argument(metavar="QUERY")],
+    method: MethodName,
+    mode: Annotated[
+        ModeName,
+        typer.Option(help="Count all queries, or those that have a match."),
+    ] = ModeName.ALL,
+    parameter: Parameters = None,
+    sensor_height: SensorHeight = 1.6,
+    align: Align = AlignName.AUTO,
+    lidar: LidarName = None,
+    across_maps: Annotated[
+        bool,
+        typer.Option(
+            "--across-maps",
+            help="Allow drives of maps with different names, such as another "
+            "draw of a city along the same streets.",
+        ),
+    ] = False,
+    truth: Annotated[
+        str,
+        typer.Option(
+            metavar="radius|overlap:PART",
+            help="Definition of a match: a place within the radius, or one "
+            "whose scan shows at least this part of the query's scan.",
+        ),
+    ] = "radius",
+    overlaps: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Write the overlap of each query with each place.",
+        ),
+    ] = None,
+    exact_overlaps: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Read these overlaps from a table of cns-drake overlap; by "
+            "default they are found from the scans.",
+        ),
+    ] = None,
+    json: Json = False,
+    *,
+    protocol: RetrievalProtocol,
+) -> None:
+    """Place recognition of one drive in another.
+
+    Measures how well the scans of QUERY find their place in DATABASE. Both are
+    recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in
+    different world frames are aligned.
+    """
+    from cns_drake.base.errors import InputError
+    from evaluation.alignment import in_one_world
+    from evaluation.drives import open_drive
+    from evaluation.recognition import place_recognition
+    from evaluation.recognition.overlap_truth import (
+        compared_frames,
+        read_overlaps,
+        write_overlaps,
+    )
+
+    protocol = replace(protocol, overlap=overlap_of(truth))
+    for option, file in (
+        ("--overlaps", overlaps),
+        ("--exact-overlaps", exact_overlaps),
+    ):
+        if file is not None and protocol.overlap is None:
+            raise InputError(f"{option}: add --truth overlap:PART")
+    is_itself = database.resolve() == query.resolve()
+    if protocol.exclude_recent is not None and not is_itself:
+        raise InputError(
+            f"--exclude-recent: it is for a drive against itself, but {query} "
+            f"is not {database}"
+        )
+    chosen = _chosen_method(method, parameter, sensor_height)
+    places, query_drive = (
+        open_drive(path, lidar) for path in (database, query)
+    )
+    for drive in (places, query_drive):
+        for note in drive.notes:
+            terminal.note(note)
+    alignment = in_one_world(
+        places,
+        query_drive,
+        align.value,
+        terminal.track,
+        across_maps=across_maps,
+    )
+    if alignment is not None:
+        places, query_drive = alignment.first, alignment.second
+        terminal.note(alignment.report.to_text())
+    exact = None
+    if exact_overlaps is not None:
+        frames = compared_frames(places, query_drive, protocol)
+        exact = read_overlaps(exact_overlaps, *frames)
+    result = place_recognition.run(
+        places,
+        query_drive,
+        chosen,
+        mode.value,
+        protocol,
+        terminal.track,
+        across_maps=across_maps,
+        overlaps=exact,
+    )
+    if overlaps is not None:
+        found = result.retrieval
+        assert found.overlaps is not None
+        write_overlaps(
+            overlaps, found.query_frames, found.database_frames, found.overlaps
+        )
+        terminal.note(f"wrote {overlaps}")
+    if protocol.exclude_recent is None and is_itself:
+        terminal.note(
+            f"{query}: every scan finds itself (--exclude-recent leaves out "
+            "recent places)"
+        )
+    if json:
+        terminal.print_json(result.to_json())
+    else:
+        terminal.print_rows(_recognition_rows(result))
+
+
+@app.command(
     epilog=example(
         "cns-eval scores --method solid --output scores.csv \\",
         "    --database kitti/sequences/01/velodyne \\",
         "    --query kitti/sequences/04/velodyne",
     )
-)(scores)
-app.command(epilog=example("cns-eval report drives --output report"))(report)
-app.command(
+)
+def scores(
+    method: MethodName,
+    database: Annotated[Path, typer.Option(help="Folder of single scans.")],
+    query: Annotated[Path, typer.Option(help="Folder of single scans.")],
+    output: Annotated[Path, typer.Option(help="CSV file to write.")],
+    parameter: Parameters = None,
+    sensor_height: SensorHeight = 1.6,
+    gate: Gate = False,
+    radius: Radius = PAPER_PROTOCOL.radius,
+) -> None:
+    """Scores of all pairs of scans of two folders.
+
+    Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
+    place; searches that only save time are left out. An empty score means that
+    the place is no candidate.
+    """
+    from evaluation.recognition import scan_folders
+
+    protocol = RetrievalProtocol(radius=radius, gate=gate)
+    chosen = _chosen_method(method, parameter, sensor_height)
+    num_ignored = scan_folders.write_scores(
+        chosen,
+        database,
+        query,
+        output,
+        terminal.track,
+        gate_radius=protocol.gate_radius,
+    )
+    if num_ignored:
+        terminal.note(f"{num_ignored} points are not finite, and left out")
+    terminal.note(f"wrote {output}")
+
+
+@app.command(epilog=example("cns-eval ranking simulated/report real/report"))
+def ranking(
+    first: Annotated[Path, typer.Argument(metavar="REPORT")],
+    second: Annotated[Path, typer.Argument(metavar="REPORT")],
+    json: Json = False,
+) -> None:
+    """Whether two reports rank methods alike.
+
+    The reports may be of simulated and of real drives. Prints the mean AUC of
+    each method in both, and Kendall's tau with its 95 %
+    interval. A report is a folder with a queries.csv, or that file.
+    """
+    from evaluation.recognition.rank_agreement import rank_agreement
+
+    found = rank_agreement(first, second)
+    if json:
+        terminal.print_json(found.to_json())
+        return
+    rows = [
+        (method, f"{one:.4f}  {other:.4f}")
+        for method, one, other in zip(
+            found.methods, found.first, found.second, strict=True
+        )
+    ]
+    low, high = map(terminal.number, (found.interval.low, found.interval.high))
+    tau = f"{terminal.number(found.tau)}  (95 %: {low} to {high})"
+    terminal.print_rows(
+        [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
+    )
+
+
+@app.command(epilog=example("cns-eval report drives --output report"))
+@with_protocol
+def report(
+    recordings: Annotated[Path, typer.Argument(metavar="DIR")],
+    output: Annotated[Path, typer.Option(help="Folder to write.")],
+    method: OwnMethods = None,
+    parameter: Settings = None,
+    lidar: LidarName = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    costs: Costs = True,
+    *,
+    protocol: RetrievalProtocol,
+) -> None:
+    """Report on all recordings in a folder.
+
+    Writes tables, figures and report.html. After an interruption the same
+    command goes on where it was.
+    """
+    from cns_drake.base.jobs.cluster import choose_cluster
+    from evaluation.paper import reference_for
+    from evaluation.study import benchmark as reporting
+
+    cluster = choose_cluster(jobs, scheduler)
+    path = reporting.write_report(
+        recordings,
+        output,
+        cluster,
+        method or (),
+        protocol,
+        on_note=terminal.note,
+        settings=parameter or (),
+        with_costs=costs,
+        reference_for=reference_for,
+        lidar=lidar,
+    )
+    print(path)
+
+
+@app.command(
     epilog=example(
         "cns-eval trend family/riverside_01_m* \\",
         "    --query family/riverside_02 --output trend",
     )
-)(trend)
-app.command(epilog=example("cns-eval ranking simulated/report real/report"))(
-    ranking
 )
+@with_protocol
+def trend(
+    databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
+    query: Annotated[Path, typer.Option(help="The query drive.")],
+    output: Annotated[Path, typer.Option(help="Folder to write.")],
+    control: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="A drive on the route of databases through the stage of the "
+            "query, to plot the kept share of AUC as well; may be "
+            "repeated."
+        ),
+    ] = None,
+    method: OwnMethods = None,
+    lidar: LidarName = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    parameter: Settings = None,
+    *,
+    protocol: RetrievalProtocol,
+) -> None:
+    """AUC over TCR_sym, of many databases.
+
+    One drive queries them all, by every method. Writes trend.csv and a figure
+    with 95 % bands. After an interruption the same command goes on where it
+    was.
+    """
+    from cns_drake.base.jobs.cluster import choose_cluster
+    from evaluation.study.trend import write_trend
+    from evaluation.study.trend_databases import measure_trend
+
+    cluster = choose_cluster(jobs, scheduler)
+    points = measure_trend(
+        query,
+        databases,
+        output,
+        cluster,
+        method or (),
+        protocol,
+        control or (),
+        lidar,
+        parameter or (),
+    )
+    print(write_trend(points, output))
 
 
 def main() -> None:
     """Runs the command line and exits with its status."""
     terminal.run(app, "cns-eval")
+
+
+def _chosen_method(
+    name: str, assignments: list[str] | None, height: float
+) -> Method:
+    from evaluation.methods import make_method
+    from evaluation.methods.own_file import load_method
+    from evaluation.study.chosen_methods import parse_setting
+
+    parameters: dict[str, object] = {"sensor_height": height}
+    parameters.update(map(parse_setting, assignments or []))
+    if name.endswith(".py"):
+        name = load_method(Path(name)).name
+    return make_method(name, parameters)
+
+
+def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
+    """Yields names and values of the results of `tcr`."""
+    change = report.change
+    pair = f"{report.source} <-> {report.target}"
+    yield "pair", pair
+    yield "TCR_sym", terminal.number(change.symmetric)
+    if change.undefined_because:
+        yield "  because", change.undefined_because
+    for label, names, side in (
+        ("TCR", (report.source, report.target), change.source_to_target),
+        ("TCR", (report.target, report.source), change.target_to_source),
+    ):
+        counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
+        yield (
+            f"{label} {names[0]} -> {names[1]}",
+            f"{terminal.number(side.ratio)}  {counts}",
+        )
+    if report.masked is not None:
+        yield (
+            "TCR_sym where both drove",
+            terminal.number(report.masked.symmetric),
+        )
+    if report.control is not None and report.control_names is not None:
+        value = terminal.number(report.control.symmetric)
+        yield (
+            "TCR_sym of the routes alone",
+            f"{value}  ({' <-> '.join(report.control_names)})",
+        )
+
+
+def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
+    """Yields names and values of the results of `pr`."""
+    from evaluation.recognition.pose_errors import (
+        SUCCESS_ROTATION_DEG,
+        SUCCESS_TRANSLATION,
+    )
+
+    metrics = result.metrics
+    yield "method", result.method
+    yield "database -> query", f"{result.database} -> {result.query}"
+    yield "mode", metrics.mode
+    yield (
+        "queries, with a match (N)",
+        f"{metrics.num_queries}, {metrics.num_with_match}",
+    )
+    yield (
+        "R@1",
+        f"{terminal.number(metrics.recall_at_1)}"
+        f"  {_interval_text(metrics.recall_at_1_interval)}"
+        f"  (TP {metrics.num_right} of N {metrics.num_with_match})",
+    )
+    for rank in (5, 10, 25):
+        yield f"R@{rank}", terminal.number(metrics.recall_at_n[rank - 1])
+    yield "R@1%", terminal.number(metrics.recall_at_1_percent)
+    yield (
+        "AUC",
+        f"{terminal.number(metrics.auc)}"
+        f"  {_interval_text(metrics.auc_interval)}",
+    )
+    f1 = terminal.number(metrics.f1_max)
+    if metrics.f1_max_index is not None:
+        index = metrics.f1_max_index
+        f1 += (
+            f"  (TP {metrics.curve.true_positives[index]},"
+            f" T {metrics.curve.counted[index]})"
+        )
+    yield "F1max", f1
+    number = terminal.number(metrics.curve.recall_at_full_precision)
+    yield "recall at 100 % precision", number
+    outcomes = result.outcomes
+    yield (
+        "mean reciprocal rank",
+        terminal.number(outcomes.mean_reciprocal_rank),
+    )
+    if not isnan(outcomes.match_auroc):
+        yield (
+            "AUROC of queries with a match",
+            terminal.number(outcomes.match_auroc),
+        )
+    yield (
+        "AUC by radius",
+        ", ".join(
+            f"{radius:g} m {terminal.number(auc)}"
+            for radius, auc in result.auc_over_radius().items()
+        ),
+    )
+    pose = result.pose
+    if not isnan(pose.success):
+        yield (
+            "translation error, median, 90 %",
+            f"{terminal.number(pose.translation_median)} m,"
+            f" {terminal.number(pose.translation_90)} m"
+            f"  ({pose.num_accepted} accepted matches)",
+        )
+        yield (
+            "rotation error, median, 90 %",
+            f"{terminal.number(pose.rotation_median_deg)} deg,"
+            f" {terminal.number(pose.rotation_90_deg)} deg",
+        )
+        yield (
+            f"within {SUCCESS_TRANSLATION:g} m"
+            f" and {SUCCESS_ROTATION_DEG:g} deg",
+            f"{terminal.number(pose.success)}  (of N)",
+        )
+    yield "protocol", result.protocol.to_text()
+
+
+def _interval_text(interval: Interval) -> str:
+    low, high = terminal.number(interval.low), terminal.number(interval.high)
+    return f"[{low}, {high}]"

@@ -144,12 +144,9 @@ class LadderRow:
         before = self.unchanged[0].outcomes.is_right
         if len(before) != len(self.outcomes):
             return math.nan
-        return self.mean(
-            lambda one: np.count_nonzero(
-                (one.outcomes.is_right != before)
-                & (one.outcomes.is_right == is_right)
-            )
-        )
+        after = [one.outcomes.is_right for one in self.draws]
+        turned = [(one != before) & (one == is_right) for one in after]
+        return float(np.mean([one.sum() for one in turned]))
 
     def mean_overlap(self) -> float:
         """Returns the mean of `RungOutcome.overlaps`; NaN if all are."""
