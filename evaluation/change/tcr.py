@@ -8,7 +8,7 @@ are open in the paper.
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.
 - The two united sets are of different clouds. The union is a concatenation:
-TCR_sym is the mean of the directed ratios, weighted by the sizes of H.
+  TCR_sym is the mean of the directed ratios, weighted by the sizes of H.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+import itertools
 from pathlib import Path
 import re
 
@@ -24,6 +25,17 @@ PERSONAL = re.compile(
 
 # A field of a docstring behind the end of another one's text.
 HIDDEN_FIELD = re.compile(r"\n +\w[^\n]*\. ([a-z_]+:)\n")
+
+# A bullet or a number of a list within a line.
+INNER_BULLET = re.compile(r"[.:;]\s(?:- |\d\. )[A-Z]")
+
+# One at the beginning of a line, which the lines of its text stand right of.
+BULLET = re.compile(r"( *)(?:- |\d\. )")
+
+# Fields whose text does not begin with its noun: "of the vehicle" says what a
+# reader has yet to guess.
+NOUNLESS_FIELD = re.compile(r"^ +(\w+(?:, \w+)*): of\b", re.MULTILINE)
+MOST_NOUNLESS_FIELDS = 100
 
 # Found text -> why it stays.
 ALLOWED = {
@@ -110,3 +122,40 @@ def test_each_field_of_a_docstring_begins_a_line():
     assert findings(HIDDEN_FIELD, texts(*ALL_CODE)) == []
     text = "\n    a: the first. b:\n        the second.\n"
     assert HIDDEN_FIELD.search(text)[1] == "b:"
+
+
+def lost_bullets(text: str) -> list[str]:
+    """Returns the lines of a docstring whose lists were joined or cut."""
+    lines = text.splitlines()
+    found = [line for line in lines if INNER_BULLET.search(line)]
+    for line, following in itertools.pairwise(lines):
+        bullet = BULLET.match(line)
+        if bullet and following.strip() and not BULLET.match(following):
+            indent = len(following) - len(following.lstrip())
+            # A heading of Drake's block of ports may follow its list.
+            if indent <= len(bullet[1]) and not following.endswith(":"):
+                found.append(following)
+    return found
+
+
+def test_lists_are_whole():
+    assert [
+        f"{place}: {line}"
+        for place, text in docstrings(texts(*ALL_CODE))
+        for line in lost_bullets(text)
+    ] == []
+
+
+def test_a_lost_bullet_is_noticed():
+    assert lost_bullets("- One goes\n  on.\n- Two.\n\n1. a\n   b\n2. c") == []
+    assert lost_bullets("- One. - Two.") == ["- One. - Two."]
+    assert lost_bullets("Text:\n1. One\ngoes on.") == ["goes on."]
+
+
+def test_fields_begin_with_their_nouns():
+    found = [
+        f"{place}: {field[1]}"
+        for place, text in docstrings(texts(*CODE))
+        for field in NOUNLESS_FIELD.finditer(text)
+    ]
+    assert len(found) < MOST_NOUNLESS_FIELDS, "\n".join(found)

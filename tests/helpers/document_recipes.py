@@ -594,7 +594,9 @@ NOT_RUN = {
     "network and runs these tests; `.ci/run` takes this very line",
     "apt install": "changes the system; `.ci/run` installs the same packages",
     "npm ci": "installs from the network; `.ci/run` does it",
-    ".venv/bin/mypy": "reads this project, not an example; test_types runs it",
+    ".venv/bin/mypy && .venv/bin/lint-imports": (
+        "these read this project, not an example; tests/packages runs them"
+    ),
     ".venv/bin/pip install -e '.[docs]'": "installs from the network",
     ".venv/bin/pip install pre-commit": "installs from the network and changes"
     " the repository's hooks",

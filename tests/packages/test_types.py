@@ -1,4 +1,4 @@
-"""Types fit, and every function has hints.
+"""Types fit, every function has hints, and words are spelled right.
 
 What is checked, and what cannot be, stands in `pyproject.toml`.
 """
@@ -13,9 +13,13 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.slow
-def test_mypy_finds_nothing():
+@pytest.mark.parametrize("checker", ["mypy", "codespell_lib"])
+def test_it_finds_nothing(checker):
     done = subprocess.run(
-        [sys.executable, "-m", "mypy"], cwd=ROOT, capture_output=True, text=True
+        [sys.executable, "-m", checker],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr
 
