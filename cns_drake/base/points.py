@@ -29,7 +29,7 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
     return coordinates
 
 
-def check_near(points: np.ndarray, limit: float, first: int = 0) -> None:
+def check_range(points: np.ndarray, limit: float, first: int = 0) -> None:
     """Refuses numbers that cannot be coordinates, such as misread bytes.
 
     Values that are not finite pass: many sensors store them for beams without a

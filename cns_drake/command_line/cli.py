@@ -15,11 +15,7 @@ from cns_drake.command_line.listing import list_drives
 from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
 from cns_drake.command_line.reproducing import reproduce
-from cns_drake.command_line.simulating import (
-    generate,
-    scan,
-    simulate,
-)
+from cns_drake.command_line.simulating import generate, scan, simulate
 from cns_drake.command_line.trends import trend
 
 app = terminal.make_program(

@@ -9,11 +9,7 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.interrupts import uninterrupted
-from evaluation.command_line.options import (
-    MaxRange,
-    PlaceSpacing,
-    QuerySpacing,
-)
+from evaluation.command_line.options import MaxRange, PlaceSpacing, QuerySpacing
 from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 _Drive = Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")]

@@ -10,11 +10,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
 from cns_drake.command_line.options import Jobs, Maps, Output, Scheduler
-from evaluation.command_line.options import (
-    Costs,
-    Settings,
-    with_protocol,
-)
+from evaluation.command_line.options import Costs, Settings, with_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
 
 

@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.command_line.options import (
-    Jobs,
-    MethodFiles,
-    Results,
-    Scheduler,
-)
+from cns_drake.command_line.options import Jobs, MethodFiles, Results, Scheduler
 from cns_drake.command_line.simulating import family_members
 from evaluation.command_line.options import Settings, with_protocol
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -17,11 +17,7 @@ from pydrake.systems.sensors import (
 
 from cns_drake.base.drives.point_layouts import to_labels, to_layout
 from cns_drake.recording import messages
-from cns_drake.recording.messages import (
-    ENCODINGS,
-    make_camera_info,
-    make_image,
-)
+from cns_drake.recording.messages import ENCODINGS, make_camera_info, make_image
 from cns_drake.recording.object_messages import (
     BoxMessages,
     marked_boxes,

@@ -12,7 +12,7 @@ import numpy as np
 from cns_drake.base import points as point_arrays
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
-from cns_drake.base.points import check_near
+from cns_drake.base.points import check_range
 from cns_drake.base.poses import FARTHEST
 from evaluation.clouds.pcd import read_pcd
 from evaluation.clouds.ply import read_ply
@@ -76,7 +76,7 @@ def read_blocks(path: Path, block: int = _BLOCK) -> Iterator[np.ndarray]:
         check_regular(path)
         read = 0
         for points in reader(path, block):
-            check_near(points, FARTHEST, first=read)
+            check_range(points, FARTHEST, first=read)
             read += len(points)
             yield points
 

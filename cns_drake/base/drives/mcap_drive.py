@@ -18,10 +18,7 @@ from cns_drake.base.drives.drive import (
     index_instances,
 )
 from cns_drake.base.drives.mcap_file import McapFile
-from cns_drake.base.drives.mcap_messages import (
-    StaticTransforms,
-    checked_poses,
-)
+from cns_drake.base.drives.mcap_messages import StaticTransforms, checked_poses
 from cns_drake.base.drives.point_layouts import (
     from_layout,
     to_points,
@@ -161,7 +158,7 @@ class McapDrive(Drive):
         message = self._message(self._lidar_topic, self._scans[index])
         try:
             points = to_points(message)
-            point_arrays.check_near(points, point_arrays.FARTHEST_RETURN)
+            point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
             return from_layout(points, self._labels(index, message))
         except ValueError as error:
             raise InputError(

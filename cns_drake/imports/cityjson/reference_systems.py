@@ -8,7 +8,6 @@ https://www.cityjson.org/specs/2.0.1/#referencesystem-crs
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 import pyproj
@@ -88,33 +87,17 @@ class ReferenceSystem:
 
         A system that names none has none.
         """
-        to_degrees, bounds = _place_finder(self.name)
-        if bounds is None:
+        system = pyproj.CRS.from_user_input(self.name)
+        if system.area_of_use is None:
             return False
+        to_degrees = pyproj.Transformer.from_crs(system, "OGC:CRS84")
         longitude, latitude = to_degrees.transform(first, second)
-        west, south, east, north = bounds
+        west, south, east, north = system.area_of_use.bounds
         near = _NEAR_AREA_DEG
         return bool(
             west - near <= longitude <= east + near
             and south - near <= latitude <= north + near
         )
-
-
-@cache
-def _place_finder(
-    name: str,
-) -> tuple[pyproj.Transformer, tuple[float, float, float, float] | None]:
-    """Returns a system's way to longitude and latitude, and its area of use.
-
-    The area is west, south, east and north [deg]. A file is looked at in both
-    orders of its axes, and building this takes long.
-    """
-    system = pyproj.CRS.from_user_input(name)
-    to_degrees = pyproj.Transformer.from_crs(
-        system, "OGC:CRS84", always_xy=False
-    )
-    area = system.area_of_use
-    return to_degrees, None if area is None else area.bounds
 
 
 def reference_system(name: str, where: str) -> ReferenceSystem:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 
@@ -18,6 +18,7 @@ from cns_drake.imports.drives.search import (
     Obstacle,
     WayGraph,
     WaypointDrive,
+    evenly_spaced,
     steerable_drive,
 )
 from cns_drake.imports.foreign_city import SHARPEST_TURN_DEG, Street
@@ -127,25 +128,13 @@ def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
         lanes: each leads into the next.
         spacing: about the distance of the points [m].
     """
-    rows = list(_rows(lanes, spacing))
-    kept = [rows[0]] + [
-        row
-        for before, row in pairwise(rows)
-        if np.hypot(row[0] - before[0], row[1] - before[1]) > 1e-6
-    ]
-    return np.array(kept)
-
-
-def _rows(
-    lanes: Sequence[Lane], spacing: float
-) -> Iterator[tuple[float, float, float]]:
+    parts = []
     for lane in lanes:
-        steps = np.linalg.norm(np.diff(lane.line, axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
-        count = max(2, round(along[-1] / spacing) + 1)
-        wanted = np.linspace(0.0, along[-1], count)
-        x, y = (np.interp(wanted, along, axis) for axis in lane.line.T)
-        yield from zip(x, y, np.full(count, lane.aside), strict=True)
+        line = evenly_spaced(lane.line, spacing)
+        parts.append(np.column_stack([line, np.full(len(line), lane.aside)]))
+    rows = np.concatenate(parts)
+    steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
+    return rows[np.append(True, steps > 1e-6)]
 
 
 class CellGraph(WayGraph):

@@ -117,6 +117,15 @@ def steerable_drive(
     return Obstacle(points[len(points) // 2]) if too_short else drive
 
 
+def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
+    """Returns places (N, D) along a line (M, D), about a spacing apart [m]."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    count = max(1, round(along[-1] / spacing))
+    wanted = np.linspace(0.0, along[-1], count + 1)
+    return np.column_stack([np.interp(wanted, along, x) for x in line.T])
+
+
 def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns the places (M, 2) of a path, and the radii (M,) of its bends.
 

@@ -14,6 +14,7 @@ from cns_drake.imports.drives.search import (
     Obstacle,
     WayGraph,
     WaypointDrive,
+    evenly_spaced,
     find_drives,
     steerable_drive,
 )
@@ -104,7 +105,9 @@ class BandGraph(WayGraph):
 
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
         line = np.concatenate([self._lines[k] for k in way])
-        points = _resampled(_forwards(line))[: int(LONGEST / _SPACING) + 1]
+        points = evenly_spaced(_forwards(line), _SPACING)[
+            : int(LONGEST / _SPACING) + 1
+        ]
         limits = [limit for k in way for _, limit in self._bands[k].road.limits]
         found: WaypointDrive | Obstacle = Obstacle(points[0, :2])
         for window in _SMOOTHING:
@@ -173,14 +176,6 @@ def _forwards(line: np.ndarray) -> np.ndarray:
         if size > 0.05 and step @ last > 0.5 * size * np.hypot(*last):
             kept.append(point)
     return np.array(kept)
-
-
-def _resampled(line: np.ndarray) -> np.ndarray:
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
-    count = max(1, round(along[-1] / _SPACING))
-    wanted = np.linspace(0.0, along[-1], count + 1)
-    return np.column_stack([np.interp(wanted, along, x) for x in line.T])
 
 
 def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:

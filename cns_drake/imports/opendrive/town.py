@@ -13,11 +13,7 @@ from shapely import GEOSException
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, stage_name
-from cns_drake.city.generation.city_structures import (
-    City,
-    Streets,
-    build_along,
-)
+from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.starter import starter_plan, starter_stages
 from cns_drake.city.geometry.polygons import polygons_of
