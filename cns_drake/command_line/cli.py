@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
-from cns_drake.command_line.city import city
-from cns_drake.command_line.importing import import_city
 from cns_drake.command_line.laddering import ladder, levels
-from cns_drake.command_line.listing import list_drives
+from cns_drake.command_line.maps import city, import_city, list_drives
 from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
 from cns_drake.command_line.reproducing import reproduce

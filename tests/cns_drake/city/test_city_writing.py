@@ -9,7 +9,7 @@ import typer
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import generate_city
-from cns_drake.command_line.city import city
+from cns_drake.command_line.maps import city
 
 pytestmark = pytest.mark.slow
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from cns_drake.command_line.listing import list_drives, table_lines
+from cns_drake.command_line.maps import list_drives, table_lines
 from cns_drake.scenarios.drive_table import DriveRow
 from cns_drake.scenarios.shipped import recordable_drives
 

@@ -1,25 +1,124 @@
-"""The command `cns-drake import`."""
+"""Commands on maps: `list`, `import` and `city`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+import shutil
+import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
+from cns_drake.command_line.options import Jobs
 from cns_drake.imports.options import DriveOn, ImportOptions, Undated
 
 if TYPE_CHECKING:
-    from cns_drake.imports.options import ImportReport
+    from cns_drake.scenarios.drive_table import DriveRow
 
+_HEADINGS = (
+    "drive",
+    "map",
+    "stage",
+    "length",
+    "time",
+    "frames",
+    "structures",
+    "triangles",
+)
+# Columns without room are dropped in this order.
+_GIVE_WAY = (
+    "map",
+    "structures",
+    "triangles",
+    "stage",
+    "frames",
+    "time",
+    "length",
+)
+_GAP = "  "
 # Share of the buildings that the first stage of a city without years lacks.
 _GROW = 0.3
+
+
+def list_drives(
+    folders: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="FOLDER",
+            help="Folders of your own maps; the shipped ones by default.",
+        ),
+    ] = None,
+) -> None:
+    """List drives and their figures.
+
+    Shows length and time of each drive, its recorded frames, and the structures
+    and triangles of its stage. A narrow terminal shows fewer columns; a file or
+    pipe gets all of them.
+    """
+    with uninterrupted():
+        from cns_drake.scenarios.drive_table import drive_rows
+        from cns_drake.scenarios.shipped import shipped_maps
+
+    rows = []
+    for folder in folders or shipped_maps().values():
+        of_map = drive_rows(folder, note)
+        if folders and not of_map:
+            raise InputError(
+                f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+            )
+        rows += of_map
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    for line in table_lines(rows, width):
+        print(line)
+
+
+def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
+    """Yields the lines of a table of drives.
+
+    Args:
+        rows: the drives.
+        width: the most characters of a line; columns other than the names are
+            dropped to keep it. None keeps all columns.
+    """
+    lines = [_HEADINGS] + [
+        (
+            row.sequence,
+            row.map,
+            row.stage,
+            f"{row.length:.0f} m",
+            f"{row.duration:.1f} s",
+            str(row.frames),
+            str(row.structures),
+            str(row.triangles),
+        )
+        for row in rows
+    ]
+    columns = dict(zip(_HEADINGS, zip(*lines, strict=True), strict=True))
+    widths = {name: max(map(len, cells)) for name, cells in columns.items()}
+    for name in _GIVE_WAY:
+        total = sum(widths.values()) + len(_GAP) * (len(widths) - 1)
+        if width is None or total <= width:
+            break
+        del widths[name]
+    for line in lines:
+        cells = dict(zip(_HEADINGS, line, strict=True))
+        yield _GAP.join(
+            cells[name].ljust(widths[name])
+            if name in ("drive", "map", "stage")
+            else cells[name].rjust(widths[name])
+            for name in widths
+        ).rstrip()
+
+
+if TYPE_CHECKING:
+    from cns_drake.imports.options import ImportReport
 
 
 def import_city(
@@ -137,7 +236,7 @@ def import_city(
     )
     with uncollected():
         report = _imported(path, output, options)
-    print_rows(_rows(report, options.years))
+    print_rows(_report_rows(report, options.years))
     for line in _shortcomings(report, output, options):
         note(f"{output}: {line}")
 
@@ -183,7 +282,7 @@ def _differences(numbers: list[int]) -> str:
     return ", ".join(str(b - a) for a, b in pairwise(numbers))
 
 
-def _rows(
+def _report_rows(
     report: ImportReport, years: tuple[int, ...]
 ) -> Iterator[tuple[str, str]]:
     for kind, number in report.kinds.items():
@@ -198,3 +297,96 @@ def _rows(
         yield f"drive {letter}", f"{length:.0f} m"
     for kind, number, example in report.faults:
         yield kind, f"{number}, such as {example}"
+
+
+def city(
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FOLDER",
+            help="Folder with roads.yaml, city.yaml and stages.yaml, and the "
+            "drives of the city, whose figures are brought up to date.",
+        ),
+    ],
+    start: Annotated[
+        bool,
+        typer.Option(
+            "--start",
+            help="First write the missing files besides roads.yaml: a plan "
+            "with a district for each block, two stages, a drive for "
+            "each.",
+        ),
+    ] = False,
+    seed: Annotated[
+        int,
+        typer.Option(min=0, metavar="N", help="Seed of --start's draws."),
+    ] = 0,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check",
+            help="Write nothing; exit with 1 if a file would change.",
+        ),
+    ] = False,
+    repair_stages: Annotated[
+        bool,
+        typer.Option(
+            "--repair-stages",
+            help="Update stages.yaml after the plan has grown: structures "
+            "that have kept their place in structures.csv get their new "
+            "names.",
+        ),
+    ] = False,
+    calibrate: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            metavar="EARLIER LATER",
+            help="Generate nothing. Simulate the drives of two stages, "
+            "such as 01 04, and show TCR_sym and each method without the "
+            "offset of the routes, without absent structures, and "
+            "without lower ones.",
+        ),
+    ] = None,
+    jobs: Jobs = None,
+) -> None:
+    """Build a city from its roads and plan."""
+    if calibrate is not None:
+        _calibrate(folder, *calibrate, jobs)
+        return
+    with uninterrupted():
+        from cns_drake.city.generation.generate import (
+            differing_files,
+            generate_city,
+        )
+        from cns_drake.city.generation.starter import start_city
+        from cns_drake.scenarios.drive_table import write_table
+
+    if check:
+        changed = differing_files(folder, note, repair_stages=repair_stages)
+        for path in changed:
+            print(path)
+        if changed:
+            raise typer.Exit(1)
+        return
+    if start:
+        start_city(folder, seed, note)
+    files = generate_city(folder, note, repair_stages=repair_stages)
+    write_table(folder, note)
+    note(f"{len(files)} files")
+
+
+def _calibrate(
+    folder: Path, earlier: str, later: str, jobs: int | None
+) -> None:
+    with uninterrupted():  # Only --calibrate needs the evaluation.
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.scenarios.scenario_files import load_scenario
+        from cns_drake.studies.knob_effects import effect_lines, knob_effects
+
+    first, last = (
+        load_scenario(MapFolder(folder).drive(stage))
+        for stage in (earlier, later)
+    )
+    effects = knob_effects(first, last, choose_cluster(jobs, None))
+    for line in effect_lines(effects):
+        print(line)
