@@ -17,7 +17,12 @@ from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
 from cns_drake.command_line.options import Jobs
-from cns_drake.imports.options import DriveOn, ImportOptions, Undated
+from cns_drake.imports.options import (
+    DriveOn,
+    ImportOptions,
+    ImportReport,
+    Undated,
+)
 
 if TYPE_CHECKING:
     from cns_drake.scenarios.drive_table import DriveRow
@@ -115,10 +120,6 @@ def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
             else cells[name].rjust(widths[name])
             for name in widths
         ).rstrip()
-
-
-if TYPE_CHECKING:
-    from cns_drake.imports.options import ImportReport
 
 
 def import_city(
