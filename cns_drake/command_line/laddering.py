@@ -73,8 +73,7 @@ def ladder(
             QUICK_PROTOCOL,
             climb_ladder,
         )
-        from cns_drake.studies.ladder_causes import CAUSES
-        from cns_drake.studies.ladder_rungs import Extent
+        from cns_drake.studies.ladder_rungs import CAUSES, Extent
         from cns_drake.studies.levels import LEVELS_EXTENT, LEVELS_PROTOCOL
         from evaluation.recognition.protocol import PAPER_PROTOCOL
         from evaluation.study.chosen_methods import choose_methods

@@ -23,8 +23,11 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.trend_databases import TrendDatabase, measure_drives
-from evaluation.study.trend_points import TrendPoint
+from evaluation.study.trend_databases import (
+    TrendDatabase,
+    TrendPoint,
+    measure_drives,
+)
 
 _AS_IT_IS = "as_it_is"
 # Variant of the earlier stage -> its title.

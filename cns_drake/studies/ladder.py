@@ -6,23 +6,32 @@ cause of change between the two at a time. Nothing is recorded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+import itertools
 from pathlib import Path
+
+import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing, make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario, map_folder
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies.distractors import distracting_drives
-from cns_drake.studies.ladder_causes import plain_drives
-from cns_drake.studies.ladder_rungs import Extent, Rung, plan_rungs
+from cns_drake.studies.ladder_rungs import (
+    Extent,
+    Rung,
+    plain_drives,
+    plan_rungs,
+)
+from cns_drake.studies.redrawing import redraw_cities
 from cns_drake.studies.reproduction import recordable_map
+from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
@@ -38,10 +47,9 @@ from evaluation.report.ladder import (
     ladder_text,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.described_drives import DescribeDrive
-from evaluation.study.parts import read_part
-from evaluation.study.rungs import MeasureRung, RungDrive
-from evaluation.study.study_layout import StudyFiles, SurveyFiles
+from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
+from evaluation.study.rungs import DescribedSource, measure_rung
+from evaluation.study.surveys import DescribeDrive
 
 # With --quick only the strongest level of each cause is measured, on every
 # other query.
@@ -51,6 +59,9 @@ QUICK_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
 # Expected seconds: to describe a drive, and for a rung.
 _DESCRIPTION_COST = 30.0
 _RUNG_COST = 60.0
+
+# Name of the only stage of a redrawn city.
+_STAGE = "01"
 
 
 def climb_ladder(
@@ -88,7 +99,7 @@ def climb_ladder(
     make_folder(output)
     files = StudyFiles(output.absolute())
     jobs: dict[str, Job] = {}
-    climbed: list[tuple[Scenario, Rung, Path]] = []
+    climbed: list[tuple[Scenario, Rung, Part]] = []
     for drive in query_drives:
         rungs, notes = plan_rungs(drive, extent)
         for text in notes:
@@ -114,7 +125,7 @@ def climb_ladder(
             _labelled(drive, rung, protocol),
             rung.seed,
             rung.fingerprint(),
-            read_part(part),
+            part.read(),
         )
         for drive, rung, part in climbed
     ]
@@ -159,38 +170,45 @@ class _Plan:
     def add_distractors(self, drives: Sequence[Scenario]) -> None:
         self._distractors = list(drives)
 
-    def add_rung(self, rung: Rung) -> Path:
-        """Adds the jobs of a rung; returns the file that they write."""
+    def add_rung(self, rung: Rung) -> Part:
+        """Adds the jobs of a rung; returns the part that they write."""
         needs: list[str] = []
         others = self._distractors if rung.drives.num_distractors else ()
         name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
         part = self._files.rung(name)
-        step = MeasureRung(
-            database=self._drive(rung, "database", "places", needs),
-            query=self._drive(rung, "query", "queries", needs),
-            distractors=tuple(
-                self._describe(drive, "places", needs, with_scans=False)
-                for drive in others
+        radius = rung.drives.radius(self._protocol.radius)
+        step = MakePart(
+            part,
+            measure_rung,
+            (
+                self._drive(rung, "database", "places", needs),
+                self._drive(rung, "query", "queries", needs),
+                tuple(
+                    self._descriptions(
+                        self._describe(drive, "places", needs, with_scans=False)
+                    )
+                    for drive in others
+                ),
+                rung.drives.num_distractors,
+                self._methods,
+                replace(self._protocol, radius=radius),
             ),
-            num_distractors=rung.drives.num_distractors,
-            methods=self._methods,
-            protocol=replace(
-                self._protocol,
-                radius=rung.drives.radius(self._protocol.radius),
-            ),
-            part=part,
         )
         self.jobs[name] = Job(name, step, tuple(needs), _RUNG_COST)
         return part
 
     def _drive(
         self, rung: Rung, side: str, role: Role, needs: list[str]
-    ) -> RungDrive:
+    ) -> DescribedSource:
         drive = getattr(rung.drives, side)
         # Only drives without a change serve several rungs.
-        is_shared = drive == getattr(self._plain, side)
-        files = self._describe(drive, role, needs) if is_shared else None
-        return RungDrive(DriveSimulation(drive), files)
+        if drive != getattr(self._plain, side):
+            return DriveSimulation(drive)
+        files = self._describe(drive, role, needs)
+        return files.scans, *self._descriptions(files)
+
+    def _descriptions(self, files: SurveyFiles) -> tuple[Part, ...]:
+        return tuple(map(files.described, self._methods))
 
     def _describe(
         self,
@@ -248,3 +266,90 @@ def _write(
 def _write_text(path: Path, text: str) -> None:
     with completing(path) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def distracting_drives(
+    query: Scenario,
+    number: int,
+    spacing: float,
+    output: Path,
+    cluster: Cluster,
+) -> list[Scenario]:
+    """Returns drives through other cities with about so many places.
+
+    These are the shipped drives of other maps, each through its own stage;
+    then those of this map, along the same streets between other buildings, if
+    it is shipped; then the drives of other maps through the other stages; then
+    through those cities drawn anew.
+
+    Args:
+        query: a drive through the city whose places are not to stand among
+            these; its LiDARs measure the others, too.
+        number: of places.
+        spacing: between two places [m].
+        output: folder for redrawn cities.
+        cluster: where these are drawn.
+
+    Raises:
+        InputError: a shipped map cannot be used.
+    """
+    drives: list[Scenario] = []
+    for drive in _drives(query, output, cluster):
+        if number <= 0:
+            break
+        drive = drive.model_copy(update={"lidars": query.lidars})
+        drives.append(drive)
+        number -= _num_places(drive, spacing)
+    return drives
+
+
+def _num_places(scenario: Scenario, spacing: float) -> int:
+    trajectory = plan_drive(scenario)
+    frames = count_frames(scenario, trajectory)
+    _, p_WB = trajectory.poses(scenario.frame_period * np.arange(frames))
+    return len(sample_frames(p_WB, spacing))
+
+
+def _drives(
+    query: Scenario, output: Path, cluster: Cluster
+) -> Iterator[Scenario]:
+    """Yields an endless series of drives."""
+    maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
+    drives = {
+        name: [load_scenario(path) for path in folder.recordable_drives()]
+        for name, folder in maps.items()
+    }
+    own = Path(str(query.map)).name
+    others = [name for name in maps if name != own]
+
+    def redrawn(name: str, seed: int) -> Iterator[Scenario]:
+        cities = redraw_cities(maps[name].path, _STAGE, [seed], output, cluster)
+        for one in drives[name]:
+            yield _elsewhere(one, str(cities[seed]), _STAGE, f"c{seed}")
+
+    for name in others:
+        yield from drives[name]
+    if own in maps:
+        yield from redrawn(own, 1)
+    for name in others:
+        for stage in maps[name].stages():
+            yield from (
+                _elsewhere(one, one.map, stage, stage)
+                for one in drives[name]
+                if one.stage != stage
+            )
+    for seed in itertools.count(1):
+        for name in others:
+            yield from redrawn(name, seed)
+
+
+def _elsewhere(
+    scenario: Scenario, place: str | None, stage: str, ending: str
+) -> Scenario:
+    return scenario.model_copy(
+        update={
+            "name": f"{scenario.name}_in_{ending}",
+            "map": place,
+            "stage": stage,
+        }
+    )

@@ -1,32 +1,267 @@
-"""The rungs of a ladder on a map: causes and levels."""
+"""The rungs of a ladder on a map: causes of change, and their strengths.
+
+Each cause changes one of the two drives. The city at the time of mapping, the
+ride and the place of the mapping LiDAR change the drive of the database.
+Conditions and sensor of the later visit change the drive of the query, but
+never its route.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+import math
 from typing import Any
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario import RideConfig, Scenario, TrafficConfig
 from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.sensors.lidar.config import WeatherConfig
 from cns_drake.simulation.loaded_drive import load_ways
-from cns_drake.studies.ladder_causes import (
-    ALL,
-    APART,
-    CAUSES,
-    NONE,
-    RANDOM_CAUSES,
-    STRENGTHS,
-    STRONGEST,
-    RungDrives,
-    changed_drives,
-    in_words,
-    plain_drives,
-)
 from cns_drake.traffic.vehicles import room_for_vehicles
+
+# The unchanged world, and all causes together.
+NONE = "none"
+ALL = "all"
+# The strongest level; that of `none` is 0.
+STRONGEST = 4
+# Switches of the section `transient` of a scenario.
+_TRANSIENT = (
+    "parked_cars",
+    "leaves",
+    "snow",
+    "scaffolds",
+    "works",
+    "furniture",
+)
+CAUSES = (
+    NONE,
+    "construction",
+    *_TRANSIENT,
+    "traffic",
+    "weather",
+    "returns",
+    "ride",
+    "sensor",
+    "viewpoint",
+    "lateral",
+    "size",
+    ALL,
+)
+# Causes that take no part in `all`.
+APART = frozenset({"lateral"})
+# Causes that another seed draws anew.
+RANDOM_CAUSES = frozenset(
+    {*_TRANSIENT, "traffic", "weather", "returns", "ride", ALL}
+)
 
 # Greatest share of the roads' room for traffic: the car needs some, too.
 _MOST_ROOM = 0.5
+# No driver keeps exactly to a line: the LiDAR of the database is this far ahead
+# of the query's, and to its left [m].
+_AHEAD = 1.25
+_LEFT = 0.5
+
+# Cause -> level -> strength. The levels of construction are the map's stages.
+STRENGTHS: Mapping[str, Mapping[int, Any]] = {
+    # Shares, or a depth [m]; see the scenario's `transient`.
+    "parked_cars": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
+    "leaves": {1: 0.75, 2: 0.5, 3: 0.25, 4: 0.0},
+    "snow": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
+    "scaffolds": {1: 0.1, 2: 0.2, 3: 0.4, 4: 0.8},
+    "works": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
+    "furniture": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
+    # Number of vehicles, and of walkers.
+    "traffic": {1: 15, 2: 30, 3: 60, 4: 120},
+    # Visibility in fog [m].
+    "weather": {1: 200.0, 2: 100.0, 3: 50.0, 4: 25.0},
+    "returns": {1: "calibrated"},
+    # Class of the road of ISO 8608.
+    "ride": {1: "A", 2: "B", 3: "C", 4: "D"},
+    # Preset.
+    "sensor": {1: "os1-64", 2: "hdl-64e", 3: "vlp-16", 4: "avia"},
+    # Offset to the left [m], and heading [deg].
+    "viewpoint": {1: (2.0, 0), 2: (4.0, 0), 3: (6.0, 0), 4: (6.0, 180)},
+    # Offset to the left [m].
+    "lateral": {1: 5.0, 2: 10.0, 3: 15.0},
+    # Number of places of other cities.
+    "size": {1: 300, 2: 1000, 3: 3000, 4: 10000},
+}
+
+_WORDS = {
+    "construction": "mapped in stage {}",
+    "parked_cars": "{:.0%} of the parked cars are others",
+    "leaves": "{:.0%} of the leaves are left",
+    "snow": "{:g} m of snow",
+    "scaffolds": "{:.0%} of the fronts behind scaffolds",
+    "works": "works beside {:.0%} of the kerbs",
+    "furniture": "{:.0%} of the furniture replaced",
+    "traffic": "{} vehicles and as many walkers",
+    "weather": "fog, {:g} m of visibility",
+    "returns": "{} returns",
+    "ride": "mapped on a road of class {}",
+    "sensor": "the query measures with {}",
+    "viewpoint": "mapped {0[0]:g} m to the left, heading {0[1]} deg",
+    "lateral": "mapped {:g} m to the left",
+    "size": "{} more places",
+}
+
+
+@dataclass(frozen=True)
+class RungDrives:
+    """The drives of a rung of a ladder.
+
+    Attributes:
+        database: drive of the mapped places.
+        query: drive of the queries.
+        num_distractors: places of other cities in the database.
+        lateral: distance between the two ways that a match has to bridge [m].
+    """
+
+    database: Scenario
+    query: Scenario
+    num_distractors: int = 0
+    lateral: float = 0.0
+
+    def radius(self, along: float) -> float:
+        """Returns the radius of a match [m].
+
+        On a straight road, as many places match at any lateral distance.
+
+        Args:
+            along: greatest distance of a match along the way [m].
+        """
+        return math.hypot(along, self.lateral)
+
+
+def plain_drives(scenario: Scenario) -> RungDrives:
+    """Returns the drives without a change: one route, one city.
+
+    Args:
+        scenario: of the query.
+    """
+    database = scenario.model_copy(update={"name": f"{scenario.name}_database"})
+    return RungDrives(_mapped_from(database, _AHEAD, _LEFT, 0.0), scenario)
+
+
+def changed_drives(
+    plain: RungDrives, strengths: Mapping[str, Any], seed: int
+) -> RungDrives:
+    """Returns drives with causes of change between them.
+
+    Args:
+        plain: drives without a change.
+        strengths: cause -> its strength.
+        seed: of random draws.
+    """
+    drives = plain
+    # The order is fixed, since returns depend on the sensor.
+    for cause, change in _CHANGES.items():
+        if cause in strengths:
+            drives = change(drives, strengths[cause], seed)
+    return drives
+
+
+def in_words(cause: str, strength: Any) -> str:
+    """Returns a strength as text."""
+    return _WORDS[cause].format(strength)
+
+
+def _construction(drives: RungDrives, stage: str, _: int) -> RungDrives:
+    return _mapped(drives, stage=stage)
+
+
+def _transient(name: str) -> Callable[[RungDrives, float, int], RungDrives]:
+    def change(drives: RungDrives, value: float, seed: int) -> RungDrives:
+        query = drives.query.with_transient(**{name: value, "seed": seed})
+        return replace(drives, query=query)
+
+    return change
+
+
+def _traffic(drives: RungDrives, number: int, seed: int) -> RungDrives:
+    traffic = TrafficConfig(vehicles=number, walkers=number, seed=seed)
+    return _with_query(drives, traffic=traffic)
+
+
+def _weather(drives: RungDrives, visibility: float, seed: int) -> RungDrives:
+    weather = WeatherConfig(visibility=visibility)
+    query = drives.query.with_returns("calibrated", weather)
+    return _with_query(replace(drives, query=query), seed=seed)
+
+
+def _returns(drives: RungDrives, _: str, seed: int) -> RungDrives:
+    query = drives.query.with_returns("calibrated")
+    return _with_query(replace(drives, query=query), seed=seed)
+
+
+def _ride(drives: RungDrives, roughness: Any, seed: int) -> RungDrives:
+    return _mapped(drives, ride=RideConfig(roughness=roughness, seed=seed))
+
+
+def _sensor(drives: RungDrives, preset: str, _: int) -> RungDrives:
+    return replace(drives, query=drives.query.with_lidar_preset(preset))
+
+
+def _viewpoint(
+    drives: RungDrives, offset: tuple[float, float], _: int
+) -> RungDrives:
+    left, heading_deg = offset
+    moved = _mapped_from(drives.database, 0.0, left - _LEFT, heading_deg)
+    return replace(drives, database=moved)
+
+
+def _lateral(drives: RungDrives, left: float, seed: int) -> RungDrives:
+    return replace(_viewpoint(drives, (left, 0.0), seed), lateral=left)
+
+
+def _size(drives: RungDrives, number: int, _: int) -> RungDrives:
+    return replace(drives, num_distractors=number)
+
+
+_CHANGES: Mapping[str, Callable[[RungDrives, Any, int], RungDrives]] = {
+    "sensor": _sensor,
+    "returns": _returns,
+    "weather": _weather,
+    **{name: _transient(name) for name in _TRANSIENT},
+    "traffic": _traffic,
+    "construction": _construction,
+    "ride": _ride,
+    "viewpoint": _viewpoint,
+    "lateral": _lateral,
+    "size": _size,
+}
+
+
+def _mapped(drives: RungDrives, **update: Any) -> RungDrives:
+    return replace(drives, database=drives.database.model_copy(update=update))
+
+
+def _with_query(drives: RungDrives, **update: Any) -> RungDrives:
+    return replace(drives, query=drives.query.model_copy(update=update))
+
+
+def _mapped_from(
+    scenario: Scenario, ahead: float, left: float, heading_deg: float
+) -> Scenario:
+    """Returns a scenario with its LiDARs moved on the vehicle."""
+    lidars = {
+        name: config.model_copy(
+            update={
+                "xyz": (
+                    config.xyz[0] + ahead,
+                    config.xyz[1] + left,
+                    config.xyz[2],
+                ),
+                "rpy_deg": (
+                    *config.rpy_deg[:2],
+                    config.rpy_deg[2] + heading_deg,
+                ),
+            }
+        )
+        for name, config in scenario.lidars.items()
+    }
+    return scenario.model_copy(update={"lidars": lidars})
 
 
 @dataclass(frozen=True)

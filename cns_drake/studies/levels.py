@@ -17,8 +17,13 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
-from cns_drake.studies.ladder_causes import ALL, NONE, STRENGTHS
-from cns_drake.studies.ladder_rungs import Extent, plan_rungs
+from cns_drake.studies.ladder_rungs import (
+    ALL,
+    NONE,
+    STRENGTHS,
+    Extent,
+    plan_rungs,
+)
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.tables import Table, in_table_order, title
 

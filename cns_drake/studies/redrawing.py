@@ -16,7 +16,6 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, part_path, user_errors
-from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -24,8 +23,9 @@ from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.base.version import __version__
 from cns_drake.base.yaml_files import read_yaml
+from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.plan.city_plan import load_plan
-from evaluation.study.parts import is_current, write_part
+from evaluation.study.parts import Part
 
 # The first line of each input that is written here.
 _MARK = b"# Of a city drawn anew by cns-drake"
@@ -102,12 +102,9 @@ class RedrawCity(Step):
 
     def is_done(self) -> bool:
         # A folder that has its final name is complete.
-        return is_current(self.folder / _PART, self._made_of())
+        return Part(self.folder / _PART).is_current(self._made_of())
 
     def run(self, reporter: Reporter) -> None:
-        with uninterrupted():
-            from cns_drake.city.generation.generate import generate_city
-
         folder, made_of = self.folder, self._made_of()
         inputs = redrawn_inputs(self.map_folder, self.stage, self.seed)
         part = part_path(folder)
@@ -128,7 +125,7 @@ class RedrawCity(Step):
                 raise InputError(
                     f"{self.map_folder}: seed {self.seed}: {fault}"
                 ) from error
-            write_part(draft / _PART, made_of, None)
+            Part(draft / _PART).write(made_of, None)
             if _is_replaced(folder):
                 reporter.note(
                     f"{folder}: replaced, since its inputs have changed"

@@ -21,8 +21,11 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures
-from cns_drake.studies.recording_jobs import plan_recordings
-from cns_drake.studies.recording_step import Record, is_recorded
+from cns_drake.studies.recording import (
+    Record,
+    is_recorded,
+    plan_recordings,
+)
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,

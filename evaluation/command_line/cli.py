@@ -330,10 +330,10 @@ def report(
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.paper import reference_for
-    from evaluation.study import benchmark as reporting
+    from evaluation.study import plan
 
     cluster = choose_cluster(jobs, scheduler)
-    path = reporting.write_report(
+    path = plan.write_report(
         recordings,
         output,
         cluster,

@@ -28,14 +28,13 @@ from evaluation.study.collection import (
     group_cities,
     nothing_to_compare,
 )
-from evaluation.study.figure_files import (
+from evaluation.study.figures import (
     auc_illustration,
     curves_stem,
     illustrations,
     survival_illustration,
 )
-from evaluation.study.parts import read_part
-from evaluation.study.study_layout import StudyFiles
+from evaluation.study.parts import StudyFiles
 
 
 def assemble(
@@ -101,7 +100,7 @@ def assemble(
         draw_survival(report.survivals, shown.stem)
         report.illustrations.insert(0, shown)
     if with_costs and any(city.recognition_pairs() for city in cities):
-        report.costs = read_part(files.costs)
+        report.costs = files.costs.read()
     return write_report(report, output)
 
 
@@ -113,7 +112,7 @@ def _collect(
     report: Report,
 ) -> None:
     for earlier, later in city.change_pairs():
-        change = read_part(files.change(earlier.name, later.name))
+        change = files.change(earlier.name, later.name).read()
         report.changes.append(change)
     survivals, closures = [], []
     pairs = city.recognition_pairs(
@@ -133,13 +132,13 @@ def _collect(
                 unchanged = _read_recognition(control, method, files)
             survivals.append(Survival.of(changed, unchanged))
         names = pair[0].name, pair[1].name
-        evidence = read_part(files.recognition(*names).evidence)
+        evidence = files.recognition(*names).evidence.read()
         if evidence is not None:
             report.evidence[names] = evidence
         for drive in (*pair, *(control or ())):
             if drive.name in report.tracks:
                 continue
-            survey = read_part(files.survey(drive.name).drive)
+            survey = files.survey(drive.name).drive.read()
             report.tracks[drive.name] = DriveTrack(
                 survey.stamps_ns, survey.X_WS
             )
@@ -149,7 +148,7 @@ def _collect(
         draw_pr_curves(city.name, compared, stem)
     report.survivals += survivals
     report.recognitions += compared
-    report.drives.update(read_part(files.page_drives(city.name)))
+    report.drives.update(files.page_drives(city.name).read())
     report.illustrations += illustrations(city, files.figures)
 
 
@@ -160,6 +159,5 @@ def _read_recognition(
 ) -> RecognitionResult | None:
     """Returns a result; None for a drive that closes no loop."""
     database, query = pair
-    return read_part(
-        files.recognition(database.name, query.name).result(method)
-    )
+    results = files.recognition(database.name, query.name)
+    return results.result(method).read()

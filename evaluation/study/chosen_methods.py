@@ -51,7 +51,7 @@ class MethodChoice:
             load_method(self.file)
         return make_method(self.name, dict(self.settings))
 
-    def inputs(self) -> dict:
+    def identity(self) -> dict:
         """Returns all that its results depend on, ready for JSON.
 
         Raises:

@@ -11,7 +11,7 @@ from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError, one_line
 from evaluation.drives import open_drive
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.study.drive_source import DriveSource, RecordedDrive
+from evaluation.study.surveys import DriveSource, RecordedDrive
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
 _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 import math
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,10 +26,8 @@ from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.drive_source import DriveSource
-from evaluation.study.parts import PartStep, part_digest, read_part
-from evaluation.study.study_layout import RecognitionFiles, SurveyFiles
-from evaluation.study.surveys import open_surveyed
+from evaluation.study.parts import Part
+from evaluation.study.surveys import DriveSource, open_surveyed
 
 # Points at least this high above the ground count as standing [m].
 _STANDING = 0.5
@@ -40,46 +37,33 @@ _CELL = 0.5
 _COINCIDENT = 1.0
 
 
-@dataclass(frozen=True)
-class FindEvidence(PartStep):
-    """Writes the `PairEvidence` of two drives; None if a drive closes no loop.
+def explain_faults(
+    reporter: Reporter,
+    drives: tuple[DriveSource, DriveSource],
+    surveyed: tuple[Part, Part],
+    methods: tuple[MethodChoice, ...],
+    results: tuple[Part, ...],
+    protocol: RetrievalProtocol,
+) -> PairEvidence | None:
+    """Returns the evidence of two drives; None if a drive closes no loop.
 
-    Attributes:
+    Args:
+        reporter: takes the progress.
         drives: database, and query.
-        surveys: likewise.
+        surveyed: the `SurveyedDrive` of each.
         methods: the methods.
-        results: their results on the two drives.
-        protocol: of these results.
-        part: to write.
+        results: their `RecognitionResult` on the two drives.
+        protocol: the protocol of these results.
     """
-
-    drives: tuple[DriveSource, DriveSource]
-    surveys: tuple[SurveyFiles, SurveyFiles]
-    methods: tuple[MethodChoice, ...]
-    results: RecognitionFiles
-    protocol: RetrievalProtocol
-    part: Path
-
-    def inputs(self) -> dict[str, object]:
-        return {
-            "results": [
-                part_digest(self.results.result(one)) for one in self.methods
-            ],
-            "drives": [one.identity() for one in self.drives],
-        }
-
-    def make(self, reporter: Reporter) -> PairEvidence | None:
-        results = []
-        for choice in self.methods:
-            # The method registers the type of its descriptions.
-            choice.make()
-            results.append(read_part(self.results.result(choice)))
-        if None in results or not results:
-            return None
-        database, query = map(open_surveyed, self.drives, self.surveys)
-        return find_evidence(
-            database, query, results, self.protocol, reporter.track
-        )
+    found = []
+    for choice, part in zip(methods, results, strict=True):
+        # The method registers the type of its descriptions.
+        choice.make()
+        found.append(part.read())
+    if None in found or not found:
+        return None
+    database, query = map(open_surveyed, drives, surveyed)
+    return find_evidence(database, query, found, protocol, reporter.track)
 
 
 def find_evidence(

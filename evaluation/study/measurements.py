@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
+import numpy as np
+from threadpoolctl import threadpool_limits
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeResult, Surveyed
 from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
+from evaluation.drives.sampling import gather
+from evaluation.recognition.costs import Cost, measure_cost
 from evaluation.recognition.place_recognition import (
     RecognitionResult,
     judge_retrieval,
@@ -16,98 +18,124 @@ from evaluation.recognition.place_recognition import (
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import PartStep, part_digest, read_part
-from evaluation.study.recording_survey import SurveyedDrive
-from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.parts import Part
+from evaluation.study.surveys import DriveSource, SurveyedDrive, open_surveyed
+
+# Number of clouds and of queries whose costs are measured; the time of the
+# first does not count.
+_NUM_TRIALS = 12
 
 
-@dataclass(frozen=True)
-class MeasureChange(PartStep):
-    """Writes the `ChangeResult` of two drives; they must be of one world.
+def measure_change(
+    reporter: Reporter,
+    map_name: str,
+    stages: tuple[str, str],
+    drives: tuple[Part, ...],
+) -> ChangeResult:
+    """Returns the change between two drives; they must be of one world.
 
-    Attributes:
-        map_name: of the city.
-        stages: of the earlier drive, and of the later one.
-        surveys: of the earlier drive, the later one, and their control if
-            there is one.
-        part: to write.
+    Args:
+        reporter: not used.
+        map_name: the name of the city.
+        stages: the stage of the earlier drive, and of the later one.
+        drives: the `SurveyedDrive` of the earlier drive, of the later one, and
+            of their control if there is one.
     """
-
-    map_name: str
-    stages: tuple[str, str]
-    surveys: tuple[SurveyFiles, ...]
-    part: Path
-
-    def inputs(self) -> dict[str, object]:
-        return {
-            "map": self.map_name,
-            "stages": self.stages,
-            "drives": [part_digest(survey.drive) for survey in self.surveys],
-        }
-
-    def make(self, reporter: Reporter) -> ChangeResult:
-        earlier, later, *controls = (
-            _to_surveyed(read_part(survey.drive)) for survey in self.surveys
-        )
-        control = controls[0] if controls else None
-        report = compare_maps(earlier, later, control)
-        return ChangeResult(self.map_name, self.stages, report)
+    del reporter
+    earlier, later, *controls = (_to_surveyed(part.read()) for part in drives)
+    control = controls[0] if controls else None
+    report = compare_maps(earlier, later, control)
+    return ChangeResult(map_name, stages, report)
 
 
-@dataclass(frozen=True)
-class RecognisePlaces(PartStep):
-    """Writes the `RecognitionResult` of a method on two drives of one world.
+def recognise_places(
+    reporter: Reporter,
+    map_name: str,
+    stages: tuple[str, str],
+    described: tuple[Part, Part],
+    choice: MethodChoice,
+    protocol: RetrievalProtocol,
+) -> RecognitionResult | None:
+    """Returns the result of a method on two drives of one world.
 
-    The result is None if a drive is compared with itself and closes no loop.
+    It is None if a drive is compared with itself and closes no loop.
 
-    Attributes:
-        map_name: of the city.
-        stages: of the database, and of the query.
-        surveys: likewise.
-        method: that described both.
-        protocol: of the descriptions.
-        part: to write.
+    Args:
+        reporter: takes the progress.
+        map_name: the name of the city.
+        stages: the stage of the database, and of the query.
+        described: the method's descriptions of both.
+        choice: the method.
+        protocol: the protocol of the descriptions.
     """
+    # The method comes first, because it registers the type of its
+    # descriptions.
+    method = choice.make()
+    (placed, database), (placed_query, query) = (p.read() for p in described)
+    check_same_world(placed, placed_query)
+    retrieval = score(method, database, query, protocol, reporter.track)
+    if database.name == query.name and not retrieval.matches.any():
+        # A route need not close a loop.
+        reporter.note(f"{query.name}: it never comes back to where it was")
+        return None
+    outcome = judge_retrieval(
+        method, database.name, query.name, retrieval, protocol
+    )
+    return RecognitionResult.of(map_name, stages, outcome)
 
-    map_name: str
-    stages: tuple[str, str]
-    surveys: tuple[SurveyFiles, SurveyFiles]
-    method: MethodChoice
-    protocol: RetrievalProtocol
-    part: Path
 
-    @property
-    def _described(self) -> list[Path]:
-        return [survey.described(self.method) for survey in self.surveys]
+def measure_costs(
+    reporter: Reporter,
+    source: DriveSource,
+    surveyed: Part,
+    methods: tuple[MethodChoice, ...],
+    described: tuple[tuple[Part, Part], ...],
+    protocol: RetrievalProtocol,
+) -> list[Cost]:
+    """Returns the cost of each method, measured on one core.
 
-    def inputs(self) -> dict[str, object]:
-        return {
-            "map": self.map_name,
-            "stages": self.stages,
-            "method": self.method.inputs(),
-            "protocol": self.protocol.to_json(),
-            "drives": [part_digest(part) for part in self._described],
-        }
-
-    def make(self, reporter: Reporter) -> RecognitionResult | None:
-        # The method comes first, because it registers the type of its
-        # descriptions.
-        method = self.method.make()
-        (placed, database), (placed_query, query) = map(
-            read_part, self._described
-        )
-        check_same_world(placed, placed_query)
-        retrieval = score(
-            method, database, query, self.protocol, reporter.track
-        )
-        if database.name == query.name and not retrieval.matches.any():
-            # A route need not close a loop.
-            reporter.note(f"{query.name}: it never comes back to where it was")
-            return None
-        outcome = judge_retrieval(
-            method, database.name, query.name, retrieval, self.protocol
-        )
-        return RecognitionResult.of(self.map_name, self.stages, outcome)
+    Args:
+        reporter: takes the progress.
+        source: opens the query drive.
+        surveyed: the `SurveyedDrive` of the query drive.
+        methods: to measure.
+        described: each method's descriptions of a database, and of the query
+            drive.
+        protocol: the protocol of the descriptions.
+    """
+    drive = open_surveyed(source, surveyed)
+    costs = []
+    with threadpool_limits(limits=1):
+        for choice, parts in reporter.track(
+            zip(methods, described, strict=True), "", len(methods)
+        ):
+            method = choice.make()
+            number = protocol.scans(method)
+            last = max(len(drive) - number, 0)
+            frames = np.linspace(0, last, _NUM_TRIALS).astype(int).tolist()
+            clouds = [
+                gather(
+                    drive,
+                    frame,
+                    number,
+                    protocol.max_range,
+                    method.point_fields,
+                    protocol.scans_before(method),
+                )
+                for frame in frames
+            ]
+            (_, database), (_, query) = (part.read() for part in parts)
+            costs.append(
+                measure_cost(
+                    method,
+                    clouds,
+                    number,
+                    database,
+                    query,
+                    protocol.gate_radius,
+                )
+            )
+    return costs
 
 
 def _to_surveyed(drive: SurveyedDrive) -> Surveyed:

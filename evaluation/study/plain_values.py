@@ -15,21 +15,11 @@ import re
 import struct
 import sys
 import tokenize
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 _LENGTH = struct.Struct("<Q")
-# Types of number whose arrays are bytes that follow each other: bool, integers,
-# floating point.
-_KINDS = "biufc"
-# What NumPy writes before an array, if its type has a short name: the length of
-# the text, the type, the order, and the shape.
-_HEADER = re.compile(
-    rb"\x93NUMPY\x01\x00([\x00-\xff]{2})"
-    rb"\{'descr': ('[<>|]\w+'), 'fortran_order': (True|False),"
-    rb" 'shape': \((|\d{1,18},|\d{1,18}(?:, \d{1,18})+)\), \} *\n"
-)
 _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
 
 
@@ -45,7 +35,12 @@ def encode(value: object) -> bytes:
     """
     encoder = _Encoder()
     tree = json.dumps(encoder.encode(value), separators=(",", ":")).encode()
-    return b"".join([_LENGTH.pack(len(tree)), tree, *encoder.arrays])
+    stream = io.BytesIO()
+    stream.write(_LENGTH.pack(len(tree)))
+    stream.write(tree)
+    for array in encoder.arrays:
+        np.lib.format.write_array(stream, array, allow_pickle=False)
+    return stream.getvalue()
 
 
 def decode(data: bytes) -> Any:
@@ -83,10 +78,9 @@ class _Encoder:
     """Makes a tree of a value; arrays that occur twice are stored once."""
 
     def __init__(self) -> None:
-        # Headers, each with the numbers that follow it.
-        self.arrays: list[bytes | memoryview] = []
-        # Keys are identities of arrays, which stay alive meanwhile.
-        self._numbers: dict[int, tuple[int, np.ndarray]] = {}
+        self.arrays: list[np.ndarray] = []
+        # The identity of an array -> its number.
+        self._numbers: dict[int, int] = {}
 
     def encode(self, value: Any) -> Any:
         kind = type(value)
@@ -123,57 +117,19 @@ class _Encoder:
         if id(array) not in self._numbers:
             if array.dtype.hasobject:
                 raise TypeError("an array of objects cannot be kept")
-            self._write(array)
-            self._numbers[id(array)] = len(self._numbers), array
-        return self._numbers[id(array)][0]
-
-    def _write(self, array: np.ndarray) -> None:
-        stream = io.BytesIO()
-        if array.dtype.kind not in _KINDS or not array.flags.forc:
-            np.lib.format.write_array(stream, array, allow_pickle=False)
-            self.arrays.append(stream.getvalue())
-            return
-        header = np.lib.format.header_data_from_array_1_0(array)
-        np.lib.format.write_array_header_1_0(stream, header)
-        ordered = array.T if header["fortran_order"] else array
-        self.arrays += [stream.getvalue(), ordered.data]
+            self._numbers[id(array)] = len(self.arrays)
+            self.arrays.append(array)
+        return self._numbers[id(array)]
 
 
 def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
-    """Returns the arrays from a place on.
-
-    NumPy parses a header as code, which takes longer than copying most arrays.
-    It is asked to once for each type of number.
-    """
+    """Returns the arrays from a place on."""
     stream = io.BytesIO(data)
-    dtypes: dict[bytes, np.dtype] = {}
+    stream.seek(start)
     arrays = []
-    while start < len(data):
-        header = _HEADER.match(data, start)
-        if header is not None and header[2] in dtypes:
-            array = _read_array(data, header, dtypes[header[2]])
-            start = header.end() + array.nbytes
-        else:
-            stream.seek(start)
-            array = np.lib.format.read_array(stream, allow_pickle=False)
-            start = stream.tell()
-            if header is not None:
-                dtypes[header[2]] = array.dtype
-        arrays.append(array)
+    while stream.tell() < len(data):
+        arrays.append(np.lib.format.read_array(stream, allow_pickle=False))
     return arrays
-
-
-def _read_array(
-    data: bytes, header: re.Match[bytes], dtype: np.dtype
-) -> np.ndarray:
-    """Returns the array behind its header."""
-    length, _, is_fortran, shape = header.groups()
-    if int.from_bytes(length, "little") != header.end() - header.end(1):
-        raise ValueError("a header of another length")
-    sides = tuple(map(int, shape.replace(b",", b"").split()))
-    order: Literal["C", "F"] = "F" if is_fortran == b"True" else "C"
-    stored = np.ndarray(sides, dtype, data, header.end(), order=order)
-    return stored.copy(order)
 
 
 def _decode(tree: Any, arrays: list[np.ndarray]) -> Any:

@@ -1,11 +1,13 @@
-"""The jobs of a study."""
+"""The whole benchmark: its jobs, and the report of a folder of recordings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from cns_drake.base.jobs.running import Job
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import (
@@ -13,28 +15,31 @@ from evaluation.recognition.protocol import (
     RetrievalProtocol,
 )
 from evaluation.report.reference import NO_REFERENCE, Reference
+from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
     RecordingInfo,
+    find_recordings,
     group_cities,
 )
-from evaluation.study.drive_source import DriveSource
-from evaluation.study.fault_evidence import FindEvidence
-from evaluation.study.figure_files import change_stems, routes_stem
-from evaluation.study.measurements import MeasureChange, RecognisePlaces
-from evaluation.study.method_costs import MeasureCosts
-from evaluation.study.parts import PartStep
-from evaluation.study.study_layout import StudyFiles, SurveyFiles
-from evaluation.study.surveys import Survey
-from evaluation.study.views import DrawChange, DrawCity
+from evaluation.study.fault_evidence import explain_faults
+from evaluation.study.figures import (
+    change_stems,
+    draw_changes,
+    draw_city,
+    figure_files,
+    routes_stem,
+)
+from evaluation.study.measurements import (
+    measure_change,
+    measure_costs,
+    recognise_places,
+)
+from evaluation.study.parts import MakePart, StudyFiles
+from evaluation.study.surveys import START_COST, survey_job
 
-# Expected seconds to start a process with its imports, and for the maps of a
-# drive of 3000 scans with 250 places and 150 queries.
-_START_COST = 2.0
-_MAP_COST = 10.0
-_ROLE_COST = {"places": 12.0, "queries": 8.0}
-# Costs of the other jobs, beyond their start.
+# Expected seconds of jobs, beyond their start.
 _CHANGE_COST = 6.0
 _CITY_COST = 4.0
 _COSTS_COST = 8.0
@@ -90,6 +95,70 @@ def plan_study(
     return jobs
 
 
+def write_report(
+    recordings: Path,
+    output: Path,
+    cluster: Cluster,
+    own_methods: Iterable[Path] = (),
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    on_note: Callable[[str], None] = lambda text: None,
+    *,
+    settings: Iterable[str] = (),
+    with_costs: bool = False,
+    reference_for: Callable[[set[str]], Reference] = lambda maps: NO_REFERENCE,
+    lidar: str | None = None,
+) -> Path:
+    """Measures all recordings in a folder; writes tables, figures, a page.
+
+    See `evaluation.study` for the files. Results of an earlier run, finished
+    or not, are used if they belong to the same recordings and methods.
+
+    Args:
+        recordings: folder of recordings; drives of one map that share stage
+            and route with others serve as same-stage controls.
+        output: folder to write, made if needed.
+        cluster: where the work is done.
+        own_methods: Python files with one method each, to run besides those
+            of this package.
+        protocol: of place recognition.
+        on_note: gets notes on recordings that are left out, and on cities
+            without a pair to compare.
+        settings: see `choose_methods`.
+        with_costs: whether to measure the costs of the methods, too.
+        reference_for: returns the reference for the report of some maps.
+        lidar: name of the LiDAR, for recordings with several.
+
+    Returns:
+        The path of `report.html`.
+
+    Raises:
+        InputError: a recording cannot be read, or the output cannot be
+            written.
+    """
+    methods = choose_methods(own_methods, settings)
+    found = find_recordings(recordings, on_note, lidar)
+    reference = reference_for({one.map_name for one in found})
+    jobs = plan_study(
+        found,
+        output,
+        methods,
+        protocol,
+        with_costs=with_costs,
+        reference=reference,
+    )
+    make_folder(output)
+    run_jobs(jobs, cluster)
+    return assemble(
+        found,
+        output,
+        methods,
+        protocol=protocol,
+        with_costs=with_costs,
+        reference=reference,
+        on_note=on_note,
+    )
+
+
 def _plan_city(
     city: City,
     files: StudyFiles,
@@ -109,17 +178,22 @@ def _plan_city(
         for recording, roles in _roles(city, protocol)
     ]
     stages = city.stages.values()
+    stem = files.figures / routes_stem(city)
+    shown = tuple(
+        (one.stage, files.survey(one.name).drive, files.survey(one.name).fine)
+        for one in stages
+    )
     jobs.append(
         Job(
             name=f"draw {city.name}",
-            step=DrawCity(
-                city.name,
-                tuple((r.stage, files.survey(r.name)) for r in stages),
-                files.figures / routes_stem(city),
+            step=MakePart(
                 files.page_drives(city.name),
+                draw_city,
+                (city.name, shown, stem),
+                figure_files(stem),
             ),
             needs=_survey_names(stages),
-            cost=_START_COST + _CITY_COST,
+            cost=START_COST + _CITY_COST,
         )
     )
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
@@ -184,25 +258,30 @@ def _change_job(
     earlier, later = pair
     surveys = tuple(files.survey(one.name) for one in drives)
     change = files.change(earlier.name, later.name)
-    first, second = change_stems(city, pair)
+    names = change_stems(city, pair)
+    stems = tuple(files.figures / name for name in names)
+    shown = tuple((survey.drive, survey.fine) for survey in surveys[:2])
+    stages = earlier.stage, later.stage
     return Job(
         name=f"change {city.name} {earlier.stage} > {later.stage}",
         step=Steps(
-            change,
+            change.path,
             (
-                MeasureChange(
-                    city.name, (earlier.stage, later.stage), surveys, change
-                ),
-                DrawChange(
-                    (surveys[0], surveys[1]),
+                MakePart(
                     change,
-                    (files.figures / first, files.figures / second),
-                    files.drawn(first),
+                    measure_change,
+                    (city.name, stages, tuple(one.drive for one in surveys)),
+                ),
+                MakePart(
+                    files.drawn(names[0]),
+                    draw_changes,
+                    (change, shown, stems),
+                    figure_files(*stems),
                 ),
             ),
         ),
         needs=_survey_names(drives),
-        cost=_START_COST + _CHANGE_COST,
+        cost=START_COST + _CHANGE_COST,
     )
 
 
@@ -221,33 +300,39 @@ def _recognition_job(
     )
     surveys = files.survey(database.name), files.survey(query.name)
     results = files.recognition(database.name, query.name)
-    steps: tuple[PartStep, ...] = tuple(
-        RecognisePlaces(
-            city.name,
-            (database.stage, query.stage),
-            surveys,
-            method,
-            protocol,
+    steps = tuple(
+        MakePart(
             results.result(method),
+            recognise_places,
+            (
+                city.name,
+                (database.stage, query.stage),
+                tuple(survey.described(method) for survey in surveys),
+                method,
+                protocol,
+            ),
         )
         for method in methods
     )
     if name == _pair_name(city, pair):
         cost += _EVIDENCE_COST
-        evidence = FindEvidence(
-            (database.source, query.source),
-            surveys,
-            methods,
-            results,
-            protocol,
+        evidence = MakePart(
             results.evidence,
+            explain_faults,
+            (
+                (database.source, query.source),
+                tuple(survey.drive for survey in surveys),
+                methods,
+                tuple(map(results.result, methods)),
+                protocol,
+            ),
         )
         steps = (*steps, evidence)
     return Job(
         name=name,
         step=Steps(results.folder, steps),
         needs=_survey_names(pair),
-        cost=_START_COST + cost,
+        cost=START_COST + cost,
     )
 
 
@@ -259,47 +344,21 @@ def _cost_job(
     others: tuple[str, ...],
 ) -> Job:
     """Returns the job that runs after all others, alone on the machine."""
-    database, query = pair
+    query = pair[1]
+    surveys = tuple(files.survey(one.name) for one in pair)
+    described = tuple(
+        tuple(survey.described(method) for survey in surveys)
+        for method in methods
+    )
     return Job(
         name="costs of the methods",
-        step=MeasureCosts(
-            query.source,
-            (files.survey(database.name), files.survey(query.name)),
-            methods,
-            protocol,
+        step=MakePart(
             files.costs,
+            measure_costs,
+            (query.source, surveys[1].drive, methods, described, protocol),
         ),
         needs=others,
-        cost=_START_COST + _COSTS_COST,
-    )
-
-
-def survey_job(
-    name: str,
-    source: DriveSource,
-    roles: Iterable[Role],
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    files: SurveyFiles,
-    needs: tuple[str, ...] = (),
-) -> Job:
-    """Returns the job that surveys a recording.
-
-    Args:
-        name: of the recording.
-        source: see `Survey`.
-        roles: likewise.
-        methods: likewise.
-        protocol: likewise.
-        files: likewise.
-        needs: names of the jobs that make the recording.
-    """
-    survey = Survey(source, frozenset(roles), methods, protocol, files)
-    return Job(
-        name=f"survey {name}",
-        step=survey,
-        needs=needs,
-        cost=_START_COST + _MAP_COST + sum(_ROLE_COST[r] for r in survey.roles),
+        cost=START_COST + _COSTS_COST,
     )
 
 

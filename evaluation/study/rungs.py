@@ -5,9 +5,9 @@ Each method has two results, without the gate and with it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,35 +22,31 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare_both_ways
 from evaluation.recognition.rung_outcome import RungOutcome
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.described_drives import describe
-from evaluation.study.drive_source import DriveSource
-from evaluation.study.parts import PartStep, part_digest, read_part
-from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.parts import Part
+from evaluation.study.surveys import DriveSource, describe
+
+# The source of a drive, or the parts of its scans and of its descriptions by
+# each method.
+DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 
 # Distance between a city and the next distracting one [m]. No scan reaches so
 # far.
 _APART = 1e5
 
 
-@dataclass(frozen=True)
-class RungDrive:
-    """A drive of a rung.
+def measure_rung(
+    reporter: Reporter,
+    database: DescribedSource,
+    query: DescribedSource,
+    distractors: tuple[tuple[Part, ...], ...],
+    num_distractors: int,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+) -> list[RungOutcome]:
+    """Returns the outcomes of a rung, two for each method.
 
-    Attributes:
-        source: opens it.
-        files: files of its descriptions and scans, if several rungs use them;
-            None if only this rung does.
-    """
-
-    source: DriveSource
-    files: SurveyFiles | None = None
-
-
-@dataclass(frozen=True)
-class MeasureRung(PartStep):
-    """Writes the list of `RungOutcome`s of a rung, two for each method.
-
-    Attributes:
+    Args:
+        reporter: takes the progress.
         database: drive of the places.
         query: drive of the queries, in the same world frame.
         distractors: descriptions of drives through other cities, whose places
@@ -58,95 +54,57 @@ class MeasureRung(PartStep):
         num_distractors: number of these places.
         methods: to run.
         protocol: of place recognition.
-        part: to write.
     """
-
-    database: RungDrive
-    query: RungDrive
-    distractors: tuple[SurveyFiles, ...]
-    num_distractors: int
-    methods: tuple[MethodChoice, ...]
-    protocol: RetrievalProtocol
-    part: Path
-
-    def inputs(self) -> dict[str, object]:
-        return {
-            "database": self._identity(self.database),
-            "query": self._identity(self.query),
-            "distractors": [self._digests(one) for one in self.distractors],
-            "number": self.num_distractors,
-            "protocol": self.protocol.to_json(),
-            "methods": [method.inputs() for method in self.methods],
-        }
-
-    def make(self, reporter: Reporter) -> list[RungOutcome]:
-        place_scans: list[np.ndarray] = []
-        query_scans: list[np.ndarray] = []
-        places = self._described(self.database, "places", reporter, place_scans)
-        queries = self._described(self.query, "queries", reporter, query_scans)
-        overlaps = None
-        found = []
-        for choice in reporter.track(
-            self.methods, "comparing", len(self.methods)
-        ):
-            database = places.pop(choice.name, None) or read_part(
-                _file(self.database, choice)
-            )
-            query = queries.pop(choice.name, None) or read_part(
-                _file(self.query, choice)
-            )
-            others = [
-                read_part(one.described(choice)) for one in self.distractors
-            ]
-            known = [database, *others]
-            searched = replace(
-                database,
-                places=joined_places(
-                    [one.places for one in known], self.num_distractors
-                ),
-            )
-            drives = [one.name for one in known for _ in one.places.frames]
-            both = compare_both_ways(
-                choice.make(), searched, query, self.protocol
-            )
-            if overlaps is None:
-                overlaps = best_overlaps(
-                    place_scans,
-                    database.places.X_WS,
-                    query_scans,
-                    query.queries.X_WS,
-                    both[0].matches[:, : len(place_scans)],
-                )
-            found += [
-                RungOutcome.of(
-                    choice.name, is_gated, one, query, drives, overlaps
-                )
-                for is_gated, one in zip((False, True), both, strict=True)
-            ]
-        return found
-
-    def _described(
-        self,
-        drive: RungDrive,
-        role: Role,
-        reporter: Reporter,
-        scans: list[np.ndarray],
-    ) -> dict[str, DescribedDrive]:
-        """Returns descriptions that are not in files, with all scans."""
-        if drive.files is not None:
-            scans += read_part(drive.files.scans)
-            return {}
-        return describe(
-            drive.source, role, self.methods, self.protocol, reporter, scans
+    place_scans, places = _describe(
+        database, "places", methods, protocol, reporter
+    )
+    query_scans, queries = _describe(
+        query, "queries", methods, protocol, reporter
+    )
+    overlaps = None
+    found = []
+    for k, choice in enumerate(
+        reporter.track(methods, "comparing", len(methods))
+    ):
+        mapped, asked = places(k), queries(k)
+        known = [mapped, *(parts[k].read() for parts in distractors)]
+        searched = replace(
+            mapped,
+            places=joined_places(
+                [one.places for one in known], num_distractors
+            ),
         )
+        drives = [one.name for one in known for _ in one.places.frames]
+        both = compare_both_ways(choice.make(), searched, asked, protocol)
+        if overlaps is None:
+            overlaps = best_overlaps(
+                place_scans,
+                mapped.places.X_WS,
+                query_scans,
+                asked.queries.X_WS,
+                both[0].matches[:, : len(place_scans)],
+            )
+        found += [
+            RungOutcome.of(choice.name, is_gated, one, asked, drives, overlaps)
+            for is_gated, one in zip((False, True), both, strict=True)
+        ]
+    return found
 
-    def _identity(self, drive: RungDrive) -> object:
-        if drive.files is None:
-            return drive.source.identity()
-        return [*self._digests(drive.files), part_digest(drive.files.scans)]
 
-    def _digests(self, files: SurveyFiles) -> list[str]:
-        return [part_digest(files.described(one)) for one in self.methods]
+def _describe(
+    drive: DescribedSource,
+    role: Role,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    reporter: Reporter,
+) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
+    """Returns the scans of a drive, and what gives each description once."""
+    if isinstance(drive, tuple):
+        scans, *parts = drive
+        return scans.read(), lambda k: parts[k].read()
+    kept: list[np.ndarray] = []
+    found = describe(drive, role, methods, protocol, reporter, kept)
+    return kept, lambda k: found.pop(methods[k].name)
 
 
 def joined_places(
@@ -174,8 +132,3 @@ def joined_places(
         descriptors=[d for one in drives for d in one.descriptors][:end],
         clouds=[cloud for one in drives for cloud in one.clouds][:end],
     )
-
-
-def _file(drive: RungDrive, choice: MethodChoice) -> Path:
-    assert drive.files is not None
-    return drive.files.described(choice)

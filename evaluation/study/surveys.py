@@ -1,25 +1,215 @@
-"""The survey of one recording, in a part for each use."""
+"""Surveys of drives: maps, places and queries, found in one pass.
+
+A job that works on a drive may run in another process, or on another machine,
+before or after the drive is recorded. The job therefore has the source of the
+drive, not the drive.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+import os
 from pathlib import Path
+from typing import Protocol
 
-from cns_drake.base.drives.drive import Drive
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Step
-from evaluation.drives.drive_views import MovedDrive
-from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.drive_source import DriveSource
-from evaluation.study.parts import is_current, read_part, write_part
-from evaluation.study.recording_survey import (
-    RecordingSurvey,
-    SurveyedDrive,
-    survey_recording,
+from cns_drake.base.progress import Track, silent
+from evaluation.drives import Drive, PlacedDrive, open_drive
+from evaluation.drives.drive_views import MovedDrive, RecentScans
+from evaluation.maps.mapped_drive import MappedDrive
+from evaluation.maps.thumbnails import thumbnail
+from evaluation.maps.voxel_maps import VoxelMap
+from evaluation.methods import Method, MethodConfig
+from evaluation.recognition.description import (
+    DescribedDrive,
+    Role,
+    describe_drive,
 )
-from evaluation.study.study_layout import SurveyFiles
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.parts import Part, SurveyFiles
+
+# Expected seconds to start a process with its imports, and for the maps of a
+# drive of 3000 scans with 250 places and 150 queries.
+START_COST = 2.0
+_MAP_COST = 10.0
+_ROLE_COST = {"places": 12.0, "queries": 8.0}
+
+
+class DriveSource(Protocol):
+    """Opens a drive; can be pickled."""
+
+    def __call__(self) -> Drive:
+        """Opens the drive.
+
+        Its scans are read in increasing order, each once; a drive may thus
+        be made while it is read.
+
+        Raises:
+            InputError: if it cannot be opened.
+        """
+
+    def identity(self) -> object:
+        """Returns the identity of the drive, ready for JSON.
+
+        Results of a drive with an equal identity are not computed again.
+
+        Raises:
+            InputError: if there is no drive.
+        """
+
+
+@dataclass(frozen=True)
+class RecordedDrive:
+    """A drive on disk, in any format that can be read.
+
+    Attributes:
+        path: of the drive.
+        lidar: name of the LiDAR, for a drive with several.
+    """
+
+    path: Path
+    lidar: str | None = None
+
+    def __call__(self) -> Drive:
+        return open_drive(self.path, self.lidar)
+
+    def identity(self) -> list[list]:
+        """Returns LiDAR, and name, size and time of change of each file.
+
+        The content of the files would be the surest identity, but reading it
+        takes as long as evaluating it.
+        """
+        try:
+            path = self.path.resolve(strict=True)
+            files = [path]
+            if path.is_dir():
+                files = sorted(p for p in path.rglob("*") if p.is_file())
+            stats = [os.stat(file) for file in files]
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: {error.strerror or error}"
+            ) from error
+        chosen: list[list] = [] if self.lidar is None else [[self.lidar]]
+        return chosen + [
+            [
+                path.name,
+                file.relative_to(path).as_posix(),
+                stat.st_size,
+                stat.st_mtime_ns,
+            ]
+            for file, stat in zip(files, stats, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class SurveyedDrive:
+    """A drive with its map on the grid of the TCR.
+
+    Attributes:
+        placed: name and world of the drive.
+        stamps_ns: (N,) int64 of its frames.
+        X_WS: (N, 4, 4) poses of the sensor along the drive.
+        coarse: the map.
+        frames: (K,) frames that are places or queries, increasing; none if
+            the drive has no role.
+        thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
+    """
+
+    placed: PlacedDrive
+    stamps_ns: np.ndarray
+    X_WS: np.ndarray
+    coarse: VoxelMap
+    frames: np.ndarray
+    thumbnails: list[np.ndarray]
+
+    @property
+    def name(self) -> str:
+        return self.placed.name
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(N, 3) of the sensor [m]."""
+        return self.X_WS[:, :3, 3]
+
+
+@dataclass(frozen=True)
+class RecordingSurvey:
+    """A recording's maps, places and queries, which replace its scans.
+
+    Attributes:
+        drive: with its map on the grid of the TCR.
+        fine: (K, 3) cloud for pictures, in W [m].
+        described: method -> its descriptions of the drive; empty if the
+            recording has no role.
+    """
+
+    drive: SurveyedDrive
+    fine: np.ndarray
+    described: dict[str, DescribedDrive]
+
+
+def survey_recording(
+    recording: Drive,
+    roles: Set[Role],
+    methods: Sequence[Method],
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    track: Track = silent,
+) -> RecordingSurvey:
+    """Maps a recording and describes its places and queries.
+
+    Each scan is read once, in order.
+
+    Args:
+        recording: the drive.
+        roles: of the drive in place recognition; may be empty.
+        methods: that describe it; may be none.
+        protocol: sets the places and queries.
+        track: reports progress.
+
+    Raises:
+        InputError: if it cannot be read, or holds no point.
+    """
+    frames, thumbnails = [], []
+    mapped = MappedDrive(
+        recording,
+        kept=max(map(protocol.scans, methods), default=1),
+    )
+
+    def keep_thumbnail(frame: int, cloud: np.ndarray) -> None:
+        frames.append(frame)
+        height = MethodConfig().sensor_height
+        thumbnails.append(thumbnail(cloud, height, seed=frame))
+
+    described = {}
+    if roles:
+        drives = describe_drive(
+            mapped, methods, roles, protocol, track, visit=keep_thumbnail
+        )
+        described = {
+            method.name: drive
+            for method, drive in zip(methods, drives, strict=True)
+        }
+    coarse, fine = mapped.finish(track)
+    if len(coarse) == 0:
+        raise InputError(f"{mapped.name}: no scan holds a point")
+    drive = SurveyedDrive(
+        placed=PlacedDrive.of(recording),
+        stamps_ns=mapped.stamps_ns,
+        X_WS=mapped.X_WS,
+        coarse=coarse,
+        frames=np.array(frames, dtype=np.int64),
+        thumbnails=thumbnails,
+    )
+    return RecordingSurvey(drive, fine, described)
 
 
 @dataclass(frozen=True)
@@ -28,10 +218,10 @@ class Survey(Step):
 
     Attributes:
         source: opens the drive.
-        roles: of the drive in place recognition; may be empty.
-        methods: that describe its places and queries.
+        roles: the roles of the drive in place recognition; may be empty.
+        methods: the methods that describe its places and queries.
         protocol: sets the places and queries.
-        files: to write.
+        files: the parts to write.
     """
 
     source: DriveSource
@@ -45,11 +235,12 @@ class Survey(Step):
         return self.files.folder
 
     def is_done(self) -> bool:
-        return not any(self._missing())
+        return not self._missing()
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
-        self._write(self.find(self.source(), missing[0], reporter), *missing)
+        methods = [m for m in self._describing() if self._file(m) in missing]
+        self._write(self.find(self.source(), methods, reporter), missing)
 
     def find(
         self,
@@ -81,31 +272,32 @@ class Survey(Step):
         Raises:
             InputError: a file cannot be written.
         """
-        self._write(found, *self._missing())
+        self._write(found, self._missing())
+
+    def _describing(self) -> tuple[MethodChoice, ...]:
+        return self.methods if self.roles else ()
+
+    def _file(self, method: MethodChoice) -> Part:
+        return self.files.described(method)
 
     def _write(
-        self,
-        found: RecordingSurvey,
-        described: Mapping[MethodChoice, Mapping],
-        maps: Mapping[str, Mapping],
+        self, found: RecordingSurvey, missing: Mapping[Part, Mapping]
     ) -> None:
-        for method, inputs in described.items():
-            if method.name in found.described:
+        for method in self._describing():
+            part = self._file(method)
+            if part in missing and method.name in found.described:
                 # Each value is dropped when it is written.
                 value = found.drive.placed, found.described.pop(method.name)
-                write_part(self.files.described(method), inputs, value)
-        for name, inputs in maps.items():
-            write_part(getattr(self.files, name), inputs, getattr(found, name))
+                part.write(missing[part], value)
+        for part, one in (
+            (self.files.fine, found.fine),
+            (self.files.drive, found.drive),
+        ):
+            if part in missing:
+                part.write(missing[part], one)
 
-    def _missing(
-        self,
-    ) -> tuple[dict[MethodChoice, Mapping], dict[str, Mapping]]:
-        """Returns the missing parts, each with its inputs.
-
-        Returns:
-            The methods whose descriptions are missing, and the names of missing
-            maps.
-        """
+    def _missing(self) -> dict[Part, Mapping]:
+        """Returns the missing parts, each with its inputs."""
         inputs = self.made_of(
             {
                 "drive": self.source.identity(),
@@ -113,25 +305,163 @@ class Survey(Step):
                 "protocol": self.protocol.described() if self.roles else None,
             }
         )
-        described = {
-            method: {**inputs, "method": method.inputs()}
-            for method in (self.methods if self.roles else ())
+        expected = {
+            self._file(method): {**inputs, "method": method.identity()}
+            for method in self._describing()
         }
-        return (
-            {
-                method: made_of
-                for method, made_of in described.items()
-                if not is_current(self.files.described(method), made_of)
-            },
-            {
-                name: inputs
-                for name in ("fine", "drive")
-                if not is_current(getattr(self.files, name), inputs)
-            },
+        return _stale(
+            {**expected, self.files.fine: inputs, self.files.drive: inputs}
         )
 
 
-def open_surveyed(source: DriveSource, files: SurveyFiles) -> Drive:
+@dataclass(frozen=True)
+class DescribeDrive(Step):
+    """Writes each method's descriptions of a drive, without its map.
+
+    Only the scans that are described are read.
+
+    Attributes:
+        source: opens the drive.
+        role: the role of the drive.
+        methods: the methods that describe it.
+        protocol: where it has places and queries.
+        files: the parts to write; only those of the descriptions, and of the
+            scans.
+        with_scans: whether to keep the described scans, too.
+    """
+
+    source: DriveSource
+    role: Role
+    methods: tuple[MethodChoice, ...]
+    protocol: RetrievalProtocol
+    files: SurveyFiles
+    with_scans: bool = False
+
+    @property
+    def output(self) -> Path:
+        return self.files.folder
+
+    def is_done(self) -> bool:
+        return not self._missing()
+
+    def run(self, reporter: Reporter) -> None:
+        missing = self._missing()
+        files = {one: self.files.described(one) for one in self.methods}
+        methods = [one for one in self.methods if files[one] in missing]
+        scans: list[np.ndarray] | None = [] if self.with_scans else None
+        found = describe(
+            self.source, self.role, methods, self.protocol, reporter, scans
+        )
+        for choice in methods:
+            # Each value is dropped when it is written.
+            part = files[choice]
+            part.write(missing[part], found.pop(choice.name))
+        if self.files.scans in missing:
+            self.files.scans.write(missing[self.files.scans], scans)
+
+    def _missing(self) -> dict[Part, Mapping]:
+        """Returns the missing parts, each with its inputs."""
+        inputs = self.made_of(
+            {
+                "drive": self.source.identity(),
+                "role": self.role,
+                "protocol": self.protocol.described(),
+            }
+        )
+        expected = {
+            self.files.described(method): {
+                **inputs,
+                "method": method.identity(),
+            }
+            for method in self.methods
+        }
+        if self.with_scans:
+            expected[self.files.scans] = inputs
+        return _stale(expected)
+
+
+def _stale(expected: Mapping[Part, Mapping]) -> dict[Part, Mapping]:
+    """Returns the parts that are missing or have other inputs than these."""
+    return {
+        part: inputs
+        for part, inputs in expected.items()
+        if not part.is_current(inputs)
+    }
+
+
+def describe(
+    source: DriveSource,
+    role: Role,
+    methods: Iterable[MethodChoice],
+    protocol: RetrievalProtocol,
+    reporter: Reporter,
+    scans: list[np.ndarray] | None = None,
+) -> dict[str, DescribedDrive]:
+    """Returns name of method -> its descriptions of a drive.
+
+    Args:
+        source: opens the drive.
+        role: of the drive.
+        methods: that describe it.
+        protocol: where it has places and queries.
+        reporter: takes the progress.
+        scans: gets the single scan (N, 3) float32 of each described frame, in
+            the frame of the sensor.
+
+    Raises:
+        InputError: see `describe_drive`.
+    """
+    running = [choice.make() for choice in methods]
+    kept = max(map(protocol.scans, running), default=1)
+    drive = RecentScans(source(), kept)
+
+    def keep(_: int, scan: np.ndarray) -> None:
+        assert scans is not None
+        scans.append(scan.astype(np.float32))
+
+    found = describe_drive(
+        drive,
+        running,
+        {role},
+        protocol,
+        reporter.track,
+        visit=None if scans is None else keep,
+    )
+    return {
+        method.name: one for method, one in zip(running, found, strict=True)
+    }
+
+
+def survey_job(
+    name: str,
+    source: DriveSource,
+    roles: Iterable[Role],
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    files: SurveyFiles,
+    needs: tuple[str, ...] = (),
+) -> Job:
+    """Returns the job that surveys a recording.
+
+    Args:
+        name: the name of the recording.
+        source: see `Survey`.
+        roles: likewise.
+        methods: likewise.
+        protocol: likewise.
+        files: likewise.
+        needs: names of the jobs that make the recording.
+    """
+    survey = Survey(source, frozenset(roles), methods, protocol, files)
+    return Job(
+        name=f"survey {name}",
+        step=survey,
+        needs=needs,
+        cost=START_COST + _MAP_COST + sum(_ROLE_COST[r] for r in survey.roles),
+    )
+
+
+def open_surveyed(source: DriveSource, surveyed: Part) -> Drive:
     """Opens a drive that has been surveyed.
 
     Its poses are those of the survey: a recording would be unpacked as a whole
@@ -141,5 +471,5 @@ def open_surveyed(source: DriveSource, files: SurveyFiles) -> Drive:
         InputError: if it cannot be opened.
     """
     drive = source()
-    known: SurveyedDrive = read_part(files.drive)
+    known: SurveyedDrive = surveyed.read()
     return MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)

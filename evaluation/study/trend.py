@@ -23,7 +23,7 @@ from evaluation.report.tables import (
     keyed,
     protocol_columns,
 )
-from evaluation.study.trend_points import TrendPoint
+from evaluation.study.trend_databases import TrendPoint
 
 # Width of the kernel that smooths over TCR_sym, as part of its range. The band
 # comes from drawing databases with replacement.

@@ -15,20 +15,61 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.jobs.step import Reporter
+from evaluation.change.tcr import temporal_change
 from evaluation.drives import Drive, check_same_world, open_drive
+from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
+from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
-from evaluation.study.drive_source import DriveSource, RecordedDrive
-from evaluation.study.parts import read_part
-from evaluation.study.plan import survey_job
-from evaluation.study.study_layout import StudyFiles
-from evaluation.study.trend_points import MeasureDatabase, TrendPoint
+from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.surveys import (
+    DriveSource,
+    RecordedDrive,
+    survey_job,
+    survey_recording,
+)
 
 # Expected seconds for a database.
 _COST = 30.0
+
+
+@dataclass(frozen=True)
+class TrendPoint:
+    """A method on one database.
+
+    Attributes:
+        database: name of the drive.
+        method: its name.
+        tcr_sym: between database and query.
+        auc, auc_low, auc_high: with its 95 % interval over queries.
+        recall_at_1: over queries with a match.
+        queries, with_match: numbers of queries, and of those with a match.
+        protocol: of place recognition.
+        auc_unchanged: of the database's control; NaN without one.
+    """
+
+    database: str
+    method: str
+    tcr_sym: float
+    auc: float
+    auc_low: float
+    auc_high: float
+    recall_at_1: float
+    queries: int
+    with_match: int
+    protocol: RetrievalProtocol
+    auc_unchanged: float = math.nan
+
+    @property
+    def kept(self) -> float:
+        """Share of AUC that remains after the change; NaN if it is unknown."""
+        if not self.auc_unchanged > 0.0:
+            return math.nan
+        return self.auc / self.auc_unchanged
 
 
 @dataclass(frozen=True)
@@ -159,8 +200,16 @@ def measure_drives(
     jobs += [
         Job(
             name=f"measure {name}",
-            step=MeasureDatabase(
-                sources[name], survey, methods, protocol, part
+            step=MakePart(
+                part,
+                measure_database,
+                (
+                    sources[name],
+                    survey.drive,
+                    tuple(survey.described(one) for one in methods),
+                    methods,
+                    protocol,
+                ),
             ),
             needs=(jobs[0].name,),
             cost=_COST,
@@ -172,12 +221,68 @@ def measure_drives(
     for name, one in databases.items():
         unchanged = {}
         if one.control is not None:
-            measured = read_part(parts[one.control])
+            measured = parts[one.control].read()
             unchanged = {point.method: point.auc for point in measured}
         points += [
             replace(point, auc_unchanged=unchanged.get(point.method, math.nan))
-            for point in read_part(parts[name])
+            for point in parts[name].read()
         ]
+    return points
+
+
+def measure_database(
+    reporter: Reporter,
+    source: DriveSource,
+    surveyed: Part,
+    described: tuple[Part, ...],
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+) -> list[TrendPoint]:
+    """Returns the points of one database.
+
+    Args:
+        reporter: takes the progress.
+        source: opens the database, which is in the world of the query.
+        surveyed: the `SurveyedDrive` of the query drive.
+        described: each method's descriptions of the query drive.
+        methods: to run.
+        protocol: of place recognition.
+    """
+    running = [method.make() for method in methods]
+    database = survey_recording(
+        source(), {"places"}, running, protocol, reporter.track
+    )
+    query_track = surveyed.read()
+    check_same_world(database.drive.placed, query_track.placed)
+    change = temporal_change(
+        database.drive.coarse.centroids_W, query_track.coarse.centroids_W
+    )
+    points = []
+    for method, part in zip(running, described, strict=True):
+        _, queries = part.read()
+        places = database.described[method.name]
+        found = judge_retrieval(
+            method,
+            places.name,
+            queries.name,
+            score(method, places, queries, protocol),
+            protocol,
+        )
+        metrics = found.metrics
+        points.append(
+            TrendPoint(
+                database=places.name,
+                method=method.name,
+                tcr_sym=float(change.symmetric),
+                auc=float(metrics.auc),
+                auc_low=float(metrics.auc_interval.low),
+                auc_high=float(metrics.auc_interval.high),
+                recall_at_1=float(metrics.recall_at_1),
+                queries=metrics.num_queries,
+                with_match=metrics.num_with_match,
+                protocol=found.protocol,
+            )
+        )
     return points
 
 

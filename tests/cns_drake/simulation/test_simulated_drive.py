@@ -11,7 +11,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
 from evaluation.drives import open_drive
-from evaluation.study.recording_survey import survey_recording
+from evaluation.study.surveys import survey_recording
 
 
 def check_same(simulated, recorded, frames):

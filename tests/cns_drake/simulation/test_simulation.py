@@ -15,8 +15,7 @@ from cns_drake.scenarios.scenario_files import (
 )
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.simulation import simulate
-from cns_drake.studies.recording_jobs import record_all
-from cns_drake.studies.recording_step import is_recorded
+from cns_drake.studies.recording import is_recorded, record_all
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")
 

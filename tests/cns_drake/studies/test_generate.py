@@ -25,8 +25,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
-from cns_drake.studies.recording_jobs import record_all
-from cns_drake.studies.recording_step import is_recorded
+from cns_drake.studies.recording import is_recorded, record_all
 from evaluation.change.drive_change import compare, survey
 from evaluation.drives import open_drive
 from evaluation.study import trend_databases

@@ -14,11 +14,9 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario, map_folder
 from cns_drake.simulation.loaded_drive import load_ways
 from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies import distractors, ladder
-from cns_drake.studies.distractors import distracting_drives
-from cns_drake.studies.ladder import climb_ladder
-from cns_drake.studies.ladder_causes import CAUSES, STRENGTHS
-from cns_drake.studies.ladder_rungs import Extent, plan_rungs
+from cns_drake.studies import ladder
+from cns_drake.studies.ladder import climb_ladder, distracting_drives
+from cns_drake.studies.ladder_rungs import CAUSES, STRENGTHS, Extent, plan_rungs
 from cns_drake.traffic.lane_file import lane_text
 from evaluation.study.chosen_methods import MethodChoice
 
@@ -214,8 +212,8 @@ def test_many_distracting_drives_have_twin_blocks(tmp_path, monkeypatch):
         drawn.append((folder.name, *seeds))
         return {seed: output / f"{folder.name}_c{seed}" for seed in seeds}
 
-    monkeypatch.setattr(distractors, "redraw_cities", redraw)
-    monkeypatch.setattr(distractors, "_num_places", lambda *_: 1)
+    monkeypatch.setattr(ladder, "redraw_cities", redraw)
+    monkeypatch.setattr(ladder, "_num_places", lambda *_: 1)
     query_drive = load_scenario("suburbia_02")
     drives = distracting_drives(query_drive, 40, 5.0, tmp_path, Cluster())
     maps = [Path(drive.map).name for drive in drives]

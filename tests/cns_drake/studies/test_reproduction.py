@@ -13,7 +13,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction
-from cns_drake.studies.recording_step import Record
+from cns_drake.studies.recording import Record
 from cns_drake.studies.reproduction import (
     control_drives,
     recording_info,

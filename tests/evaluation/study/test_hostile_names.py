@@ -11,7 +11,7 @@ from cns_drake.base.files import file_name
 from evaluation.report.tables import Table
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import City, RecordingInfo
-from evaluation.study.figure_files import change_stems
+from evaluation.study.figures import change_stems
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"
 MAP = "..|[x](y)_$"

@@ -11,9 +11,8 @@ from evaluation.methods import known_methods
 from evaluation.recognition import costs
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import find_recordings
-from evaluation.study.parts import read_part
+from evaluation.study.parts import StudyFiles
 from evaluation.study.plan import plan_study
-from evaluation.study.study_layout import StudyFiles
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +41,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
         assert row["scans_per_place"] == ("10" if name == "btc" else "1")
         (job,) = (j for j in jobs if j.name == "survey town_01")
         (choice,) = (m for m in job.step.methods if m.name == name)
-        _, described = read_part(files.survey("town_01").described(choice))
+        _, described = files.survey("town_01").described(choice).read()
         places = described.places.descriptors
         sizes = [len(pickle.dumps(one, protocol=5)) for one in places]
         assert float(row["place_bytes"]) == sum(sizes) / len(sizes)

@@ -11,10 +11,9 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import run_jobs
 from evaluation.methods import method
 from evaluation.paper import reference_for
-from evaluation.study.benchmark import write_report
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings, group_cities
-from evaluation.study.plan import plan_study
+from evaluation.study.plan import plan_study, write_report
 
 pytestmark = pytest.mark.slow
 

@@ -13,11 +13,9 @@ from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.described_drives import DescribeDrive
-from evaluation.study.drive_source import RecordedDrive
-from evaluation.study.parts import read_part
-from evaluation.study.rungs import MeasureRung, RungDrive
-from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.parts import MakePart, Part, SurveyFiles
+from evaluation.study.rungs import measure_rung
+from evaluation.study.surveys import DescribeDrive, RecordedDrive
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
 PROTOCOL = RetrievalProtocol()
@@ -55,38 +53,35 @@ def folder(tmp_path_factory):
 
 
 def described(folder, name, role):
-    """The files of a drive, and the step that writes them."""
+    """The parts of a drive's scans and descriptions, which are there."""
     files = SurveyFiles(folder / "parts" / name)
     step = DescribeDrive(
         RecordedDrive(folder / name), role, METHODS, PROTOCOL, files, True
     )
     if not step.is_done():
         step.run(Reporter())
-    return files
+    return (files.scans, *map(files.described, METHODS))
 
 
 def rung(folder, part, **changes):
     """A rung whose database is described beforehand."""
     values = {
-        "database": RungDrive(
-            RecordedDrive(folder / "metropolis_01"),
-            described(folder, "metropolis_01", "places"),
-        ),
-        "query": RungDrive(Once(folder / "metropolis_04")),
+        "database": described(folder, "metropolis_01", "places"),
+        "query": Once(folder / "metropolis_04"),
         "distractors": (),
         "num_distractors": 0,
         "methods": METHODS,
         "protocol": PROTOCOL,
-        "part": part,
     }
-    return MeasureRung(**values | changes)
+    arguments = tuple((values | changes).values())
+    return MakePart(Part(part), measure_rung, arguments)
 
 
 def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
     step = rung(folder, tmp_path / "rung.data")
     step.run(Reporter())
     assert step.is_done()
-    found = read_part(step.part)
+    found = step.part.read()
     assert [(one.method, one.is_gated) for one in found] == [
         (choice.name, gated) for choice in METHODS for gated in (False, True)
     ]
@@ -126,13 +121,13 @@ def test_the_best_match_agrees_with_the_matrix_of_overlaps(folder, tmp_path):
     # Places and queries are all frames of both drives.
     assert matrix.shape == apart.shape
     expected = np.where(apart <= PROTOCOL.radius, matrix, 0.0).max(axis=1)
-    for one in read_part(_done(rung(folder, tmp_path / "rung.data"))):
+    for one in _done(rung(folder, tmp_path / "rung.data")):
         np.testing.assert_allclose(one.overlaps, expected, atol=1e-4)
 
 
 def test_places_of_other_cities_are_never_right(folder, tmp_path):
-    others = (described(folder, "suburbia_01", "places"),)
-    plain = read_part(_done(rung(folder, tmp_path / "plain.data")))
+    others = (described(folder, "suburbia_01", "places")[1:],)
+    plain = _done(rung(folder, tmp_path / "plain.data"))
     for number in (3, 100):
         step = rung(
             folder,
@@ -140,7 +135,7 @@ def test_places_of_other_cities_are_never_right(folder, tmp_path):
             distractors=others,
             num_distractors=number,
         )
-        for before, after in zip(plain, read_part(_done(step)), strict=True):
+        for before, after in zip(plain, _done(step), strict=True):
             places = before.outcomes.num_places
             assert after.outcomes.num_places == places + min(number, 9)
             np.testing.assert_array_equal(
@@ -156,7 +151,7 @@ def test_places_of_other_cities_are_never_right(folder, tmp_path):
 
 def _done(step):
     step.run(Reporter())
-    return step.part
+    return step.part.read()
 
 
 def test_another_database_is_another_rung(folder, tmp_path):
@@ -164,8 +159,8 @@ def test_another_database_is_another_rung(folder, tmp_path):
     step.run(Reporter())
     other = rung(
         folder,
-        step.part,
-        database=RungDrive(RecordedDrive(folder / "metropolis_04")),
+        step.part.path,
+        database=RecordedDrive(folder / "metropolis_04"),
     )
     assert step.is_done()
     assert not other.is_done()

@@ -8,12 +8,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.study.parts import (
-    is_current,
-    part_digest,
-    read_part,
-    write_part,
-)
+from evaluation.study.parts import Part
 from evaluation.study.plain_values import decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
@@ -28,9 +23,9 @@ class Description:
 
 @pytest.fixture
 def part(tmp_path):
-    path = tmp_path / "new" / "folder" / "values.data"
-    write_part(path, INPUTS, list(range(1000)))
-    return path
+    part = Part(tmp_path / "new" / "folder" / "values.data")
+    part.write(INPUTS, list(range(1000)))
+    return part
 
 
 def test_arrays_come_back_bit_by_bit(tmp_path):
@@ -42,8 +37,9 @@ def test_arrays_come_back_bit_by_bit(tmp_path):
         np.flatnonzero(rng.integers(2, size=50)),
         np.empty((0, 3)),
     )
-    write_part(tmp_path / "one.data", INPUTS, value)
-    again = read_part(tmp_path / "one.data")
+    part = Part(tmp_path / "one.data")
+    part.write(INPUTS, value)
+    again = part.read()
     for name in ("spectrum", "filled", "empty"):
         old, new = getattr(value, name), getattr(again, name)
         assert (old.dtype, old.shape) == (new.dtype, new.shape)
@@ -53,51 +49,52 @@ def test_arrays_come_back_bit_by_bit(tmp_path):
 
 def test_equal_inputs_and_values_give_equal_bytes(part, tmp_path):
     turned = {key: INPUTS[key] for key in reversed(INPUTS)}
-    write_part(tmp_path / "again.data", turned, list(range(1000)))
-    assert (tmp_path / "again.data").read_bytes() == part.read_bytes()
+    again = Part(tmp_path / "again.data")
+    again.write(turned, list(range(1000)))
+    assert again.path.read_bytes() == part.path.read_bytes()
 
 
 def test_a_part_belongs_to_its_inputs(part):
-    assert is_current(part, INPUTS)
-    assert part_digest(part) == fingerprint(INPUTS)
-    assert is_current(part, {**INPUTS, "roles": ["places"]})
+    assert part.is_current(INPUTS)
+    assert part.identity() == fingerprint(INPUTS)
+    assert part.is_current({**INPUTS, "roles": ["places"]})
     for other in (
         {**INPUTS, "roles": []},
         {**INPUTS, "more": 1},
         {**INPUTS, "z": {"b": 1.5000001, "a": None}},
     ):
-        assert not is_current(part, other)
+        assert not part.is_current(other)
 
 
 def test_only_a_whole_part_is_one(part, tmp_path):
-    whole = part.read_bytes()
-    assert not is_current(tmp_path / "none.data", INPUTS)
+    whole = part.path.read_bytes()
+    assert not Part(tmp_path / "none.data").is_current(INPUTS)
     with pytest.raises(InputError, match=r"none.data: No such file"):
-        read_part(tmp_path / "none.data")
+        Part(tmp_path / "none.data").read()
     for length in (0, 10, 16, 60, len(whole) - 1):
-        part.write_bytes(whole[:length])
-        assert not is_current(part, INPUTS)
+        part.path.write_bytes(whole[:length])
+        assert not part.is_current(INPUTS)
         with pytest.raises(InputError, match=r"values.data: damaged"):
-            read_part(part)
-    part.write_bytes(whole + b"x")
-    assert not is_current(part, INPUTS)
+            part.read()
+    part.path.write_bytes(whole + b"x")
+    assert not part.is_current(INPUTS)
 
 
 @pytest.mark.parametrize("place", [-1, -5, -200])
 def test_damage_is_noticed_before_it_is_used(part, place):
-    data = bytearray(part.read_bytes())
+    data = bytearray(part.path.read_bytes())
     data[place] ^= 1
-    part.write_bytes(bytes(data))
+    part.path.write_bytes(bytes(data))
     with pytest.raises(InputError, match=r"values.data: damaged .* delete it"):
-        read_part(part)
+        part.read()
 
 
 def test_what_cannot_be_kept_leaves_the_part_as_it_was(part):
-    whole = part.read_bytes()
+    whole = part.path.read_bytes()
     with pytest.raises(InputError, match=r"function cannot be kept"):
-        write_part(part, INPUTS, lambda: None)
-    assert [path.name for path in part.parent.iterdir()] == ["values.data"]
-    assert part.read_bytes() == whole
+        part.write(INPUTS, lambda: None)
+    assert [path.name for path in part.path.parent.iterdir()] == ["values.data"]
+    assert part.path.read_bytes() == whole
 
 
 def test_a_part_runs_nothing_of_what_it_names(tmp_path, monkeypatch):
@@ -136,7 +133,7 @@ def test_a_part_runs_nothing_of_what_it_names(tmp_path, monkeypatch):
         b"cns-eval part 1\n{}\n" + pickle.dumps(described)
     )
     with pytest.raises(InputError, match="damaged"):
-        read_part(tmp_path / "old.data")
+        Part(tmp_path / "old.data").read()
 
 
 class Painter:
@@ -186,5 +183,5 @@ def test_an_array_that_is_there_twice_is_stored_once():
 def test_what_cannot_be_kept(tmp_path, value):
     path = tmp_path / "a.data"
     with pytest.raises(InputError, match=f"^{path}: .*cannot be kept"):
-        write_part(path, {}, value)
+        Part(path).write({}, value)
     assert not list(tmp_path.iterdir())

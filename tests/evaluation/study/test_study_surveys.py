@@ -13,12 +13,9 @@ from evaluation.drives import Drive, open_drive
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.drive_source import RecordedDrive
-from evaluation.study.measurements import RecognisePlaces
-from evaluation.study.parts import read_part
-from evaluation.study.recording_survey import survey_recording
-from evaluation.study.study_layout import SurveyFiles
-from evaluation.study.surveys import Survey
+from evaluation.study.measurements import recognise_places
+from evaluation.study.parts import MakePart, Part, SurveyFiles
+from evaluation.study.surveys import RecordedDrive, Survey, survey_recording
 
 pytestmark = pytest.mark.slow
 
@@ -123,11 +120,11 @@ def test_stored_surveys_equal_computed_ones(recorded, source, files):
     survey(source, choices, files)
     methods = [choice.make() for choice in choices]
     found = survey_recording(recorded, BOTH, methods)
-    assert_equal(read_part(files.drive), found.drive)
-    assert_equal(read_part(files.fine), found.fine)
+    assert_equal(files.drive.read(), found.drive)
+    assert_equal(files.fine.read(), found.fine)
     direct = describe_drive(recorded, methods, BOTH)
     for choice, expected in zip(choices, direct, strict=True):
-        placed, described = read_part(files.described(choice))
+        placed, described = files.described(choice).read()
         assert_equal(described, expected)
         assert placed == found.drive.placed
     assert len(source.opened) == 1
@@ -150,11 +147,11 @@ def test_only_missing_or_stale_parts_are_computed(source, files):
     survey(source, (*others, btc), files)
     assert len(source.opened) == 2
     for method in others:
-        path = files.described(method)
+        path = files.described(method).path
         assert path.stat().st_mtime_ns == stamps[path]
     survey(source, (*others, btc), files, frozenset())
     assert len(source.opened) == 3
-    assert len(read_part(files.drive).frames) == 0
+    assert len(files.drive.read().frames) == 0
     other = Source(source.recorded, 7, source.opened)
     survey(other, (), files, frozenset())
     assert len(source.opened) == 4
@@ -186,10 +183,10 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     survey(Source(recorded), (solid,), surveys[0])
     other = Source(Elsewhere(recorded))
     survey(other, (solid,), surveys[1])
-    part = tmp_path / "results" / "solid.data"
-    step = RecognisePlaces(
-        "metropolis", ("01", "04"), surveys, solid, PAPER_PROTOCOL, part
-    )
+    part = Part(tmp_path / "results" / "solid.data")
+    described = tuple(survey.described(solid) for survey in surveys)
+    arguments = "metropolis", ("01", "04"), described, solid, PAPER_PROTOCOL
+    step = MakePart(part, recognise_places, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         step.run(Reporter())
-    assert not part.parent.exists()
+    assert not part.path.parent.exists()

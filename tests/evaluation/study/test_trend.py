@@ -14,7 +14,7 @@ from evaluation.drives import open_drive
 from evaluation.methods import known_methods, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study import trend_databases, trend_points
+from evaluation.study import trend_databases
 from evaluation.study.trend import smooth, smooth_band, write_trend
 from evaluation.study.trend_databases import measure_trend
 
@@ -92,7 +92,7 @@ def test_processes_change_nothing_and_are_not_needed_twice(
         trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
     )
     monkeypatch.setattr(
-        trend_points, "survey_recording", lambda *_: pytest.fail("again")
+        trend_databases, "survey_recording", lambda *_: pytest.fail("again")
     )
     assert measure_trend(*arguments, Cluster()) == points
 

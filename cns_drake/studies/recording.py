@@ -1,17 +1,20 @@
-"""The step that records a drive, and the check whether it is done."""
+"""Recordings as jobs, side by side, one process each."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 import shutil
+import sys
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
-from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.files import make_folder, user_errors
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.recording.recording_folder import RecordingFolder
@@ -23,9 +26,98 @@ from cns_drake.scenarios.provenance import (
 )
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
-from evaluation.study.parts import is_current, write_part
-from evaluation.study.recording_survey import RecordingSurvey
-from evaluation.study.surveys import Survey
+from cns_drake.simulation.simulation import simulate
+from evaluation.study.parts import Part
+from evaluation.study.surveys import RecordingSurvey, Survey
+
+# Expected time to load a stage, and to simulate a frame with the default LiDAR
+# [s]; assumed frames of a drive without a number.
+_LOADING = 3.0
+_FRAME = 0.014
+_USUAL_FRAMES = 3000
+
+
+def record_all(
+    scenarios: Sequence[Scenario],
+    output: Path,
+    cluster: Cluster,
+    *,
+    overwrite: bool = True,
+) -> None:
+    """Records scenarios as `<output>/<name>/`, with progress on stderr.
+
+    A finished recording of the same scenario and world is kept; an interrupted
+    one goes on.
+
+    Args:
+        scenarios: to record.
+        output: the folder of recordings.
+        cluster: where the work is done.
+        overwrite: replace other recordings of these names.
+
+    Raises:
+        InputError: some could not be recorded, all of which are named, or the
+            folder cannot be made.
+    """
+    jobs = plan_recordings(scenarios, output, overwrite=overwrite)
+    make_folder(output)
+    run_jobs(jobs, cluster)
+
+
+def plan_recordings(
+    scenarios: Sequence[Scenario],
+    output: Path,
+    *,
+    overwrite: bool = True,
+    pages: Mapping[str, Path] | None = None,
+) -> list[Job]:
+    """Returns a job for each unfinished recording; notes the finished ones.
+
+    The job has the recording's name.
+
+    Args:
+        scenarios: to record.
+        output: the folder of recordings.
+        overwrite: replace other recordings of these names.
+        pages: name -> web page of the drive. A recording without its page
+            counts as not finished.
+
+    Raises:
+        InputError: two have one name, or a folder must not be used.
+    """
+    for name, count in Counter(s.name for s in scenarios).items():
+        if count > 1:
+            raise InputError(f"{name}: {count} drives have this name")
+    output = output.absolute()
+    waiting = []
+    for scenario in scenarios:
+        page = (pages or {}).get(scenario.name)
+        if page is not None:
+            page = page.absolute()
+        step = Record(scenario, output, overwrite, page)
+        if step.is_done():
+            print(f"{scenario.name}: already finished", file=sys.stderr)
+        else:
+            waiting.append(step)
+    # Quick checks come before all slow work.
+    folders = [RecordingFolder(step.output) for step in waiting]
+    others = [files.path.name for files in folders if files.is_finished()]
+    if others and not overwrite:
+        raise InputError(
+            f"{output}: finished recordings of another scenario, world, "
+            f"length or program: {', '.join(others)} "
+            "(--overwrite replaces them)"
+        )
+    for files in folders:
+        files.check(overwrite)
+    return [
+        Job(
+            name=step.scenario.name,
+            step=step,
+            cost=_LOADING + _FRAME * (step.scenario.frames or _USUAL_FRAMES),
+        )
+        for step in waiting
+    ]
 
 
 @dataclass(frozen=True)
@@ -55,9 +147,6 @@ class Record(Step):
         return is_recorded(self.scenario, self.folder) and self._is_shown()
 
     def run(self, reporter: Reporter) -> None:
-        with uninterrupted():
-            from cns_drake.simulation.simulation import simulate
-
         shown = None if self.page is None else self._shown()
         is_new = not is_recorded(self.scenario, self.folder)
         survey = self.survey if is_new and self._is_first_read() else None
@@ -84,7 +173,7 @@ class Record(Step):
             assert survey is not None
             survey.write(one)
         if shown is not None:
-            write_part(self._page_part, shown, None)
+            self._page_part.write(shown, None)
 
     def _is_first_read(self) -> bool:
         """Returns whether the first LiDAR's scans are surveyed."""
@@ -109,14 +198,14 @@ class Record(Step):
                 shutil.rmtree(spare)
 
     @property
-    def _page_part(self) -> Path:
-        """Writes the fingerprint of the page."""
+    def _page_part(self) -> Part:
+        """The fingerprint of the page."""
         assert self.page is not None
-        return self.page.parent / "parts" / f"{self.page.stem}.data"
+        return Part(self.page.parent / "parts" / f"{self.page.stem}.data")
 
     def _is_shown(self) -> bool:
         return self.page is None or (
-            self.page.is_file() and is_current(self._page_part, self._shown())
+            self.page.is_file() and self._page_part.is_current(self._shown())
         )
 
     def _shown(self) -> dict[str, object]:

@@ -1,14 +1,91 @@
-"""The figures of a study: their file names, and what they show."""
+"""The figures of a study: how they are drawn, file names, what they show."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from cns_drake.base.files import file_name
-from evaluation.report.figures import CHANGE_LEGEND, SETS_LEGEND
-from evaluation.report.page_data import Illustration
+from cns_drake.base.files import file_name, make_folder
+from cns_drake.base.jobs.step import Reporter
+from evaluation.report.drawing import PIXELS
+from evaluation.report.figures import (
+    CHANGE_LEGEND,
+    SETS_LEGEND,
+    SeenRoute,
+    Stage,
+    draw_change,
+    draw_routes,
+    top_view,
+)
+from evaluation.report.page_data import Illustration, PageDrive, make_drive
 from evaluation.study.collection import City, RecordingInfo
-from evaluation.study.views import PAGE_KIND
+from evaluation.study.parts import Part
+
+# Format of pictures on the page.
+_PAGE_KIND = PIXELS[-1]
+
+
+def draw_city(
+    reporter: Reporter,
+    map_name: str,
+    stages: tuple[tuple[str, Part, Part], ...],
+    stem: Path,
+) -> dict[str, PageDrive]:
+    """Draws the routes of a city; returns its drives for the page, by name.
+
+    Args:
+        reporter: takes the progress.
+        map_name: the name of the city.
+        stages: the name of each, and its drive's `SurveyedDrive` and cloud.
+        stem: path of the figure, without ending.
+    """
+    routes, drives = [], {}
+    for done, (name, surveyed, fine) in enumerate(stages):
+        reporter.progress(done, len(stages) + 1)
+        drive = surveyed.read()
+        view = top_view(fine.read(), drive.positions)
+        routes.append(SeenRoute(name, view, drive.positions))
+        drives[drive.name] = make_drive(
+            drive.name, view, drive.X_WS, drive.frames, drive.thumbnails
+        )
+    reporter.progress(len(stages), len(stages) + 1)
+    make_folder(stem.parent)
+    draw_routes(map_name, routes, stem)
+    return drives
+
+
+def draw_changes(
+    reporter: Reporter,
+    change: Part,
+    drives: tuple[tuple[Part, Part], tuple[Part, Part]],
+    stems: tuple[Path, Path],
+) -> None:
+    """Draws what changed between two stages, and the sets of the TCR.
+
+    Args:
+        reporter: not used.
+        change: the `ChangeResult`.
+        drives: `SurveyedDrive` and cloud of the earlier drive, and of the later
+            one.
+        stems: paths of the two figures, without endings.
+    """
+    del reporter
+    result = change.read()
+    shown = []
+    for name, (surveyed, fine) in zip(result.stages, drives, strict=True):
+        drive = surveyed.read()
+        shown.append(Stage(name, fine.read(), drive.coarse, drive.positions))
+    make_folder(stems[0].parent)
+    earlier, later = shown
+    draw_change(result.map_name, earlier, later, result.report.change, stems)
+
+
+def figure_files(*stems: Path) -> tuple[Path, ...]:
+    """Returns the files of drawn figures."""
+    return tuple(
+        stem.with_name(f"{stem.name}.{kind}")
+        for stem in stems
+        for kind in PIXELS
+    )
 
 
 def routes_stem(city: City) -> str:
@@ -43,7 +120,7 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
         Illustration(
             folder / routes_stem(city),
             f"Routes in {city.name}, from red to blue",
-            PAGE_KIND,
+            _PAGE_KIND,
             # The page shows each drive's map in a figure of its own.
             section="print",
         )
@@ -55,7 +132,7 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
             Illustration(
                 folder / change,
                 f"What changed in {city.name} between {first} and {last}",
-                PAGE_KIND,
+                _PAGE_KIND,
                 section="change",
                 num_panels=2,
                 legend=CHANGE_LEGEND,
@@ -66,7 +143,7 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
                 folder / sets,
                 f"Sets H and O of {city.name} {first} and {last}: both orders"
                 " and their union",
-                PAGE_KIND,
+                _PAGE_KIND,
                 section="change",
                 num_panels=3,
                 legend=SETS_LEGEND,
