@@ -200,7 +200,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
         SURVEY,
         "evaluation.study.views",
         "cns_drake.simulation.simulated_drive",
-        "cns_drake.studies.recording_step",
+        "cns_drake.studies.recording",
     ],
 )
 def test_what_python_imports_is_found_in_the_sources(module, monkeypatch):
