@@ -37,9 +37,14 @@ from evaluation.study.measurements import (
     recognise_places,
 )
 from evaluation.study.parts import MakePart, StudyFiles
-from evaluation.study.surveys import START_COST, survey_job
+from evaluation.study.surveys import Survey
 
-# Expected seconds of jobs, beyond their start.
+# Expected seconds to start a process with its imports, and for the maps of a
+# drive of 3000 scans with 250 places and 150 queries.
+_START_COST = 2.0
+_MAP_COST = 10.0
+_ROLE_COST = {"places": 12.0, "queries": 8.0}
+# Those of the other jobs, beyond their start.
 _CHANGE_COST = 6.0
 _CITY_COST = 4.0
 _COSTS_COST = 8.0
@@ -166,14 +171,19 @@ def _plan_city(
     protocol: RetrievalProtocol,
 ) -> list[Job]:
     jobs = [
-        survey_job(
-            recording.name,
-            recording.source,
-            roles,
-            methods,
-            protocol,
-            files.survey(recording.name),
-            recording.needs,
+        Job(
+            name=f"survey {recording.name}",
+            step=Survey(
+                recording.source,
+                frozenset(roles),
+                methods,
+                protocol,
+                files.survey(recording.name),
+            ),
+            needs=recording.needs,
+            cost=_START_COST
+            + _MAP_COST
+            + sum(_ROLE_COST[role] for role in roles),
         )
         for recording, roles in _roles(city, protocol)
     ]
@@ -193,7 +203,7 @@ def _plan_city(
                 figure_files(stem),
             ),
             needs=_survey_names(stages),
-            cost=START_COST + _CITY_COST,
+            cost=_START_COST + _CITY_COST,
         )
     )
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
@@ -281,7 +291,7 @@ def _change_job(
             ),
         ),
         needs=_survey_names(drives),
-        cost=START_COST + _CHANGE_COST,
+        cost=_START_COST + _CHANGE_COST,
     )
 
 
@@ -332,7 +342,7 @@ def _recognition_job(
         name=name,
         step=Steps(results.folder, steps),
         needs=_survey_names(pair),
-        cost=START_COST + cost,
+        cost=_START_COST + cost,
     )
 
 
@@ -358,7 +368,7 @@ def _cost_job(
             (query.source, surveys[1].drive, methods, described, protocol),
         ),
         needs=others,
-        cost=START_COST + _COSTS_COST,
+        cost=_START_COST + _COSTS_COST,
     )
 
 

@@ -16,7 +16,6 @@ from typing import Protocol
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.progress import Track, silent
 from evaluation.drives import Drive, PlacedDrive, open_drive
@@ -36,12 +35,6 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
-
-# Expected seconds to start a process with its imports, and for the maps of a
-# drive of 3000 scans with 250 places and 150 queries.
-START_COST = 2.0
-_MAP_COST = 10.0
-_ROLE_COST = {"places": 12.0, "queries": 8.0}
 
 
 class DriveSource(Protocol):
@@ -430,35 +423,6 @@ def describe(
     return {
         method.name: one for method, one in zip(running, found, strict=True)
     }
-
-
-def survey_job(
-    name: str,
-    source: DriveSource,
-    roles: Iterable[Role],
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    files: SurveyFiles,
-    needs: tuple[str, ...] = (),
-) -> Job:
-    """Returns the job that surveys a recording.
-
-    Args:
-        name: the name of the recording.
-        source: see `Survey`.
-        roles: likewise.
-        methods: likewise.
-        protocol: likewise.
-        files: likewise.
-        needs: names of the jobs that make the recording.
-    """
-    survey = Survey(source, frozenset(roles), methods, protocol, files)
-    return Job(
-        name=f"survey {name}",
-        step=survey,
-        needs=needs,
-        cost=START_COST + _MAP_COST + sum(_ROLE_COST[r] for r in survey.roles),
-    )
 
 
 def open_surveyed(source: DriveSource, surveyed: Part) -> Drive:

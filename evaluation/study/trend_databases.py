@@ -29,7 +29,7 @@ from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import (
     DriveSource,
     RecordedDrive,
-    survey_job,
+    Survey,
     survey_recording,
 )
 
@@ -191,9 +191,8 @@ def measure_drives(
     files = StudyFiles(output.absolute())
     make_folder(output)
     survey = files.survey(query_name)
-    jobs = [
-        survey_job(query_name, query, {"queries"}, methods, protocol, survey)
-    ]
+    step = Survey(query, frozenset({"queries"}), methods, protocol, survey)
+    jobs = [Job(name=f"survey {query_name}", step=step)]
     sources = {name: one.source for name, one in databases.items()}
     sources |= controls
     parts = {name: files.trend_points(name, query_name) for name in sources}

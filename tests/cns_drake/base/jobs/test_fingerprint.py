@@ -198,7 +198,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
     "module",
     [
         SURVEY,
-        "evaluation.study.views",
+        "evaluation.study.figures",
         "cns_drake.simulation.simulated_drive",
         "cns_drake.studies.recording",
     ],
