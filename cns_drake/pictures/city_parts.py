@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.scene.perception_geometry import (
+    merge_surfaces,
+    read_perception_geometry,
+)
 from cns_drake.scene.semantics import CLASS_RGB
-from cns_drake.scene.surface_merging import merge_surfaces
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 

@@ -11,8 +11,11 @@ from pydrake.math import RigidTransform
 from pydrake.perception import BaseField, Fields, PointCloud
 
 from cns_drake.pictures.city_parts import Part
-from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surface_merging import merge_surfaces, merge_triangles
+from cns_drake.scene.perception_geometry import (
+    PerceptionGeometry,
+    merge_surfaces,
+)
+from cns_drake.scene.surfaces import merge_triangles
 
 # Vertices are put on an invisible grid of 4 mm: the zeros at the end of each
 # float compress well.

@@ -19,13 +19,13 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.ray_groups import RayGroup
-from cns_drake.scene.surface_merging import tessellate
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
     HalfSpaceSurface,
     TriangleSurface,
+    tessellate,
 )
 
 if TYPE_CHECKING:

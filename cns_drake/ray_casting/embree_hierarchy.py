@@ -75,7 +75,7 @@ class EmbreeHierarchy:
     through an edge that two triangles share.
 
     Attributes:
-        rows: of the groups with primitives in this hierarchy.
+        rows: rows of the groups with primitives in this hierarchy.
     """
 
     def __init__(

@@ -13,13 +13,13 @@ from pydrake.math import RigidTransform
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.curved_shapes import circumscribe
 from cns_drake.ray_casting.ray_groups import Member, RayGroup
-from cns_drake.scene.surface_merging import merge_triangles
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
     HalfSpaceSurface,
     TriangleSurface,
+    merge_triangles,
 )
 
 # Masks of geometry: all rays hit solids, some also hit proxies.
@@ -38,7 +38,7 @@ class Primitives(NamedTuple):
     """One Embree geometry.
 
     Attributes:
-        kind: of its primitives.
+        kind: Embree's number for the kind of its primitives.
         buffers: (slot, format, array) each.
         owners: (P,) int32, the index of each primitive's geometry.
         mask: `SOLID` or `PROXY`.

@@ -65,7 +65,7 @@ class Placed(NamedTuple):
     """P groups of a scene that were placed anew.
 
     Attributes:
-        rows: (P,) of the groups.
+        rows: (P,) rows of the groups.
         X_OLs: (P, 3, 4) their `X_OL`.
         in_sight: (P,) whether each is in sight.
         moves: (P,) whether each has a `motion`.
@@ -146,7 +146,7 @@ class MovingGroups:
 
         Args:
             calc_X_WF: gives the pose of a frame in the world.
-            motions: of the frames that move during the turn.
+            motions: motion of each frame that moves during the turn.
             known: poses of frames, which replace calls of `calc_X_WF`.
             seen: the ball in which rays can meet geometry.
 

@@ -15,7 +15,7 @@ import numpy as np
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
-from cns_drake.scene.surface_merging import merge_triangles, tessellate
+from cns_drake.scene.surfaces import merge_triangles, tessellate
 
 # Sides of the polyhedron of a round shape, true to 0.03 % of its radius.
 _SIDES = 128

@@ -130,7 +130,7 @@ class RayCastingScene:
 
         Args:
             calc_X_WF: gives the pose of a frame in the world.
-            motions: of the frames that move during the next casts.
+            motions: motion of each frame that moves during the next casts.
             known: poses of frames, which replace calls of `calc_X_WF`.
             seen: the ball in which the next rays can meet geometry.
         """
@@ -157,7 +157,7 @@ class RayCastingScene:
             p_WSset: (3,) or (K, 3) origins in the world [m]; ray i starts at
                 origin i mod K.
             d_Sset: (N, 3) unit directions, expressed in S.
-            max_range: of the rays [m], one for all or (M,) taken in turn
+            max_range: how far to look [m], one for all or (M,) taken in turn
                 likewise.
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world, taken
                 in turn likewise.

@@ -38,7 +38,7 @@ class Motion(NamedTuple):
     Attributes:
         w: angular velocity [rad/s].
         v: velocity of F's origin [m/s].
-        duration: of the turn [s].
+        duration: length of the turn [s].
     """
 
     w: np.ndarray
@@ -91,7 +91,7 @@ class RayGroup:
             other groups share.
         X_OL: (3, 4) affine map from L to the scene's origin, at the start of
             a turn; it does not exist before `place`.
-        motion: of F during the turn, None if it stays.
+        motion: motion of F during the turn, None if it stays.
         in_sight: whether rays can meet it; elsewhere `X_OL` and `motion` are
             those of an earlier turn.
     """

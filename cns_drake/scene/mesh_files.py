@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import functools
 from itertools import pairwise
 from pathlib import Path
+import re
 import tempfile
 
 import numpy as np
@@ -13,14 +15,100 @@ from pydrake.geometry import (
     Mesh,
     MeshSource,
     ReadObjToTriangleSurfaceMesh,
+    RefineVolumeMeshIntoVtkFileContents,
 )
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
-from cns_drake.scene.vtk_meshes import read_vtk
+
+_LIMIT_BYTES = 1 << 28
+# For a face with a missing vertex, Drake's reader reads foreign memory, and may
+# end the process.
+_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
+_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
+# A ray caster needs neither texture nor normals; Drake checks them.
+_OTHER_INDICES = re.compile(rb"/[^\s]*")
+_NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
+
+
+def check_obj(path: Path) -> None:
+    """Refuses an OBJ file with a face that names missing vertices.
+
+    Args:
+        path: an existing file.
+
+    Raises:
+        ValueError: if so; it names the line.
+        InputError: if it cannot be read.
+    """
+    # Drake ends a line at either.
+    content = read_bytes(path, _LIMIT_BYTES).replace(b"\r", b"\n")
+    num_vertices = len(_VERTEX.findall(content))
+    faces = b" \n".join(_FACE.findall(content))
+    if b"/" in faces:
+        faces = _OTHER_INDICES.sub(b"", faces)
+    if _are_indices(faces, num_vertices):
+        return
+    for number, line in enumerate(content.split(b"\n"), start=1):
+        face = _FACE.match(line)
+        indices = _OTHER_INDICES.sub(b"", face[1]) if face else b""
+        if not _are_indices(indices, num_vertices):
+            raise ValueError(
+                f"line {number}: a face has a vertex that is not there (of"
+                f" {num_vertices})"
+            )
+
+
+def _are_indices(text: bytes, num_vertices: int) -> bool:
+    """Returns whether a text has valid vertex numbers, from 1 or from -1."""
+    if not text.strip():
+        return True
+    if _NO_INDICES.search(text):
+        return False
+    values = np.fromstring(text, dtype=np.int64, sep=" ")
+    return bool(((values != 0) & (np.abs(values) <= num_vertices)).all())
+
+
+# The faces of a tetrahedron, counter-clockwise seen from outside, if the first
+# three vertices are counter-clockwise seen from the fourth.
+_FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
+
+
+def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Reads the boundary of a volume mesh.
+
+    Returns:
+        (N, 3) float64 vertices [m], also those inside; (M, 3) int32
+        triangles.
+
+    Raises:
+        RuntimeError: Drake cannot read the file.
+    """
+    # Drake's reader converts all dialects of VTK to the one that it writes.
+    text = RefineVolumeMeshIntoVtkFileContents(MeshSource(path))
+    words = text.split()
+    vertices = _block(words, "POINTS", 3, 3).astype(float)
+    cells = _block(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
+    faces = cells[:, _FACES].reshape(-1, 3)
+    # A face between two tetrahedra is there twice.
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return vertices, faces[np.sort(first[count == 1])]
+
+
+def _block(
+    words: Sequence[str], keyword: str, header: int, columns: int
+) -> np.ndarray:
+    """Returns the rows of numbers that follow a keyword and its header."""
+    at = words.index(keyword)
+    rows, begin = int(words[at + 1]), at + header
+    block = np.array(words[begin : begin + rows * columns])
+    return block.reshape(rows, columns)
+
 
 # Formats whose y axis points up. Drake turns them, so that z does.
 _Y_UP = (".gltf", ".glb", ".dae")
@@ -43,7 +131,7 @@ class MeshFiles:
         """Returns the surface of a shape in G.
 
         Args:
-            name: of the geometry.
+            name: name of the geometry.
             shape: a mesh, or the convex hull of one.
 
         Raises:
@@ -180,7 +268,7 @@ def _parse_small_obj(
     """Returns what a file holds: the stages of a city share most files.
 
     Args:
-        path: of the file.
+        path: the file.
         identity: changes whenever the file does.
     """
     del identity

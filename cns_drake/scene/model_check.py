@@ -15,7 +15,7 @@ from xml.parsers import expat
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.scene.obj_check import check_obj
+from cns_drake.scene.mesh_files import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 
 _MODELS = (".sdf", ".urdf")

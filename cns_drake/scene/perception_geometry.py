@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
+import itertools
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import (
     Box,
     Capsule,
@@ -20,11 +22,17 @@ from pydrake.geometry import (
     Mesh,
     MeshcatCone,
     Role,
+    SceneGraph,
     SceneGraphInspector,
     Shape,
     Sphere,
 )
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import (
+    AbstractParameterIndex,
+    Context,
+    OutputPort,
+)
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.foreign_meshes import ForeignMeshes
@@ -37,6 +45,8 @@ from cns_drake.scene.surfaces import (
     HalfSpaceSurface,
     Surface,
     TriangleSurface,
+    merge_triangles,
+    tessellate,
 )
 
 # The corners of a unit cube and its faces, counter-clockwise from outside.
@@ -98,7 +108,7 @@ def check_shape(name: str, shape: Shape) -> None:
     """Checks the size of a shape; a mesh has its size in its file.
 
     Args:
-        name: of the geometry.
+        name: name of the geometry.
         shape: its shape.
 
     Raises:
@@ -133,6 +143,28 @@ def read_perception_geometry(
     return reader.read(inspector, hidden)
 
 
+def merge_surfaces(
+    geometries: Iterable[PerceptionGeometry],
+    calc_X_TF: Callable[[FrameId], RigidTransform],
+) -> TriangleSurface:
+    """Returns one surface with the triangles of many geometries.
+
+    Args:
+        geometries: what to merge; curved shapes are tessellated.
+        calc_X_TF: gives the pose of a geometry's frame F in the frame T of the
+            merged surface.
+    """
+    members = [
+        (
+            index,
+            calc_X_TF(geometry.frame_id) @ geometry.X_FG,
+            tessellate(geometry.surface),
+        )
+        for index, geometry in enumerate(geometries)
+    ]
+    return merge_triangles(members)[0]
+
+
 class _Record(NamedTuple):
     """The properties of a geometry in a SceneGraph, for comparison."""
 
@@ -151,7 +183,7 @@ class GeometryReader:
         """Reads nothing yet.
 
         Args:
-            role: of the geometry to read.
+            role: role of the geometry to read.
         """
         self._role = role
         self._known: dict[GeometryId, tuple[_Record, PerceptionGeometry]] = {}
@@ -304,3 +336,40 @@ def _cone(shape: MeshcatCone) -> TriangleSurface:
             ]
         ).astype(np.int32),
     )
+
+
+_PORT = "geometry_revision"
+_revisions = itertools.count(1)
+
+
+def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
+    """Returns a port whose value changes when geometry does, and only then.
+
+    SceneGraph's own `geometry_version` covers only perception geometry that a
+    render engine accepted, and comparing all geometries takes longer than a
+    scan. A Context holds the geometry as a parameter, which Drake's cache
+    tracks. A port that depends on this parameter alone is computed anew when
+    geometry was added, removed, replaced, reshaped, renamed or given another
+    role, in any way. The first call adds the port to the SceneGraph, and must
+    come before a Diagram is built from it.
+
+    Returns:
+        An abstract port; its value is an int that no other geometry, also of
+        another Context, has had in this process.
+
+    Raises:
+        RuntimeError: the SceneGraph is already part of a Diagram.
+    """
+    if scene_graph.HasOutputPort(_PORT):
+        return scene_graph.GetOutputPort(_PORT)
+    return scene_graph.DeclareAbstractOutputPort(
+        _PORT,
+        lambda: Value(object()),
+        _calc_revision,
+        # The only parameter that a SceneGraph has.
+        {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
+    )
+
+
+def _calc_revision(context: Context, output: AbstractValue) -> None:
+    output.set_value(next(_revisions))

@@ -11,7 +11,7 @@ import time
 from xml.parsers import expat
 
 from cns_drake.base.files import user_errors
-from cns_drake.scene.gazebo_models import ModelFinder
+from cns_drake.scene.gazebo_worlds import ModelFinder
 
 # Files of a model's folder, besides meshes.
 _MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")

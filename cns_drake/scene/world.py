@@ -5,19 +5,179 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+import re
 
-from pydrake.geometry import FrameId, SceneGraph
+from pydrake.geometry import FrameId, Role, SceneGraph, SourceId
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.scene.parsed_world import parse_models, parse_world
-from cns_drake.scene.perception_geometry import structure_name
+from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
+from cns_drake.scene.gazebo_worlds import (
+    is_gazebo_world,
+    read_xml,
+    simplify_world,
+)
+from cns_drake.scene.model_check import check_model
+from cns_drake.scene.perception_geometry import check_shape, structure_name
 from cns_drake.scene.structure_table import (
     StructureTable,
     load_structure_table,
 )
+
+
+@dataclass(frozen=True)
+class ParsedWorld:
+    """The models of a world; more may be parsed before the plant is finalized.
+
+    Attributes:
+        scene_graph: holds the geometry.
+        plant: owns bodies and frames; not finalized yet.
+        parser: the plant's.
+        names: names of the geometries that a LiDAR can see.
+        notes: for the user.
+    """
+
+    scene_graph: SceneGraph
+    plant: MultibodyPlant
+    parser: Parser
+    names: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def parse_world(
+    sdf: Path,
+    *,
+    without: Collection[str] = (),
+    model_paths: Collection[Path] = (),
+) -> ParsedWorld:
+    """Parses a world; see `load_world`.
+
+    Raises:
+        InputError: likewise.
+    """
+    scene_graph = SceneGraph()
+    # The plant parses models and has their frames. It stays out of the
+    # Diagram: motion is prescribed, for which a plant has no port, and a
+    # plant of many models makes Build() slow.
+    plant = MultibodyPlant(time_step=0.0)
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    notes = _parse_world(parser, sdf, model_paths)
+    _check_names(scene_graph, sdf)
+    if without:
+        _remove(scene_graph, plant.get_source_id(), set(without), sdf)
+    inspector = scene_graph.model_inspector()
+    if not inspector.GetAllGeometryIds(Role.kPerception):
+        raise InputError(
+            f"{sdf}: the world has no visuals, and so no geometry that a "
+            "LiDAR can see"
+        )
+    names = []
+    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        names.append(inspector.GetName(geometry_id))
+        try:
+            check_shape(names[-1], inspector.GetShape(geometry_id))
+        except InputError as error:
+            raise InputError(f"{sdf}: {error}") from None
+    return ParsedWorld(scene_graph, plant, parser, tuple(names), notes)
+
+
+def parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
+    """Parses the models of a file.
+
+    Raises:
+        InputError: the file is missing or cannot be parsed, or holds none.
+    """
+    _check_file(path)
+    check_model(path)
+    with collected_errors() as errors:
+        try:
+            models = parser.AddModels(str(path))
+        except PARSER_ERRORS as error:
+            raise _parse_fault(path, str(error), *errors) from error
+        if errors:
+            raise _parse_fault(path, *errors)
+    if not models:
+        raise InputError(f"{path}: holds no model")
+    return models
+
+
+def _check_names(scene_graph: SceneGraph, sdf: Path) -> None:
+    inspector = scene_graph.model_inspector()
+    for geometry_id in inspector.GetAllGeometryIds():
+        try:
+            inspector.GetName(geometry_id)
+        except UnicodeDecodeError:
+            raise InputError(f"{sdf}: a name is not UTF-8 text") from None
+
+
+def _remove(
+    scene_graph: SceneGraph, source_id: SourceId, names: set[str], sdf: Path
+) -> None:
+    """Removes the geometry of structures."""
+    inspector = scene_graph.model_inspector()
+    found = set()
+    for geometry_id in inspector.GetAllGeometryIds():
+        structure = structure_name(inspector.GetName(geometry_id))
+        if structure in names:
+            found.add(structure)
+            scene_graph.RemoveGeometry(source_id, geometry_id)
+    missing = sorted(names - found)
+    if missing:
+        raise InputError(f"{sdf}: no structure {missing[0]} to leave out")
+
+
+def _parse_world(
+    parser: Parser, path: Path, model_paths: Collection[Path]
+) -> tuple[str, ...]:
+    """Parses a world, and returns notes on omitted parts."""
+    _check_file(path)
+    root = None if path.suffix.lower() == ".urdf" else read_xml(path)
+    if root is None or not is_gazebo_world(root):
+        parse_models(parser, path)
+        return ()
+    text, notes = simplify_world(path, root, model_paths)
+    with collected_errors() as errors:
+        try:
+            parser.AddModelsFromString(text, "sdf")
+        except PARSER_ERRORS as error:
+            raise _parse_fault(path, str(error), *errors) from error
+        if errors:
+            raise _parse_fault(path, *errors)
+    return notes
+
+
+def _check_file(path: Path) -> None:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    # Drake fails on quoting other text.
+    content = read_bytes(path)
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text") from None
+
+
+def _parse_fault(path: Path, *texts: str) -> InputError:
+    """Returns the error with the first two of Drake's messages."""
+    # Drake and libsdformat begin with the path, which Drake makes absolute, a
+    # severity and a code.
+    names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))
+    faults = [" ".join(text.split()) for text in texts[:2]]
+    faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
+    faults = [
+        re.sub(
+            rf"/*(?:{names}):(?:(\d+):)? (?:error|ERROR): (?:ERROR: )?",
+            lambda match: f"line {match[1]}: " if match[1] else "",
+            fault,
+        )
+        for fault in faults
+    ]
+    return InputError(f"{path}: cannot be parsed: {': '.join(faults)}")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleSweep
-from cns_drake.scene.geometry_revision import geometry_revision_port
+from cns_drake.scene.perception_geometry import geometry_revision_port
 from cns_drake.sensors.carriers import (
     body_and_pose,
     connect_motion,

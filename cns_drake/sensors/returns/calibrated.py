@@ -44,10 +44,10 @@ class CalibratedReturns:
     and the beam.
 
     Attributes:
-        sheet: of the unit.
+        sheet: data sheet of the unit.
         echoes: the reported echoes of a beam.
-        weather: of the drive.
-        seed: of random numbers.
+        weather: weather of the drive.
+        seed: seed of random numbers.
         sensor_name: distinguishes several LiDARs.
 
     Example:
@@ -78,7 +78,7 @@ class CalibratedReturns:
             preset: a key of `LIDAR_PRESETS`.
             echoes: see the class.
             weather: fog, rain and snowfall.
-            seed: of the random draws.
+            seed: seed of random numbers.
             sensor_name: the name of the LiDAR.
 
         Raises:
@@ -145,8 +145,8 @@ class CalibratedReturns:
 
         Args:
             scene: casts rays.
-            materials: of the scene's geometries.
-            pattern: of the beams.
+            materials: materials of the scene's geometries.
+            pattern: pattern of the beams.
             turn: the beams of this turn.
             p_WSset: (K, 3) positions of S; ray i of the order of casting
                 starts at position i mod K.

@@ -103,7 +103,7 @@ def reflect(
         distance: (N,) whole way of the light to the surface [m].
         geometry: (N,) index of the surface.
         cosine: (N,) cosine of the angle of incidence.
-        materials: of all geometries.
+        materials: materials of all geometries.
     """
     kind = materials.kind[geometry]
     factor = np.where(kind == BEADS, 1.0, cosine)

@@ -36,9 +36,9 @@ class SheetRow:
     """A range on a data sheet.
 
     Attributes:
-        reflectivity: of the Lambertian target that faces the unit, 0 to 1.
-        range: at which it is detected [m].
-        probability: of its detection there.
+        reflectivity: that of the Lambertian target that faces the unit, 0 to 1.
+        range: distance at which it is detected [m].
+        probability: probability of its detection there.
     """
 
     reflectivity: float

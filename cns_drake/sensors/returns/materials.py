@@ -100,8 +100,8 @@ def find_materials(
     `reflectivity` of a table of structures, and that over class and colour.
 
     Args:
-        geometries: of the scene.
-        structures: of all geometries.
+        geometries: geometries of the scene.
+        structures: structures of all geometries.
         is_wet: whether the ground is wet.
     """
     table = [_material(geometry, structures) for geometry in geometries]

@@ -100,7 +100,7 @@ def start_ways(
         hits: by the axes of the beams.
         sides: rays at the sides of beams.
         side_hits: by those; misses do not count.
-        materials: of all geometries.
+        materials: materials of all geometries.
 
     Returns:
         The light, the rays that meet panes or leaves, and what they meet.
@@ -179,7 +179,7 @@ def follow(
         key: the frame's; see `frame_key`.
         ways: the rays of the beams.
         met: their hits.
-        materials: of all geometries.
+        materials: materials of all geometries.
         budget: the unit's.
         divergence: half angle of a beam [rad].
         max_range: greatest distance of followed light [m].

@@ -43,7 +43,7 @@ class UnitSheet:
         retro_from: the intensity at which retro-reflectors begin; diffuse
             targets have 0 to this for reflectivities of 0 to 1.
         unknown: fields that the sheet does not state.
-        source: of the numbers.
+        source: where the numbers are from.
     """
 
     rows: tuple[SheetRow, ...]

@@ -157,7 +157,7 @@ def tabulate_scattering(
 
     Args:
         weather: the weather.
-        budget: of the unit.
+        budget: link budget of the unit.
         divergence: half angle of a beam [rad].
         resolution: length of a pulse, there and back [m].
         min_range: nearest measured range [m].

@@ -3,13 +3,16 @@ from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surface_merging import merge_surfaces, tessellate
+from cns_drake.scene.perception_geometry import (
+    PerceptionGeometry,
+    merge_surfaces,
+)
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
     TriangleSurface,
+    tessellate,
 )
 
 CURVED = {
