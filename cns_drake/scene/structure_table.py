@@ -22,8 +22,8 @@ class StructureEntry:
         instance: id from 1 to 65535; 0 stands for no structure.
         name: the structure's name.
         semantic_class: a key of `CLASS_IDS`.
-        reflectivity: that of its surfaces near 900 nm, 0 to 1; None if it follows
-            from class and colours.
+        reflectivity: that of its surfaces near 900 nm, 0 to 1; None if it
+            follows from class and colours.
         causes: reasons for its differences to the stage's file: switches of a
             scenario's `transient`.
     """

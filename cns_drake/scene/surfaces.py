@@ -111,8 +111,8 @@ def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
 
     Args:
         surface: the shape; of a plane, a square of 200 m about G.
-        sides: number of sides of a circle about the z axis of G; a half sphere has half as
-            many parallels.
+        sides: number of sides of a circle about the z axis of G; a half sphere
+            has half as many parallels.
     """
     if isinstance(surface, TriangleSurface):
         return surface
