@@ -22,8 +22,8 @@ from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
 from cns_drake.sensors.imu.config import ImuConfig
 from cns_drake.sensors.lidar.config import LidarConfig, WeatherConfig
+from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.odometry.config import OdometryConfig
-from cns_drake.sensors.returns.unit_sheets import Echoes
 from cns_drake.sensors.sensor_config import (
     Section,
     SensorConfig,

@@ -14,10 +14,9 @@ from pydantic import (
 
 from cns_drake.base.drives.point_layouts import LayoutName
 from cns_drake.base.errors import InputError, describe_validation_error
-from cns_drake.sensors.lidar.measurement import MeasurementModel
+from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
-from cns_drake.sensors.returns.unit_sheets import Echoes
 from cns_drake.sensors.sensor_config import (
     Mount,
     Section,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 import math
 import numbers
 from typing import NamedTuple
@@ -23,6 +24,15 @@ _FARTHEST_NOISE = 8.0
 # Purposes of random numbers. Each purpose has its own stream, so that switching
 # one option does not change the draws of the others.
 _RANGE_NOISE, _DROPOUT = range(2)
+
+
+class Echoes(str, Enum):
+    """The echoes of a beam that a unit reports."""
+
+    FIRST = "first"
+    STRONGEST = "strongest"
+    LAST = "last"
+    DUAL = "dual"
 
 
 class Returns(NamedTuple):

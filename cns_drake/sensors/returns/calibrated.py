@@ -12,6 +12,7 @@ from cns_drake.ray_casting.ray_casting_scene import (
     RayHits,
 )
 from cns_drake.ray_casting.rays import rotate
+from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
 from cns_drake.sensors.returns.echoes import (
     Receiver,
@@ -25,7 +26,6 @@ from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key
 from cns_drake.sensors.returns.unit_sheets import (
     UNIT_SHEETS,
-    Echoes,
     UnitSheet,
 )
 from cns_drake.sensors.returns.weather import (

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.returns.light import Light, join, select
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
@@ -19,7 +20,6 @@ from cns_drake.sensors.returns.link_budget import (
     target_snr,
 )
 from cns_drake.sensors.returns.random_numbers import normal, uniform
-from cns_drake.sensors.returns.unit_sheets import Echoes
 from cns_drake.sensors.returns.weather import Scattering
 
 # The index of the weather, in place of a geometry's.

@@ -7,7 +7,6 @@ field.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 import math
 
 from cns_drake.sensors.returns.link_budget import (
@@ -18,15 +17,6 @@ from cns_drake.sensors.returns.link_budget import (
 
 # Speed of light [m/s].
 _LIGHT = 299_792_458.0
-
-
-class Echoes(str, Enum):
-    """The echoes of a beam that a unit reports."""
-
-    FIRST = "first"
-    STRONGEST = "strongest"
-    LAST = "last"
-    DUAL = "dual"
 
 
 @dataclass(frozen=True)
