@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from pydrake.common import MemoryFile
@@ -23,6 +25,7 @@ from pydrake.geometry import (
     Sphere,
 )
 from pydrake.math import RigidTransform, RollPitchYaw
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.mesh import FOLDER
@@ -41,7 +44,24 @@ from cns_drake.scene.structure_table import (
 )
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
-from cns_drake.transient.standing import Standing, StandingPart
+from cns_drake.transient.world_structures import (
+    GroundSurface,
+    Obstacles,
+    Structure,
+    StructurePart,
+    draws,
+)
+
+# Snow farther from the drive would be hardly visible to a LiDAR [m].
+_NEAR = 120.0
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+Named = TypeVar("Named", bound=_Named)
 
 
 class Look(NamedTuple):
@@ -82,20 +102,20 @@ class SceneEditing:
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
-    def remove(self, thing: Standing, cause: str) -> None:
+    def remove(self, thing: Structure, cause: str) -> None:
         """Removes a structure."""
         for part in thing.parts:
             self.remove_part(part)
         self.blame(thing.name, cause)
 
-    def remove_part(self, part: StandingPart) -> None:
+    def remove_part(self, part: StructurePart) -> None:
         """Removes a part of a structure."""
         self._world.scene_graph.RemoveGeometry(
             self._source, part.geometry.geometry_id
         )
 
     def move(
-        self, thing: Standing, X_new: RigidTransform, name: str, cause: str
+        self, thing: Structure, X_new: RigidTransform, name: str, cause: str
     ) -> None:
         """Moves a structure, and gives it a new name.
 
@@ -113,7 +133,7 @@ class SceneEditing:
         self.blame(name, cause)
 
     def cover_part(
-        self, part: StandingPart, p_W: np.ndarray, look: Look
+        self, part: StructurePart, p_W: np.ndarray, look: Look
     ) -> None:
         """Moves a part of a structure and paints it.
 
@@ -158,7 +178,7 @@ class SceneEditing:
         self._added[name] = (semantic_class, None)
         self.blame(name, cause)
 
-    def replace_triangles(self, part: StandingPart, kept: np.ndarray) -> None:
+    def replace_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
         """Keeps only some of the triangles of a part.
 
         Args:
@@ -183,7 +203,7 @@ class SceneEditing:
 
     def add_triangles(
         self,
-        part: StandingPart,
+        part: StructurePart,
         name: str,
         vertices: np.ndarray,
         triangles: np.ndarray,
@@ -265,7 +285,7 @@ class SceneEditing:
         return replace(entry, causes=(*entry.causes, *new)) if new else entry
 
     def _properties(
-        self, part: StandingPart
+        self, part: StructurePart
     ) -> tuple[PerceptionProperties, IllustrationProperties | None]:
         inspector = self._world.scene_graph.model_inspector()
         geometry_id = part.geometry.geometry_id
@@ -274,7 +294,7 @@ class SceneEditing:
             inspector.GetIllustrationProperties(geometry_id),
         )
 
-    def _scale(self, part: StandingPart) -> np.ndarray:
+    def _scale(self, part: StructurePart) -> np.ndarray:
         inspector = self._world.scene_graph.model_inspector()
         shape = inspector.GetShape(part.geometry.geometry_id)
         # Boxes and cones are the only such shapes without triangles.
@@ -283,7 +303,7 @@ class SceneEditing:
         return np.array(shape.scale3())
 
     def _copy_part(
-        self, part: StandingPart, X_WG: RigidTransform, name: str
+        self, part: StructurePart, X_WG: RigidTransform, name: str
     ) -> None:
         inspector = self._world.scene_graph.model_inspector()
         shape = inspector.GetShape(part.geometry.geometry_id)
@@ -306,6 +326,72 @@ class SceneEditing:
         scene_graph.AssignRole(self._source, geometry, seen)
         if shown is not None:
             scene_graph.AssignRole(self._source, geometry, shown)
+
+
+@dataclass
+class Surroundings:
+    """A drive's surroundings while they are changed.
+
+    Attributes:
+        editing: changes the world.
+        things: structure name -> structure, all of them.
+        drive: the way of the vehicle, seen from above [m].
+        kept_free: area that stays free of new things, seen from above [m].
+        seed: seed of all draws.
+    """
+
+    editing: SceneEditing
+    things: Mapping[str, Structure]
+    drive: BaseGeometry
+    kept_free: BaseGeometry
+    seed: int
+
+    @cached_property
+    def ground(self) -> GroundSurface:
+        """The ground near the drive."""
+        return GroundSurface(self.things, self.drive.buffer(_NEAR))
+
+    def of_classes(self, classes: Collection[str]) -> list[Structure]:
+        """Returns the structures of some classes."""
+        return [t for t in self.things.values() if t.semantic_class in classes]
+
+    def obstacles(
+        self,
+        *,
+        ignored: Collection[str] | None = None,
+        classes: Collection[str] = (),
+    ) -> Obstacles:
+        """Returns the area that stays free, and footprints of structures.
+
+        Args:
+            ignored: classes of structures that are no obstacles.
+            classes: in place of `ignored`, those that alone are obstacles.
+        """
+        feet = (
+            (thing.name, thing.footprint)
+            for thing in self.things.values()
+            if (
+                thing.semantic_class in classes
+                if ignored is None
+                else thing.semantic_class not in ignored
+            )
+        )
+        return Obstacles([("", self.kept_free), *feet])
+
+    def chosen(
+        self, cause: str, things: Iterable[Named], share: float
+    ) -> Iterator[tuple[Named, np.random.Generator]]:
+        """Yields a share of some things, each with its random numbers.
+
+        Args:
+            cause: the switch.
+            things: they have names.
+            share: from 0 to 1.
+        """
+        for thing in things:
+            rng = draws(self.seed, cause, thing.name)
+            if rng.uniform() < share:
+                yield thing, rng
 
 
 def memory_mesh(

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 import shapely
-from shapely.geometry.base import BaseGeometry
 
-from cns_drake.transient.draws import draws
-from cns_drake.transient.ground_surface import (
+from cns_drake.transient.scene_editing import Look, SceneEditing, Surroundings
+from cns_drake.transient.world_structures import (
+    GROUND_CLASSES,
     GroundSurface,
+    StructurePart,
+    draws,
     faced_up,
     from_above,
     triangle_corners,
     upwardness,
 )
-from cns_drake.transient.scene_editing import Look, SceneEditing
-from cns_drake.transient.standing import GROUND_CLASSES, Standing, StandingPart
 
 CAUSE = "snow"
 # Snow near 900 nm: Warren, "Optical properties of snow", 1982.
@@ -42,27 +40,18 @@ _SPACING = 1.5
 _WAVES = (9.0, 3.7)
 
 
-def lay_snow(
-    editing: SceneEditing,
-    things: Mapping[str, Standing],
-    drive: BaseGeometry,
-    ground: GroundSurface,
-    depth: float,
-    seed: int,
-) -> None:
+def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
     """Lays snow near a drive, except on roads, plants and thin things.
 
     Ground is raised. Roads are cleared, with banks along their kerbs.
 
     Args:
-        editing: of the world.
-        things: all structures, with earlier changes.
-        drive: the way of the vehicle, seen from above [m].
-        ground: near the drive.
-        depth: of the snow [m].
-        seed: of the banks' heights.
+        around: the structures, with earlier changes.
+        ground: near the drive, without them.
+        depth: thickness of the snow [m].
     """
-    for thing in things.values():
+    editing = around.editing
+    for thing in around.things.values():
         if thing.semantic_class in _BARE:
             continue
         is_ground = thing.semantic_class in GROUND_CLASSES
@@ -83,10 +72,10 @@ def lay_snow(
             "cleared, and no bank lies along a kerb"
         )
     else:
-        _lay_banks(editing, drive, ground, depth, seed)
+        _lay_banks(around, ground, depth)
 
 
-def _is_below_road(part: StandingPart, ground: GroundSurface) -> bool:
+def _is_below_road(part: StructurePart, ground: GroundSurface) -> bool:
     """Returns whether ground continues below a carriageway."""
     corners = faced_up(triangle_corners(part))
     corners = corners[upwardness(corners) > 0.0]
@@ -99,7 +88,7 @@ def _is_below_road(part: StandingPart, ground: GroundSurface) -> bool:
 
 def _cover(
     editing: SceneEditing,
-    part: StandingPart,
+    part: StructurePart,
     ground: GroundSurface,
     depth: float,
     is_ground: bool,
@@ -160,11 +149,11 @@ def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
         last = corners[fine]
         middles = last[:, :, :2].mean(axis=1)
         done.append(last[~shapely.contains_xy(road, middles)])
-        corners = _halved(corners[~fine])
+        corners = _subdivided(corners[~fine])
     return np.concatenate(done)
 
 
-def _halved(corners: np.ndarray) -> np.ndarray:
+def _subdivided(corners: np.ndarray) -> np.ndarray:
     """Returns the four triangles of each between the middles of its sides."""
     a, b, c = np.moveaxis(corners, 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
@@ -195,14 +184,10 @@ def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _lay_banks(
-    editing: SceneEditing,
-    drive: BaseGeometry,
-    ground: GroundSurface,
-    depth: float,
-    seed: int,
+    around: Surroundings, ground: GroundSurface, depth: float
 ) -> None:
-    phases = draws(seed, CAUSE, "banks").uniform(0, 2 * np.pi, 4)
-    way = drive.buffer(1.4 + _INSIDE)
+    phases = draws(around.seed, CAUSE, "banks").uniform(0, 2 * np.pi, 4)
+    way = around.drive.buffer(1.4 + _INSIDE)
     shapely.prepare(way)
     meshes = []
     for kerb in ground.kerbs(_SPACING):
@@ -235,11 +220,8 @@ def _lay_banks(
             meshes += [np.stack([a, d, c], 1), np.stack([a, c, b], 1)]
     if meshes:
         corners = np.concatenate(meshes)
-        corners = corners[:, ::-1] if _faces_down(corners) else corners
-        vertices, triangles = _merged(corners)
-        editing.add_mesh("snow_banks", "terrain", vertices, triangles, _LOOK,
-                         CAUSE)  # fmt: skip
-
-
-def _faces_down(corners: np.ndarray) -> bool:
-    return float(np.median(upwardness(corners))) < 0.0
+        if np.median(upwardness(corners)) < 0.0:
+            corners = corners[:, ::-1]
+        around.editing.add_mesh(
+            "snow_banks", "terrain", *_merged(corners), _LOOK, CAUSE
+        )

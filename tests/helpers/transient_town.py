@@ -8,7 +8,7 @@ from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.standing import read_standing
+from cns_drake.transient.world_structures import read_structures
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
@@ -141,6 +141,6 @@ def change_maker(sdf, drive, lanes):
     def make(**switches):
         config = TransientConfig(**switches)
         world = change_world(load_world(sdf), config, drive, lanes)
-        return world, read_standing(world)
+        return world, read_structures(world)
 
     return make

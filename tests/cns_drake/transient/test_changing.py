@@ -10,9 +10,10 @@ from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
-from cns_drake.transient.bays_refilled import make_bays
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.standing import read_standing
+from cns_drake.transient.parked_cars import make_bays
+from cns_drake.transient.scene_editing import Surroundings
+from cns_drake.transient.world_structures import read_structures
 
 X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
 # The drive leads through cars and roads, below z = 2.2 m or so.
@@ -87,7 +88,7 @@ def test_at_one_no_parked_car_stays(changed):
 
 def test_cars_keep_to_their_bays_and_touch_nothing(changed):
     _, before = changed()
-    bays = make_bays(before, LANES)
+    bays = make_bays(Surroundings(None, before, None, LANES, seed=0))
     boxes = {name: bay.box() for name, bay in bays.items()}
     everything = list(boxes.values())
     for k, box in enumerate(everything):
@@ -160,7 +161,7 @@ def test_the_same_twice(sdf, changed):
         load_world(sdf), TransientConfig(**switches), DRIVE, LANES
     )
     assert list(again.structures) == list(world.structures)
-    assert same(places(things), places(read_standing(again)))
+    assert same(places(things), places(read_structures(again)))
 
 
 def crown(things, name):

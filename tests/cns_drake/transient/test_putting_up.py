@@ -11,12 +11,12 @@ from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.ground_surface import (
+from cns_drake.transient.world_structures import (
     GroundSurface,
     faced_up,
+    read_structures,
     upwardness,
 )
-from cns_drake.transient.standing import read_standing
 
 X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
 # The road is 6 m wide, and its lanes leave 0.3 m at the kerbs.
@@ -129,7 +129,7 @@ def test_over_slits_of_the_ground_there_are_no_works(sdf, monkeypatch):
     config = TransientConfig(works=1.0)
     before = load_world(sdf)
     after = change_world(before, config, DRIVE, LANES)
-    assert read_standing(after).keys() == read_standing(before).keys()
+    assert read_structures(after).keys() == read_structures(before).keys()
 
 
 def test_kerbs_and_heights_of_a_plane_road(changed):

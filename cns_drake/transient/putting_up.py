@@ -1,34 +1,168 @@
-"""Roadworks beside the carriageway: fences, skips, diggers and new kerbs."""
+"""Puts up scaffolds and roadworks along a drive."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.furniture.pavilions import FENCES
+from cns_drake.city.furniture.pavilions import (
+    FENCES,
+)
 from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
-from cns_drake.city.geometry.structures import Builder, Model, assemble, block
-from cns_drake.transient.draws import draws
-from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.scene_editing import SceneEditing
-from cns_drake.transient.standing import GROUND_CLASSES, Obstacles, Standing
+from cns_drake.city.geometry.structures import (
+    Builder,
+    Model,
+    Part,
+    assemble,
+    bar,
+    block,
+    post,
+)
+from cns_drake.transient.scene_editing import Surroundings
+from cns_drake.transient.world_structures import (
+    GROUND_CLASSES,
+    GroundSurface,
+    Obstacles,
+    Structure,
+)
 
-CAUSE = "works"
-# Cell size of the world's grid of kerb stretches, and their greatest distance
-# from the drive [m].
-_CELL = 20.0
+# Greatest distance of fronts from the drive [m].
 _FARTHEST = 30.0
+# A scaffold's inner and outer row of standards, from the front [m].
+_ROW_INNER, _ROW_OUTER = 0.25, 1.15
+# Height of lifts, length of bays, and greatest size of a scaffold [m].
+_LIFT, _BAY = 2.0, 2.5
+_LONGEST, _HIGHEST = 25.0, 16.0
+_LEAST_LENGTH, _LEAST_HEIGHT = 4.0, 3.5
+# Part of the scaffolds with a net.
+_NETTED = 0.4
+_STEEL = (0.6, 0.61, 0.62)
+_WOOD = (0.62, 0.5, 0.35)
+_NET = (0.35, 0.52, 0.42)
+_NOT_THROUGH = frozenset({"building", "car", "truck", "bus", "other-structure"})
+
+
+def put_up_scaffolds(around: Surroundings, share: float) -> None:
+    """Puts scaffolds before a share of the fronts along a drive.
+
+    A front without room before it gets none.
+    """
+    fronts = [
+        thing
+        for thing in around.of_classes({"building"})
+        if thing.footprint.area > 0.0
+        and thing.footprint.distance(around.drive) < _FARTHEST
+    ]
+    if not fronts:
+        around.editing.note(
+            f"scaffolds: no building within {_FARTHEST:g} m of the drive"
+        )
+    obstacles = around.obstacles(classes=_NOT_THROUGH)
+    for building, rng in around.chosen("scaffolds", fronts, share):
+        X_WF, length = _front(building, around.drive)
+        xy = X_WF.translation()[None, :2]
+        foot = float(around.ground.heights(xy, of_road=False)[0])
+        if not np.isfinite(foot):
+            foot = building.bottom
+        height = min(float(building.p_WPs[:, 2].max()) - foot, _HIGHEST)
+        length = min(length, _LONGEST)
+        corners = [
+            X_WF @ [x, y, 0.0]
+            for x, y in (
+                (-length / 2, _ROW_INNER), (length / 2, _ROW_INNER),
+                (length / 2, _ROW_OUTER + 0.1), (-length / 2, _ROW_OUTER + 0.1),
+            )
+        ]  # fmt: skip
+        area = shapely.Polygon([corner[:2] for corner in corners])
+        if (
+            length >= _LEAST_LENGTH
+            and height >= _LEAST_HEIGHT
+            and obstacles.is_free(area, (building.name,))
+        ):
+            around.editing.add(
+                f"scaffold_{building.name}",
+                "other-structure",
+                _scaffold(length, height, rng),
+                RigidTransform([0.0, 0.0, foot]) @ X_WF,
+                "scaffolds",
+            )
+
+
+def _front(
+    building: Structure, drive: BaseGeometry
+) -> tuple[RigidTransform, float]:
+    """Returns the pose of the front that faces a drive, and its length.
+
+    The pose is that of the front's middle at z = 0, x along it and y away
+    from the building.
+    """
+    rectangle = shapely.MultiPoint(
+        shapely.get_coordinates(building.footprint)
+    ).minimum_rotated_rectangle
+    corners = shapely.get_coordinates(rectangle)
+    middles = (corners[:-1] + corners[1:]) / 2
+    k = int(np.argmin(shapely.distance(shapely.points(middles), drive)))
+    along = corners[k + 1] - corners[k]
+    length = float(np.linalg.norm(along))
+    away = middles[k] - corners[:-1].mean(axis=0)
+    yaw = float(np.arctan2(away[1], away[0])) - np.pi / 2
+    return RigidTransform(RollPitchYaw(0, 0, yaw), [*middles[k], 0.0]), length
+
+
+def _scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
+    """Returns a scaffold along x: standards, ledgers, decks, perhaps a net."""
+    lifts = max(int(height / _LIFT), 1)
+    bays = max(round(length / _BAY), 1)
+    xs = np.linspace(-length / 2, length / 2, bays + 1)
+    top = lifts * _LIFT + 1.0
+    parts: list[Part] = [
+        post(f"standard_{row}_{k:02d}", 0.03, top, (float(x), y), _STEEL)
+        for row, y in enumerate((_ROW_INNER, _ROW_OUTER))
+        for k, x in enumerate(xs)
+    ]
+    for k in range(1, lifts + 1):
+        z = k * _LIFT
+        parts.append(
+            block(
+                f"deck_{k}",
+                (length, _ROW_OUTER - _ROW_INNER - 0.1, 0.05),
+                (0.0, (_ROW_INNER + _ROW_OUTER) / 2, z),
+                rgb=_WOOD,
+            )
+        )
+        parts += [
+            bar(
+                f"rail_{k}_{j}",
+                (-length / 2, _ROW_OUTER, z + up),
+                (length / 2, _ROW_OUTER, z + up),
+                0.025,
+                _STEEL,
+            )
+            for j, up in enumerate((0.5, 1.0))
+        ]
+    if rng.uniform() < _NETTED:
+        parts.append(
+            block(
+                "net",
+                (length, 0.01, top - _LIFT),
+                (0.0, _ROW_OUTER + 0.05, (top + _LIFT) / 2),
+                rgb=_NET,
+            )
+        )
+    return assemble(*parts)
+
+
+# Cell size of the world's grid of kerb stretches [m].
+_CELL = 20.0
 _SPACING = 1.0
 # Greatest ratio of a stretch's length to its chord: a bent one is not used.
 _MOST_BENT = 1.05
 _LENGTHS = (6.0, 14.0)
 _TRIES = 6
 # Sites reach from this distance from the kerb to one of these [m].
-_INNER = 0.4
+_SITE_INNER = 0.4
 _WIDTHS = (4.6, 2.7)
 # New kerb stones narrow the carriageway by this [m].
 _KERB_WIDTH, _KERB_HEIGHT = 0.3, 0.13
@@ -71,46 +205,22 @@ class _Stretch:
         )
 
 
-def put_up_works(
-    editing: SceneEditing,
-    things: Mapping[str, Standing],
-    drive: BaseGeometry,
-    kept_free: BaseGeometry,
-    ground: GroundSurface,
-    part: float,
-    seed: int,
-) -> None:
-    """Puts roadworks along a part of the kerbs near a drive.
+def put_up_works(around: Surroundings, share: float) -> None:
+    """Puts roadworks along a share of the kerbs near a drive.
 
     Kerbs without room beside them get none.
-
-    Args:
-        editing: of the world.
-        things: all structures.
-        drive: the way of the vehicle, seen from above [m].
-        kept_free: area that stays free [m].
-        ground: near the drive.
-        part: share of the stretches of kerb, from 0 to 1.
-        seed: of the draws.
     """
     stretches = [
         stretch
-        for stretch in _stretches(ground)
-        if drive.distance(shapely.Point(stretch.middle)) < _FARTHEST
+        for stretch in _stretches(around.ground)
+        if around.drive.distance(shapely.Point(stretch.middle)) < _FARTHEST
     ]
     if not stretches:
-        editing.note("works: no structure of class road along the drive")
+        around.editing.note("works: no structure of class road along the drive")
     solid, every = (
-        Obstacles.of_things(
-            kept_free,
-            [t for t in things.values() if t.semantic_class not in ignored],
-        )
-        for ignored in (_OPEN, GROUND_CLASSES)
+        around.obstacles(ignored=ignored) for ignored in (_OPEN, GROUND_CLASSES)
     )
-    for stretch in stretches:
-        rng = draws(seed, CAUSE, stretch.name)
-        if rng.uniform() >= part:
-            continue
+    for stretch, rng in around.chosen("works", stretches, share):
         for _ in range(_TRIES):
             length = min(float(rng.uniform(*_LENGTHS)), stretch.length)
             spare = max(stretch.length - length, 0.0) / 2
@@ -120,13 +230,13 @@ def put_up_works(
                     (x, length, width)
                     for width in _WIDTHS
                     if solid.is_free(
-                        stretch.rectangle(x, length, _INNER, width)
+                        stretch.rectangle(x, length, _SITE_INNER, width)
                     )
                 ),
                 None,
             )
             if site is not None:
-                _Site(editing, ground, stretch, site, rng).build(every, drive)
+                _Site(around, stretch, site, rng).build(every)
                 break
 
 
@@ -135,29 +245,22 @@ class _Site:
 
     def __init__(
         self,
-        editing: SceneEditing,
-        ground: GroundSurface,
+        around: Surroundings,
         stretch: _Stretch,
         site: tuple[float, float, float],
         rng: np.random.Generator,
     ):
-        self._editing = editing
-        self._ground = ground
+        self._around = around
         self._stretch = stretch
         self._x, self._length, self._width = site
         self._rng = rng
 
-    def build(self, every: Obstacles, drive: BaseGeometry) -> None:
-        """Puts up fences, machines, and new kerb stones.
-
-        Args:
-            every: obstacles of machines.
-            drive: area that kerb stones keep clear of [m].
-        """
+    def build(self, every: Obstacles) -> None:
+        """Puts up fences, machines clear of obstacles, and new kerb stones."""
         x, length, width = self._x, self._length, self._width
-        middle, across = (_INNER + width) / 2, width - _INNER
+        middle, across = (_SITE_INNER + width) / 2, width - _SITE_INNER
         sides = (
-            (x, _INNER, 0.0, length),
+            (x, _SITE_INNER, 0.0, length),
             (x, width, 0.0, length),
             (x - length / 2, middle, np.pi / 2, across),
             (x + length / 2, middle, np.pi / 2, across),
@@ -167,7 +270,7 @@ class _Site:
             self._add(f"fence_{k}", "fence", model, at, y, turn, run)
         self._add_machines(every, middle)
         stones = self._stretch.rectangle(x, length, -_KERB_WIDTH, 0.0)
-        if not stones.intersects(drive.buffer(1.3)):
+        if not stones.intersects(self._around.drive.buffer(1.3)):
             size = (length, _KERB_WIDTH, 2 * _KERB_HEIGHT)
             model = assemble(block("stones", size, (0, 0, 0), rgb=_KERB_RGB))
             y = -_KERB_WIDTH / 2
@@ -198,7 +301,7 @@ class _Site:
                 *self._stretch.place(x, y),
             )
             inside = self._stretch.rectangle(
-                self._x, self._length, _INNER, self._width
+                self._x, self._length, _SITE_INNER, self._width
             )
             if (
                 inside.contains(area)
@@ -224,26 +327,26 @@ class _Site:
 
         Without ground the thing is left out.
         """
-        yaw = self._stretch.yaw + turn
+        ground, yaw = self._around.ground, self._stretch.yaw + turn
         middle = self._stretch.place(x, y)
         along = np.array([np.cos(yaw), np.sin(yaw)]) * length / 2
         ends = np.array([middle, middle - along, middle + along])
-        z = self._ground.heights(ends, of_road=y < 0.0)
+        z = ground.heights(ends, of_road=y < 0.0)
         at = float(z[0])
         if not np.isfinite(at):  # No ground beside the road.
             edge = self._stretch.place(x, -0.1)[None]
-            at = float(self._ground.heights(edge, of_road=True)[0])
+            at = float(ground.heights(edge, of_road=True)[0])
         if not np.isfinite(at):  # Both are in slits of the ground.
             return
         pitch = 0.0
         if length > 0.0 and np.isfinite(z).all():
             pitch = -float(np.arctan2(z[2] - z[1], length))
-        self._editing.add(
+        self._around.editing.add(
             f"{self._stretch.name}_{suffix}",
             semantic_class,
             model,
             RigidTransform(RollPitchYaw(0.0, pitch, yaw), [*middle, at]),
-            CAUSE,
+            "works",
         )
 
 

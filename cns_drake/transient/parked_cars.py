@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely import Polygon
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.geometry.structures import Model, part_triangles
-from cns_drake.transient.draws import draws
-from cns_drake.transient.scene_editing import SceneEditing
-from cns_drake.transient.standing import (
+from cns_drake.city.geometry.structures import (
+    Model,
+    part_triangles,
+)
+from cns_drake.transient.scene_editing import SceneEditing, Surroundings
+from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
     Obstacles,
-    Standing,
+    Structure,
 )
 
 CAUSE = "parked_cars"
@@ -57,7 +56,7 @@ class Bay:
         front, back, left, right: reach of the bay from there [m].
     """
 
-    def __init__(self, car: Standing):
+    def __init__(self, car: Structure):
         """A bay as large as the car.
 
         Args:
@@ -87,7 +86,7 @@ class Bay:
         )
         return Polygon(corners @ np.array([[c, s], [-s, c]]) + self.middle)
 
-    def grow(self, car: Standing, cars: Obstacles, others: Obstacles) -> None:
+    def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
         """Grows towards surroundings, and half the way towards other cars.
 
         Args:
@@ -141,25 +140,14 @@ class Bay:
         return self.middle + offset, float(yaw)
 
 
-def make_bays(
-    things: Mapping[str, Standing], kept_free: BaseGeometry
-) -> dict[str, Bay]:
-    """Returns the bays of all parked cars, by the cars' names.
-
-    Args:
-        things: all structures.
-        kept_free: area into which no bay may grow, seen from above [m].
-    """
-    cars = {n: t for n, t in things.items() if t.semantic_class in CLASSES}
+def make_bays(around: Surroundings) -> dict[str, Bay]:
+    """Returns the bays of all parked cars, by the cars' names."""
+    cars = {car.name: car for car in around.of_classes(CLASSES)}
     bays = {name: Bay(car) for name, car in cars.items()}
     if not bays:
         return {}
     standing = Obstacles((n, bay.box()) for n, bay in bays.items())
-    passed = CLASSES | GROUND_CLASSES
-    others = Obstacles.of_things(
-        kept_free,
-        (t for t in things.values() if t.semantic_class not in passed),
-    )
+    others = around.obstacles(ignored=CLASSES | GROUND_CLASSES)
     grown = {}
     for name, car in cars.items():
         grown[name] = Bay(car)
@@ -174,42 +162,26 @@ def make_bays(
     return grown
 
 
-def change_parked_cars(
-    editing: SceneEditing,
-    things: Mapping[str, Standing],
-    bays: Mapping[str, Bay],
-    part: float,
-    seed: int,
-) -> None:
-    """Changes a part of the parked cars.
-
-    Args:
-        editing: of the world.
-        things: all structures.
-        bays: of the cars.
-        part: share of them, from 0 to 1.
-        seed: of the draws.
-    """
+def change_parked_cars(around: Surroundings, share: float) -> None:
+    """Changes a share of the parked cars, from 0 to 1."""
+    editing, bays = around.editing, make_bays(around)
     if not bays:
         editing.note("parked_cars: the world has no car, truck or bus")
-    for name, bay in bays.items():
-        rng = draws(seed, CAUSE, name)
-        if rng.uniform() >= part:
-            continue
-        car, fate = things[name], rng.uniform()
+    cars = [around.things[name] for name in bays]
+    for car, rng in around.chosen(CAUSE, cars, share):
+        bay, fate = bays[car.name], rng.uniform()
         if fate < _GONE:
             editing.remove(car, CAUSE)
         elif fate < _GONE + _MOVED:
-            editing.move(car, _moved(bay, car, rng), _new_name(name), CAUSE)
+            X_new = _moved(bay, car, rng)
+            editing.move(car, X_new, f"parked_{car.name}", CAUSE)
         else:
             _replace(editing, car, bay, rng)
 
 
-def _new_name(name: str) -> str:
-    return f"parked_{name}"
-
-
-def _moved(bay: Bay, car: Standing, rng: np.random.Generator) -> RigidTransform:
+def _moved(
+    bay: Bay, car: Structure, rng: np.random.Generator
+) -> RigidTransform:
     """Returns the transformation of a moved car's points."""
     own = Bay(car)
     half_size = np.array([own.front, own.left])
@@ -228,7 +200,7 @@ def _moved(bay: Bay, car: Standing, rng: np.random.Generator) -> RigidTransform:
 
 
 def _replace(
-    editing: SceneEditing, car: Standing, bay: Bay, rng: np.random.Generator
+    editing: SceneEditing, car: Structure, bay: Bay, rng: np.random.Generator
 ) -> None:
     """Puts another car into a bay, or none if the bay is too small."""
     forms = list(_FORMS)
@@ -247,7 +219,11 @@ def _replace(
         X_WS = RigidTransform(R, [*middle, car.bottom] - offset)
         editing.remove(car, CAUSE)
         editing.add(
-            _new_name(car.name), builder.semantic_class, model, X_WS, CAUSE
+            f"parked_{car.name}",
+            builder.semantic_class,
+            model,
+            X_WS,
+            CAUSE,
         )
         return
     editing.remove(car, CAUSE)

@@ -1,0 +1,377 @@
+"""The structures of a loaded world, and the ground below them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+import hashlib
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.geometry import Role
+from pydrake.math import RigidTransform
+import shapely
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
+
+from cns_drake.city.geometry.polygons import polygons_of
+from cns_drake.scene.perception_geometry import (
+    GeometryReader,
+    PerceptionGeometry,
+    structure_name,
+)
+from cns_drake.scene.surfaces import (
+    CapsuleSurface,
+    CylinderSurface,
+    EllipsoidSurface,
+    HalfSpaceSurface,
+    TriangleSurface,
+)
+from cns_drake.scene.world import World
+
+# Classes of the ground below other things.
+GROUND_CLASSES = frozenset(
+    {"road", "parking", "sidewalk", "other-ground", "terrain"}
+)
+# Cars and walkers can pass below parts higher than this above a thing's foot
+# [m].
+_HEADROOM = 2.2
+# Corners of the box about a round shape of size one.
+_BOX = np.array(
+    [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float
+)
+
+
+@dataclass(frozen=True)
+class StructurePart:
+    """One geometry of a structure.
+
+    Attributes:
+        geometry: visible to a LiDAR.
+        X_WG: its pose in the world.
+    """
+
+    geometry: PerceptionGeometry
+    X_WG: RigidTransform
+
+    @property
+    def name(self) -> str:
+        """The part's name within its structure."""
+        return self.geometry.name.rpartition("::")[2].rpartition("/")[2]
+
+    @cached_property
+    def p_WPs(self) -> np.ndarray:
+        """(N, 3) points in the world whose hull holds the part [m]."""
+        surface = self.geometry.surface
+        if isinstance(surface, TriangleSurface):
+            p_GPs = surface.p_GVset
+        elif isinstance(surface, EllipsoidSurface):
+            p_GPs = _BOX * surface.semi_axes
+        elif isinstance(surface, CylinderSurface):
+            r = surface.radius
+            p_GPs = _BOX * (r, r, surface.length / 2)
+        elif isinstance(surface, CapsuleSurface):
+            r = surface.radius
+            p_GPs = _BOX * (r, r, surface.length / 2 + r)
+        else:
+            assert isinstance(surface, HalfSpaceSurface)
+            p_GPs = np.zeros((0, 3))
+        R, p = self.X_WG.rotation().matrix(), self.X_WG.translation()
+        return p_GPs @ R.T + p
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A structure in the world.
+
+    Attributes:
+        name: of the structure.
+        semantic_class: a key of `CLASS_IDS`.
+        parts: its geometries.
+    """
+
+    name: str
+    semantic_class: str
+    parts: tuple[StructurePart, ...]
+
+    @cached_property
+    def p_WPs(self) -> np.ndarray:
+        """(N, 3) points in the world whose hull holds the structure [m]."""
+        return np.concatenate([part.p_WPs for part in self.parts])
+
+    @cached_property
+    def bottom(self) -> float:
+        """Height of its lowest point [m]."""
+        return float(self.p_WPs[:, 2].min(initial=np.inf))
+
+    @cached_property
+    def outline(self) -> BaseGeometry:
+        """The convex hull of all of it, seen from above [m]."""
+        return shapely.MultiPoint(self.p_WPs[:, :2]).convex_hull
+
+    @cached_property
+    def footprint(self) -> BaseGeometry:
+        """The convex hull of the parts near its foot, seen from above [m]."""
+        p_WPs = self.p_WPs
+        low = p_WPs[p_WPs[:, 2] <= self.bottom + _HEADROOM]
+        return shapely.MultiPoint(low[:, :2]).convex_hull
+
+
+def read_structures(
+    world: World, wanted: Callable[[str], bool] = lambda name: True
+) -> dict[str, Structure]:
+    """Reads the static structures of a world.
+
+    Args:
+        world: not yet a part of a diagram.
+        wanted: name -> whether to read the structure.
+
+    Returns:
+        Structure name -> structure, in alphabetical order.
+
+    Raises:
+        InputError: a mesh cannot be read.
+    """
+    plant = world.plant
+    context = plant.CreateDefaultContext()
+    X_WFs = {
+        frame: plant.GetBodyFromFrameId(frame).EvalPoseInWorld(context)
+        for frame in world.anchored_frames()
+    }
+    X_WFs[world.scene_graph.world_frame_id()] = RigidTransform()
+    inspector = world.scene_graph.model_inspector()
+    hidden = {
+        geometry
+        for geometry in inspector.GetAllGeometryIds(Role.kPerception)
+        if inspector.GetFrameId(geometry) not in X_WFs
+        or not wanted(structure_name(inspector.GetName(geometry)))
+    }
+    found = defaultdict(list)
+    for geometry in GeometryReader(Role.kPerception).read(inspector, hidden):
+        X_WG = X_WFs[geometry.frame_id] @ geometry.X_FG
+        found[geometry.structure].append(StructurePart(geometry, X_WG))
+    return {
+        name: Structure(
+            name, world.structures[name].semantic_class, tuple(found[name])
+        )
+        for name in sorted(found)
+    }
+
+
+class Obstacles:
+    """Obstacles of new things, seen from above."""
+
+    def __init__(self, areas: Iterable[tuple[str, BaseGeometry]]):
+        """Collects them.
+
+        Args:
+            areas: names, and areas in the world [m].
+        """
+        pairs = [(n, area) for n, area in areas if not area.is_empty]
+        self._names = np.array([name for name, _ in pairs], object)
+        self._areas = [area for _, area in pairs]
+        self._tree = shapely.STRtree(self._areas)
+
+    def is_free(
+        self, area: BaseGeometry, ignored: Collection[str] = ()
+    ) -> bool:
+        """Returns whether an area meets no obstacle.
+
+        Args:
+            area: in the world [m].
+            ignored: names of obstacles that do not count.
+        """
+        return not self._met(area, ignored)
+
+    def distance(
+        self, area: BaseGeometry, within: BaseGeometry, ignored: Collection[str]
+    ) -> float:
+        """Returns the distance of the nearest obstacle from an area [m].
+
+        Args:
+            area: in the world [m].
+            within: area to search.
+            ignored: names of obstacles that do not count.
+
+        Returns:
+            The distance to the part of obstacles within; inf for none.
+        """
+        return min(
+            (
+                float(area.distance(shapely.intersection(other, within)))
+                for other in self._met(within, ignored)
+            ),
+            default=np.inf,
+        )
+
+    def _met(
+        self, area: BaseGeometry, ignored: Collection[str]
+    ) -> list[BaseGeometry]:
+        found = self._tree.query(area, predicate="intersects")
+        return [
+            self._areas[k]
+            for k in sorted(found)
+            if self._names[k] not in ignored
+        ]
+
+
+# Steeper surfaces are not ground: sine of their slope against the vertical.
+_LEAST_UP = 0.3
+# Slits between triangles are closed up to twice this width [m].
+_SEAM = 0.05
+# Smaller islands and holes have no kerb of their own [m^2].
+_LEAST_AREA = 4.0
+
+
+class Kerb(NamedTuple):
+    """A stretch of the edge of the carriageway.
+
+    Attributes:
+        points: (N, 2) along it [m].
+        outwards: (N, 2) unit vectors, away from the carriageway.
+    """
+
+    points: np.ndarray
+    outwards: np.ndarray
+
+
+class GroundSurface:
+    """The ground below things near a drive.
+
+    Attributes:
+        near: its area [m].
+    """
+
+    def __init__(self, things: Mapping[str, Structure], near: BaseGeometry):
+        """Collects it.
+
+        Args:
+            things: all structures.
+            near: the area to collect [m].
+        """
+        shapely.prepare(near)
+        self.near = near
+        corners, is_road = [np.zeros((0, 3, 3))], [np.zeros(0, bool)]
+        for thing in things.values():
+            if thing.semantic_class in GROUND_CLASSES:
+                for part in thing.parts:
+                    found = self._upward(part)
+                    corners.append(found)
+                    road = thing.semantic_class == "road"
+                    is_road.append(np.full(len(found), road))
+        self._corners = np.concatenate(corners)
+        self._is_road = np.concatenate(is_road)
+        self._tree = shapely.STRtree(from_above(self._corners))
+
+    def _upward(self, part: StructurePart) -> np.ndarray:
+        corners = faced_up(triangle_corners(part))
+        middles = corners[:, :, :2].mean(axis=1)
+        return corners[
+            (upwardness(corners) > _LEAST_UP)
+            & shapely.contains_xy(self.near, middles)
+        ]
+
+    @cached_property
+    def carriageway(self) -> BaseGeometry:
+        """The area of class `road`, seen from above [m]."""
+        roads = from_above(self._corners[self._is_road])
+        joined = shapely.unary_union(roads, grid_size=0.001)
+        return joined.buffer(_SEAM).buffer(-_SEAM)
+
+    def heights(self, xy: np.ndarray, *, of_road: bool) -> np.ndarray:
+        """Returns the height of the ground at places; NaN without ground.
+
+        Args:
+            xy: (N, 2) places [m].
+            of_road: whether of carriageways, or of all other ground.
+        """
+        place, index = self._tree.query(shapely.points(xy), "intersects")
+        right = self._is_road[index] == of_road
+        place, index = place[right], index[right]
+        a, b, c = np.moveaxis(self._corners[index], 1, 0)
+        normals = np.cross(b - a, c - a)
+        offset = xy[place] - a[:, :2]
+        z = a[:, 2] - (normals[:, :2] * offset).sum(axis=1) / normals[:, 2]
+        found = np.full(len(xy), -np.inf)
+        np.maximum.at(found, place, z)
+        return np.where(np.isfinite(found), found, np.nan)
+
+    def kerbs(self, spacing: float) -> Iterator[Kerb]:
+        """Yields the edges of the carriageway within the area.
+
+        Args:
+            spacing: of their points, at most [m].
+        """
+        inner = self.near.buffer(-1.0)  # The edge of `near` is no kerb.
+        shapely.prepare(inner)
+        for polygon in polygons_of(self.carriageway):
+            turned = orient(polygon)
+            for ring in (turned.exterior, *turned.interiors):
+                if shapely.Polygon(ring).area < _LEAST_AREA:
+                    continue
+                xy = shapely.get_coordinates(ring.segmentize(spacing))[:-1]
+                yield from _runs(xy, shapely.contains_xy(inner, xy))
+
+
+def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
+    """Yields rings of an area, with the area on their left."""
+    along = np.roll(xy, -1, axis=0) - np.roll(xy, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    outwards = np.column_stack([along[:, 1], -along[:, 0]])
+    if inside.all():
+        order = np.append(np.arange(len(xy)), 0)
+        yield Kerb(xy[order], outwards[order])
+        return
+    first = int(np.argmin(inside))
+    order = np.roll(np.arange(len(xy)), -first)
+    edges = np.flatnonzero(np.diff(inside[order].astype(int)))
+    for begin, end in zip(edges[::2] + 1, edges[1::2] + 1, strict=False):
+        if end - begin >= 2:
+            run = order[begin:end]
+            yield Kerb(xy[run], outwards[run])
+    if len(edges) % 2 and len(order) - edges[-1] > 2:
+        run = order[edges[-1] + 1 :]
+        yield Kerb(xy[run], outwards[run])
+
+
+def triangle_corners(part: StructurePart) -> np.ndarray:
+    """Returns the (M, 3, 3) corners of a part's triangles in the world [m]."""
+    surface = part.geometry.surface
+    if not isinstance(surface, TriangleSurface):
+        return np.zeros((0, 3, 3))
+    return part.p_WPs[surface.triangles]
+
+
+def faced_up(corners: np.ndarray) -> np.ndarray:
+    """Returns triangles of ground, with either winding in the file."""
+    down = upwardness(corners) < 0.0
+    return np.where(down[:, None, None], corners[:, ::-1], corners)
+
+
+def from_above(corners: np.ndarray) -> np.ndarray:
+    """Returns the (M,) polygons of triangles (M, 3, 3) seen from above."""
+    return np.asarray(shapely.polygons(corners[:, :, :2]), object)
+
+
+def upwardness(corners: np.ndarray) -> np.ndarray:
+    """Returns the z of the normals of triangles (M, 3, 3); 0 of slivers."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    return normals[:, 2] / np.where(lengths > 0.0, lengths, np.inf)
+
+
+def draws(seed: int, cause: str, name: str) -> np.random.Generator:
+    """Returns the random numbers of one structure for one cause.
+
+    They do not depend on other structures or other causes.
+
+    Args:
+        seed: of the scenario's section.
+        cause: the switch.
+        name: of the structure.
+    """
+    digest = hashlib.sha256(f"{seed}/{cause}/{name}".encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:16], "little"))
