@@ -56,9 +56,7 @@ def window_rows(
     """Returns a box's windows, the sides' further apart."""
     openings = Openings(wing, boxes)
     for edges, step in (((0, 2), pitch), ((1, 3), _SIDE_PITCH_M)):
-        house_walls.add_rows(
-            openings, edges, floor, STOREY_M, storeys, step, width
-        )
+        openings.add_rows(edges, floor, STOREY_M, storeys, step, width)
     return openings
 
 
@@ -80,7 +78,7 @@ def close_box(
         casing: style of the windows' frames on `edges`.
         edges: walls with framed windows.
     """
-    house_walls.add_casings(out, wing, openings, edges, casing)
+    openings.add_casings(out, edges, casing)
     bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()
     openings.add_walls(out, (house_walls.GLASS_M,), bands)
     low = wing.wall_top + 0.4
@@ -107,9 +105,7 @@ def add_garage(out: Assembly, garage: Wing, boxes: Sequence[Wing]) -> None:
     """Adds a garage, its door in front."""
     openings = Openings(garage, boxes)
     length = garage.x1 - garage.x0
-    house_walls.add_garage_door(
-        out, garage, openings, 0, length / 2, min(length - 0.7, 4.9)
-    )
+    openings.add_garage_door(out, 0, length / 2, min(length - 0.7, 4.9))
     openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
     openings.add_walls(out, (house_walls.GLASS_M,))
     wings.add_roof(out, garage)
@@ -127,8 +123,6 @@ _WING_ENDS = {
 
 class DetachedHouse(Building):
     """The detached house: wings under gables or hips, a porch, a garage.
-
-    Lengths are in metres.
 
     `plan` is `box`, `ell` (a wing to the front), `tee` (a wing to the
     back) or `cross` (both). The garage stands on the right, the front wing
@@ -218,7 +212,7 @@ def _add_main(p: DetachedHouse, plan: _Plan) -> None:
     )
     a, b = (x - main.x0 for x in plan.free)
     door = a + 0.5 * (b - a)
-    house_walls.add_door(p, main, openings, 0, door, p.deck, lights=0.3)
+    openings.add_door(p, 0, door, p.deck, lights=0.3)
     _add_porch(p, plan, (a, b))
     close_box(p, main, openings, p.deck, p.casing)
     if p.roof in ("gable", "gambrel"):
@@ -325,20 +319,15 @@ _BUNGALOW_MARGIN = 0.75
 class Bungalow(Building):
     """The bungalow: one long low storey, a carport or a garage under its roof.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the ridge.
-        plan: `long`, `ell` (a wing to the front) or `court` (two of them).
-        parking: `garage` in the front wing, `carport` beside the house or
-            `none`.
+        plan: `long`, `ell` (a wing to the front) or `court` (two of
+            them).
+        parking: `garage` in the front wing, `carport` beside the house
+            or `none`.
         mirrored: whether the front wing stands on the right.
-        roof: `gable` or `hip`.
-        wing_width: of a front wing, as a part of the house.
-        reach: of the front wings.
-        floor: height of the floor.
+        wing_width: width of a front wing, as a part of the house's.
+        reach: how far the front wings stand out.
         picture: width of the large window beside the door.
-        veranda: whether a porch runs along the front.
     """
 
     def draw(self, d: Dice) -> None:
@@ -367,9 +356,7 @@ class Bungalow(Building):
             openings = window_rows(wing, boxes, *size)
             if self.parking == "garage" and k == 0:
                 width = min(wing.width - 0.8, 4.8)
-                house_walls.add_garage_door(
-                    self, wing, openings, 0, wing.width / 2, width
-                )
+                openings.add_garage_door(self, 0, wing.width / 2, width)
             close_box(self, wing, openings, self.floor, self.casing)
         if plan.carport is not None:
             _add_carport(self, plan.carport)
@@ -434,7 +421,7 @@ def _add_bungalow_main(
         x = (door + 0.6 + b) / 2
         pane = house_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
         openings.put(0, x, p.picture + 0.7, pane)
-    house_walls.add_door(p, main, openings, 0, door, p.floor, lights=0.3)
+    openings.add_door(p, 0, door, p.floor, lights=0.3)
     close_box(p, main, openings, p.floor, p.casing)
     reach = min(1.6, main.y0 - y0 - 0.4)
     if p.veranda and b - a > 4.0 and reach > 0.9:
@@ -490,20 +477,11 @@ _SEMI_DETACHED_MARGIN = 0.5
 class SemiDetached(Building):
     """The pair of semi-detached houses: mirrored halves under one roof.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the ridge.
-        roof: `gable` or `hip`.
-        pitch_deg: wanted, of the roof.
-        floor: height of the ground floor.
+        pitch_deg: wanted slope of the roof.
         bay: `gabled` (through all storeys, under a gable of its own),
             `canted` or `none`.
-        bay_width, bay_reach: of the bays.
-        doors_inside: whether the doors lie side by side in the middle.
-        porch_reach: of the roofs above the doors.
-        garages: `none`, `flat`, `shed` or `hip`, one on either side.
-        chimneys: `middle` or `ends`.
+        garages: shape of their roofs, one on either side, or `none`.
     """
 
     def draw(self, d: Dice) -> None:
@@ -555,9 +533,7 @@ class SemiDetached(Building):
         close_box(self, main, openings, self.floor, self.casing)
         for wing in bays:
             rows = Openings(wing, boxes)
-            house_walls.add_rows(
-                rows, (0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
-            )
+            rows.add_rows((0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2)
             close_box(self, wing, rows, self.floor, self.casing)
         for garage in garages:
             add_garage(self, garage, boxes)
@@ -603,7 +579,7 @@ def _add_entrances(
     eaves = p.floor + 2.35
     size = (reach, p.floor, eaves, eaves + 0.4)
     for x in (half - offset, half + offset):
-        house_walls.add_door(p, main, openings, 0, x, p.floor)
+        openings.add_door(p, 0, x, p.floor)
         if not p.doors_inside:
             details.add_porch(p, wall, x - 0.85, x + 0.85, *size)
     if p.doors_inside:

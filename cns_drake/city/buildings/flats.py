@@ -166,19 +166,10 @@ _FRONT_M, _BACK_M = 1.5, 0.5
 class WalkUp(Building):
     """The walk-up: brick flats around a stair, bay fronts, a raised entrance.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the parapet or the ridge.
-        roof: `flat` or `hip`.
-        floor: height of the ground floor above the street.
-        storey: wanted height of a storey.
         section: wanted length of front for each stair.
         bay_reach: how far the bays of the front stand out; 0 for none.
-        pitch, window_width, recess: of the windows.
         arched: whether the windows of the ground floor are arched.
-        ledge, hood: of the windows' sills and lintels.
-        cornice: how far it sticks out.
     """
 
     def draw(self, d: Dice) -> None:
@@ -346,16 +337,11 @@ _FLOOR = 0.3
 class GardenFlats(Building):
     """Flats in a garden: staggered houses under gables, stacks of verandas.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the highest ridge.
-        roof: `gable` or `hip`.
-        pitch_deg: wanted, of the roofs.
+        pitch_deg: wanted slope of the roofs.
         section: wanted length of front for each house of the group.
-        stagger: by which every other house stands back.
+        stagger: distance by which every other house stands back.
         crossed: whether every other house turns its gable to the front.
-        veranda_width, veranda_reach: of the stacks of verandas.
     """
 
     def draw(self, d: Dice) -> None:
@@ -408,8 +394,7 @@ def _add_house(
     storey = (wing.wall_top - 0.15 - _FLOOR) / storeys
     head = min(2.2, storey - 0.4)
     for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 4.5)):
-        house_walls.add_rows(
-            openings, edges, _FLOOR, storey, storeys, pitch, p.window_width,
+        openings.add_rows(edges, _FLOOR, storey, storeys, pitch, p.window_width,
             head=head,
         )  # fmt: skip
     wall = wing.wall(0)
@@ -419,14 +404,12 @@ def _add_house(
     if wing.wall_top > 6.0:
         stair = bays.window(1.8, _FLOOR + 2.6, wing.wall_top - 0.7, glass)
         openings.put(0, middle, 2.6, stair)
-    house_walls.add_door(
-        p, wing, openings, 0, middle, _FLOOR, width=1.2, lights=0.4
-    )
+    openings.add_door(p, 0, middle, _FLOOR, width=1.2, lights=0.4)
     area = (middle - 1.4, middle + 1.4, -0.05, 1.3)
     p.add_to("trim", wall.box(*area, _FLOOR + 2.3, _FLOOR + 2.5))
     p.add_to("base", wall.standing(*area, _FLOOR, bottom=True))
     _add_verandas(p, wing, storeys, storey, number)
-    house_walls.add_casings(p, wing, openings, (0,), p.casing)
+    openings.add_casings(p, (0,), p.casing)
     z = round(_FLOOR + storey, 2)
     bands = (Band(0.0, _FLOOR, -0.05), Band(z - 0.2, z, -0.05))
     low = wing.wall_top + 0.4

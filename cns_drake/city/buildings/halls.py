@@ -27,18 +27,11 @@ _RECESS = 0.15
 class Barn(Building):
     """The barn or boat house: timber boards, wide doors, a lean-to.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the ridge, the ventilator on it included.
-        roof: `gambrel`, `gable` or `barrel`.
         wall: height of the walls, as a part of the ridge's.
         deck: room in front, a jetty of a boat house; 0 for a barn.
-        door_width, door_height: of the doors in the gable.
         aisle: width of the lean-to on one side; 0 for none.
-        aisle_left: on which.
         batten: distance between battens.
-        ventilators: on the ridge.
     """
 
     def draw(self, d: Dice) -> None:
@@ -200,17 +193,12 @@ _SPORTS_HALL_MARGIN = 0.6
 class SportsHall(Building):
     """The sports hall: a wide roof on outer frames, a low front, high windows.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the ridge, the ribs on it included.
         roof: `barrel`, `gable`, `shed` or `butterfly` (two sheds that
             fall to the middle).
-        wall: height of the walls as a part of the ridge's.
+        wall: height of the walls, as a part of the ridge's.
         bay: distance between the frames.
-        frame_reach: how far the frames stand out of the walls.
         annex: depth of the low front; 0 for none.
-        annex_height: [m].
         glazed: whether the gables are glazed.
     """
 
@@ -353,8 +341,6 @@ def _add_porch(p: SportsHall, halls: list[Wing]) -> None:
 
 class WaterfrontHall(Building):
     """The waterfront hall: a long shed with a loading dock and big doors.
-
-    Lengths are in metres.
 
     `roof` is `gable`, `barrel` or `sawtooth`; the ridge is at `height`.
     """

@@ -18,17 +18,12 @@ _FRONT_M, _BACK_M = 0.4, 0.1
 class ShopStrip(Building):
     """The strip of shops: low flat-roofed units side by side, each its own.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the highest parapet.
-        unit_width: wanted, of a shop.
         ground: height of the shops without their parapets.
-        upper: part of the units with an upper floor, where height allows.
+        upper: part of the units with an upper floor, where height
+            allows.
         canopy: whether one canopy runs along all shops, else awnings.
-        canopy_reach: of the canopy.
-        steps: by how much parapets differ.
-        roof_items: on the roofs.
+        steps: difference between parapets.
     """
 
     def draw(self, d: Dice) -> None:
@@ -82,12 +77,11 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
     upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
     storey = (wing.top - 0.5 - p.ground) / max(upper_floors, 1)
     width = round(float(rng.uniform(1.1, 2.2)), 2)
-    house_walls.add_rows(
-        openings, (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
+    openings.add_rows(
+        (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
         head=min(2.3, storey - 0.4),
     )  # fmt: skip
-    house_walls.add_shops(
-        p, wall, openings, 0, 0.2, wall.length - 0.2, p.ground,
+    openings.add_shops(p, 0, 0.2, wall.length - 0.2, p.ground,
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
     back = [bays.gate(2.0, 2.2, 0.2), house_walls.sash(1.0, 0.0, 1.6, 2.3)]
@@ -124,15 +118,10 @@ _COUNTER = 1.05
 class KioskRow(Building):
     """The row of kiosks: small stalls with counters behind a common arcade.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the highest roof.
         stall: wanted width of a stall.
-        depth: of the stalls.
-        gap: between groups of stalls.
+        gap: distance between groups of stalls.
         group: stalls built wall to wall.
-        roof: `hip`, `gable`, `barrel` or `shed`.
         arcade: reach of a roof on posts in front; 0 for awnings.
         tower: whether one stall carries a lantern.
     """
@@ -241,19 +230,13 @@ _RECESS = 0.25
 class Supermarket(Building):
     """The supermarket: a low hall, a glazed front under a canopy, a dock.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the entrance's gable or sign.
-        eaves: of the hall.
         entrance: `tower` (a box), `gable` or `vault` above the doors.
         entrance_at: its place along the front, a part of it.
-        entrance_width: [m].
         canopy: reach of the canopy along the front.
-        pitch: of the pilasters.
-        dock_left: side of the loading dock.
-        dock_depth: of the dock beside the hall; 0 for none.
-        shelters: for trolleys, in front.
+        pitch: distance between the pilasters.
+        dock_depth: depth of the dock beside the hall; 0 for none.
+        shelters: roofs for trolleys, in front.
     """
 
     def draw(self, d: Dice) -> None:

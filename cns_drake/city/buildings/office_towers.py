@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Assembly, Building, Dice, Site
+from cns_drake.city.facades.assembly import Building, Dice, Site
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import (
     Band,
@@ -24,19 +24,13 @@ from cns_drake.city.geometry.structures import MeshShape
 class BandedTower(Building):
     """The banded office tower: round corners, bands of glass, gardens between.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the parapet.
-        radius: of the rounded corners.
         corners: which corners of the rectangle are round.
-        stacks: of storeys, with an open floor between two.
-        taper: by which every other stack is smaller.
-        lobby: height of the ground floor.
-        storey: wanted height of a storey.
+        stacks: number of stacks of storeys, with an open floor between
+            two.
+        taper: distance by which every other stack is smaller.
         spandrel: height of the bands between the glass.
         ledge: how far a sunshade above the glass sticks out.
-        recess: of the glass.
         fins: distance between upright fins; 0 for none.
     """
 
@@ -75,7 +69,7 @@ class BandedTower(Building):
         room = (self.height - 1.2 - z - gap * (self.stacks - 1)) / self.stacks
         counts = tiers.divided(room, self.storey, 12 // self.stacks)
         shapes = [
-            _Stack(self, self, plan, counts, name)
+            _Stack(self, plan, counts, name)
             for plan, name in ((outer, "wide"), (inner, "slim"))[: self.stacks]
         ]
         for k in range(self.stacks):
@@ -119,7 +113,6 @@ def _add_garden(
     """Adds an open floor: columns around a smaller glazed core.
 
     Args:
-        out: the building.
         plan: outline of the floor.
         inner: the smallest outline of the storeys above.
         z0, height: of the floor [m].
@@ -148,14 +141,13 @@ class _Stack:
 
     def __init__(
         self,
-        out: Assembly,
         p: BandedTower,
         plan: np.ndarray,
         counts: tuple[int, int, float],
         name: str,
     ):
         self.plan = plan
-        self._out = out
+        self._p = p
         self._groups, per_group, storey = counts
         self._step = per_group * storey
         bands = (
@@ -177,7 +169,7 @@ class _Stack:
         glass = massing.skirt(pane, pane, 0.0, self._height)
         soffit = massing.flat(plan, 0.0, up=False)
         self._walls, self._glass, self._soffit = (
-            MeshShape(out.define(f"{name}{part}", mesh))
+            MeshShape(p.define(f"{name}{part}", mesh))
             for part, mesh in (
                 ("", merge_meshes(*pieces)),
                 ("_glass", glass),
@@ -187,30 +179,25 @@ class _Stack:
 
     def place(self, z0: float, number: int) -> float:
         """Places the storeys; returns their top [m]."""
-        at, part, out = (0.0, 0.0, z0), f"stack_{number}", self._out
-        out.place(f"{part}_glass", self._glass, at, rgb=out.glass_rgb)
-        out.place(f"{part}_soffit", self._soffit, at)
+        at, part, p = (0.0, 0.0, z0), f"stack_{number}", self._p
+        p.place(f"{part}_glass", self._glass, at, rgb=p.glass_rgb)
+        p.place(f"{part}_soffit", self._soffit, at)
         for k in range(self._groups):
             z = z0 + k * self._step
-            out.place(f"{part}_storey_{k:02d}", self._walls, (0.0, 0.0, z))
+            p.place(f"{part}_storey_{k:02d}", self._walls, (0.0, 0.0, z))
         return round(z0 + self._height, 3)
 
 
 class GridTower(Building):
     """The gridded office tower: deep frames, plant floors, offset slabs.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the crown.
         plan: `box`, `offset` (two slabs that slide past each other) or
             `notched`.
-        shift: of the slabs or size of the notches, as a part of the depth.
-        lobby: height of the ground floor.
-        storey: wanted height of a storey.
-        pitch: of the frames.
-        pier, beam: what the frames leave of wall beside and below windows.
-        recess: of the windows.
+        shift: how far slabs slide, or size of notches, as a part of the
+            depth.
+        pier, beam: what the frames leave of wall beside and below
+            windows.
         double: whether each frame spans two storeys.
         waist: where a plant floor interrupts the grid, as a part of the
             height; 0 for none.
@@ -334,21 +321,16 @@ _LIFT_M = 2.0
 class UnfinishedTower(Building):
     """The tower under construction: core, concrete frame, scaffolds, cladding.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the core.
         storeys: slabs above the ground.
-        storey: height of a storey.
         group: storeys that are placed as one.
-        pitch: of the columns.
         core: extent of the core, as parts of the plan.
         clad: storeys whose walls are finished.
         scaffolds: edges with a scaffold.
         scaffold_top: storeys it covers.
         nets: part of the scaffold's bays behind a net.
         props: whether the top slab is still propped.
-        hoist: whether a hoist climbs the right side.
+        hoist: whether a hoist climbs the back.
     """
 
     def draw(self, d: Dice) -> None:

@@ -22,16 +22,10 @@ _RECESS = 0.18
 class GasStation(Building):
     """The gas station: pumps under a canopy, a shop, a car wash, a price sign.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the price sign, the highest thing.
-        canopy_top: of the canopy.
-        fascia: height of its edge.
+        fascia: height of the canopy's edge.
         sloped: whether the canopy is a pair of raised wings.
-        lanes: rows of pumps.
-        pumps: in each row.
-        shop_depth, shop_height: of the shop behind.
+        lanes, pumps: rows of pumps, and pumps in each row.
         wash: whether a car wash stands beside the shop.
         mirrored: whether the car wash and the sign are on the left.
     """
@@ -176,16 +170,10 @@ _EAVES_M = 0.6
 class ParkPavilion(Building):
     """The park pavilion: a bandstand, a shelter with tables, or a tea house.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the finial.
         form: `bandstand` (open, round), `tea_house` (glazed, round) or
             `shelter` (open, long).
-        sides: of a round one.
-        floor: height of the deck.
         eaves: height of the posts above the deck.
-        lantern: whether a lantern sits on the roof.
         bell: whether the roof is bent like a bell.
     """
 

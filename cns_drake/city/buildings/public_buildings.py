@@ -19,18 +19,11 @@ _RECESS = 0.16
 class School(Building):
     """The school: classroom wings, a glazed entrance, a gymnasium.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the ridge of the classrooms, or of their stair.
-        roof: `hip` or `flat`.
-        rise: of a hipped roof.
-        storeys: of classrooms.
-        depth: of the classroom wing.
-        wing: depth of the wing behind, as a part of the site; 0 for none.
+        depth: depth of the classroom wing.
+        wing: whether there is a wing behind.
         mirrored: whether gymnasium and wing stand on the left.
         gym: width of the gymnasium; 0 for none.
-        gym_roof: `barrel`, `shed` or `flat`.
         pitch: width of a classroom's window group.
         entrance: width of the glazed hall.
     """
@@ -189,19 +182,14 @@ _THICK = 0.2
 class Chapel(Building):
     """The chapel: a nave under a steep roof, a tower or a bell cote, a porch.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the cross on top.
         belfry: `front` (a tower in the middle of the front), `side` (a
             tower beside the nave) or `cote` (a bell gable on the roof).
-        spire: `needle`, `broach` or `cap`.
         tower: side of the tower.
         nave: width of the nave, as a part of the site's.
-        pitch_deg: of the nave's roof.
         bay: distance between the side windows.
-        buttresses: whether the long walls have them.
-        porch: whether the door has a porch (with a cote or a side tower).
+        porch: whether the door has a porch (with a cote or a side
+            tower).
         annex: whether a vestry stands beside the choir.
     """
 

@@ -95,13 +95,12 @@ def add_unit(
     step = (wing.wall_top - 0.25 - p.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
     for edges, pitch in (((0, 2), p.window_pitch), (sides, 4.2)):
-        house_walls.add_rows(
-            openings, edges, p.floor, step, storeys, pitch, p.window_width,
+        openings.add_rows(edges, p.floor, step, storeys, pitch, p.window_width,
             head=min(2.2, step - 0.45),
         )  # fmt: skip
     door = _add_entrance(out, p, wing, openings, door_material)
     _add_bay(out, p, wing, openings, storeys, step, door)
-    house_walls.add_casings(out, wing, openings, (0,), p.casing)
+    openings.add_casings(out, (0,), p.casing)
     bands = [Band(0.0, round(p.floor, 2), -0.05)]
     if storeys > 1:
         z = round(p.floor + step, 2)
@@ -151,9 +150,7 @@ def _add_entrance(
     wall = wing.wall(0)
     inset = min(0.95, 0.3 * wall.length)
     x = inset if p.door_left else wall.length - inset
-    house_walls.add_door(
-        out, wing, openings, 0, x, p.floor, height=2.25, material=material
-    )
+    openings.add_door(out, 0, x, p.floor, height=2.25, material=material)
     count = max(1, round(p.floor / 0.17))
     run = min(0.29 * count, max(p.stoop - 0.5, 0.3 * p.stoop))
     landing = p.stoop - run
@@ -341,15 +338,12 @@ _DOORS = ("accent", "trim", "roof")
 class Terrace(Building):
     """The terrace: a row of narrow houses, alike but not the same.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the highest house.
         unit: what the houses have in common.
-        width: wanted, of a house.
-        step: by which every other pair of houses is lower.
-        setback: by which every other pair stands back.
-        crossed: how many houses turn their gable to the street.
+        width: wanted width of a house.
+        step: height by which every other pair of houses is lower.
+        setback: distance by which every other pair stands back.
+        crossed: part of the houses with their gable to the street.
         paired: whether doors lie side by side in pairs.
         bays: part of the houses with a bay window.
     """
@@ -414,12 +408,8 @@ def _varied(p: Terrace, k: int, rng: np.random.Generator) -> RowUnit:
 class ShopHouse(Building):
     """The shop house: shops on the ground floor, flats above them.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of its top.
-        unit: of the flats; its floor is the top of the shops.
-        shop_width: wanted, of a shop.
+        unit: the flats; its floor is the top of the shops.
         awnings: part of the shops with an awning.
         oriels: bay windows above the shops, at most.
         course: how far the band above the shops sticks out.
@@ -465,13 +455,12 @@ class ShopHouse(Building):
         sides = [k for k in (1, 3) if k not in blind]
         head = min(2.25, step - 0.4)
         for edges, pitch in (((0, 2), self.unit.window_pitch), (sides, 4.0)):
-            house_walls.add_rows(
-                openings, edges, ground, step, upper, pitch,
+            openings.add_rows(edges, ground, step, upper, pitch,
                 self.unit.window_width, head=head,
             )  # fmt: skip
         _add_ground(self, wing, openings)
         _add_oriels(self, wing, openings, upper, step)
-        house_walls.add_casings(self, wing, openings, (0,), self.unit.casing)
+        openings.add_casings(self, (0,), self.unit.casing)
         bands = [Band(round(ground - 0.3, 2), ground, -self.course)]
         if self.unit.roof == "flat" and room > 0.8:
             z = round(wing.wall_top - 0.45, 2)
@@ -491,13 +480,12 @@ def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
     door, length = 1.7 * (p.unit.floor < p.height - 3.0), wall.length
     left = p.unit.door_left
     start, end = (door, length) if left else (0.0, length - door)
-    house_walls.add_shops(
-        p, wall, openings, 0, start, end, p.unit.floor,
+    openings.add_shops(p, 0, start, end, p.unit.floor,
         width=p.shop_width, awnings=p.awnings,
     )  # fmt: skip
     if door:
         x = 0.9 if left else length - 0.9
-        house_walls.add_door(p, wing, openings, 0, x, 0.0, height=2.3)
+        openings.add_door(p, 0, x, 0.0, height=2.3)
     back = [house_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
     openings.row((2,), 0.5, 4.5, back, 0.8)
 

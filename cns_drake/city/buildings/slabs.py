@@ -126,21 +126,14 @@ _FRONT_M = 1.7
 class BalconyFlats(Building):
     """The white slab of flats: stacks of balconies, staggered sections.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of its highest parapet or stair.
         sections: parts of the slab, each with its own stair.
-        stagger: by which every other section stands back.
-        step: by which every other section is lower, in storeys.
-        depth: of a section.
-        storey: wanted height of a storey.
-        pitch, window_width, recess: of the windows.
-        balcony_width, balcony_reach: of the balconies.
-        balconies: `stacks` (one above the other), `ribbons` (all along the
-            front) or `checks` (every other one left out).
-        rail: whether the balconies have open railings, else parapets.
-        stair: `slit` (a strip of glass) or `tower` (stands out in front).
+        stagger: distance by which every other section stands back.
+        step: storeys by which every other section is lower.
+        balconies: `stacks` (one above the other), `ribbons` (all along
+            the front) or `checks` (every other one left out).
+        stair: `slit` (a strip of glass) or `tower` (stands out in
+            front).
     """
 
     def draw(self, d: Dice) -> None:
@@ -349,22 +342,12 @@ def _runs(
 class GalleryFlats(Building):
     """The bar of flats: open galleries in front of the doors, loggias behind.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the stair's top.
-        gallery_front: whether the galleries look to the street, else the
-            loggias do.
-        depth: of the bar between galleries and loggias.
-        gallery: width of a gallery.
-        storey: wanted height of a storey.
+        gallery_front: whether the galleries look to the street, else
+            the loggias do.
+        depth: depth of the bar between galleries and loggias.
         pitch: width of a flat.
-        loggia: depth of the loggias.
-        rail: height of the parapets.
-        stair_left: where the stair stands.
-        stair_width: along the front.
         panels: part of the galleries' bays with a screen.
-        ground: height of the ground floor.
     """
 
     def draw(self, d: Dice) -> None:

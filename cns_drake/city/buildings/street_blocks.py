@@ -132,8 +132,6 @@ _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")
 class CornerBuilding(Building):
     """The corner house: a curved front, arched windows, a dome or a lantern.
 
-    Lengths are in metres.
-
     `corner` is the rounded corner of the rectangle (0: front left,
     1: front right) and `radius` its radius.
     """
@@ -289,8 +287,6 @@ def _is_front(plan: np.ndarray, edge: int) -> bool:
 class Office(Building):
     """The mid-rise office: shops and a lobby below, window bands, a penthouse.
 
-    Lengths are in metres.
-
     `style` is `ribbon` (bands of glass), `frame` (deep square frames) or
     `grooves` (piers from the first floor to the top).
     """
@@ -392,16 +388,10 @@ def _add_penthouse(p: Office, outline: np.ndarray, roof: float) -> float:
 class CornerStore(Building):
     """The corner store: a cut-off corner with the door, flats above the shop.
 
-    Lengths are in metres.
-
     Attributes:
-        height: of the parapet, its raised part above the corner included.
         corner: 0 front left, 1 front right.
-        cut: taken off each edge at the corner.
-        ground: height of the shop.
-        storey: wanted height of a storey above.
-        raised: what the parapet rises above the corner.
-        cornice: how far it sticks out.
+        cut: length taken off each edge at the corner.
+        raised: rise of the parapet above the corner.
         awnings: part of the shop windows with an awning.
     """
 

@@ -16,8 +16,6 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 class ArtDecoTower(Building):
     """The art-deco tower: symmetric setbacks, tall piers, a stepped crown.
 
-    Lengths are in metres.
-
     `steps` has, for each tier above the base, where it starts (as a
     fraction of the height) and how far it steps back across the front and
     along the sides.
@@ -115,8 +113,6 @@ _ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")
 
 class GlassSkyscraper(Building):
     """The glass skyscraper: curtain walls with fins, setbacks, a crown.
-
-    Lengths are in metres.
 
     `setbacks` has, for each tier above the first, where it starts (as a
     fraction of the height) and how far each edge of the site steps back.
@@ -359,8 +355,6 @@ _PODIUM_TOWER_ROOF_ITEMS = (
 
 class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof.
-
-    Lengths are in metres.
 
     The tower covers the share `tower` of the podium along x and y and
     stands at the fraction `at` of the room that is left.

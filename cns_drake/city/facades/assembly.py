@@ -313,7 +313,8 @@ class Building(Assembly):
     """A building of an archetype: it draws its parameters, then builds itself.
 
     Functions that add something to a building take it as `p`: they find in it
-    its parameters, and gather in it what they make.
+    its parameters, and gather in it what they make. Subclasses explain those of
+    their parameters that a name cannot; lengths are in metres.
 
     Attributes:
         kind: its archetype.

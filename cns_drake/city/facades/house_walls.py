@@ -158,6 +158,151 @@ class Openings:
         self.add_walls(out, glass, bands, material)
         wings.add_roof(out, self._wing, attic, material)
 
+    def add_rows(
+        self,
+        edges: Iterable[int],
+        floor: float,
+        storey: float,
+        count: int,
+        pitch: float,
+        width: float,
+        margin: float = 0.6,
+        head: float = 2.15,
+    ) -> None:
+        """Adds a row of windows to each storey of a wing.
+
+        Windows of the ground floor are the widest.
+
+        Args:
+            edges: its walls with windows.
+            floor: height of the ground floor [m].
+            storey: height of a storey [m].
+            count: of storeys.
+            pitch, width: of the windows [m].
+            margin: kept from corners [m].
+            head: of the windows above the floor [m].
+        """
+        for k in range(count):
+            z = floor + k * storey
+            wide = round(width * (1.25 if k == 0 else 1.0), 2)
+            choices = [sash(wide, z, 0.85, head), sash(width, z, 0.85, head)]
+            self.row(edges, z + 0.7, pitch, choices, margin)
+
+    def add_door(
+        self,
+        out: Assembly,
+        edge: int,
+        x: float,
+        floor: float,
+        *,
+        width: float = 1.0,
+        height: float = 2.1,
+        lights: float = 0.0,
+        material: str = "accent",
+    ) -> None:
+        """Adds a door with its leaf, between windows of `lights` width."""
+        half, top = width / 2, round(floor + height, 2)
+
+        def bay(x0: float, x1: float) -> list[Relief]:
+            a, b = round(x - half, 2), round(x + half, 2)
+            relief: list[Relief] = [Patch(a, b, floor, top, DOOR_M)]
+            if lights > 0:
+                for u0, u1 in ((a - lights, a - 0.08), (b + 0.08, b + lights)):
+                    relief.append(
+                        Patch(u0, u1, round(floor + 0.3, 2), top, GLASS_M)
+                    )
+            return relief
+
+        self.put(edge, x, width + 2 * lights + 0.5, bay)
+        leaf = _leaf(x - half, x + half, floor, top)
+        out.add_to(
+            material, *(self._wing.wall(edge).place(part) for part in leaf)
+        )
+
+    def add_garage_door(
+        self,
+        out: Assembly,
+        edge: int,
+        x: float,
+        width: float,
+        height: float = 2.15,
+    ) -> None:
+        """Adds a sectional door with ribs, as `trim`."""
+        a, b = round(x - width / 2, 2), round(x + width / 2, 2)
+        hole: list[Relief] = [Patch(a, b, 0.0, height, DOOR_M)]
+        self.put(edge, x, width + 0.3, lambda x0, x1: hole)
+        count = 4
+        step = height / count
+        for k in range(count):
+            low, high = (
+                round(k * step + 0.02, 2),
+                round((k + 1) * step - 0.02, 2),
+            )
+            panel = details.board(a, b, low, high, 0.06)
+            panel = panel.moved((0.0, -DOOR_M, 0.0))
+            out.add_to("trim", self._wing.wall(edge).place(panel))
+
+    def add_casings(
+        self, out: Assembly, edges: Sequence[int], style: str
+    ) -> None:
+        """Frames the windows of some walls, see `details.casings`."""
+        material = "accent" if style == "shutters" else "trim"
+        for edge in edges:
+            wall = self._wing.wall(edge)
+            boards = details.casings(
+                self.layout(edge, wall.length), (GLASS_M,), style
+            )
+            out.add_to(material, *(wall.place(board) for board in boards))
+
+    def add_shops(
+        self,
+        out: Assembly,
+        edge: int,
+        start: float,
+        end: float,
+        height: float,
+        *,
+        width: float = 5.5,
+        awnings: float = 0.6,
+        reach: float = 1.2,
+    ) -> None:
+        """Adds shops side by side between two points of a wall.
+
+        Args:
+            out: gets `trim` (fascias), `awning` and `sign`; its `rng` draws the
+                differences between shops.
+            edge: number of the wall.
+            start, end: the stretch [m].
+            height: of the ground floor [m].
+            width: wanted, of a shop [m].
+            awnings: part of the shops with an awning.
+            reach: of awnings out of the wall [m].
+        """
+        wall = self._wing.wall(edge)
+        head, rng = round(height - 1.15, 2), out.rng
+        for a, b in bays.stretches(end - start, width, 0.1):
+            x0, x1 = round(start + a, 2), round(start + b, 2)
+            if x1 - x0 < 2.4:
+                continue
+            shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
+            if rng.random() < 0.5:
+                shop = _reversed(shop)
+            self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
+            z, tall = head + 0.08, round(float(rng.uniform(0.55, 0.8)), 2)
+            fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
+            out.add_to("sign", fascia)
+            if rng.random() < awnings:
+                shade = details.awning(
+                    x0 + 0.3, x1 - 0.3, reach, max(2.4, head - 0.8), head + 0.05
+                )
+                out.add_to("awning", wall.place(shade))
+            if rng.random() < 0.4:
+                x = x0 + 0.25 if rng.random() < 0.5 else x1 - 0.25
+                # Blades hang above heads, like awnings.
+                z = max(2.4, head + 0.1)
+                blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
+                out.add_to("trim", blade)
+
 
 # Depths of windows and of the leaves of doors behind the wall [m].
 GLASS_M, DOOR_M = 0.12, 0.2
@@ -171,69 +316,6 @@ def sash(
     return bays.window(width, low, high, GLASS_M, mullions=bars, pier=0.25)
 
 
-def add_rows(
-    openings: Openings,
-    edges: Iterable[int],
-    floor: float,
-    storey: float,
-    count: int,
-    pitch: float,
-    width: float,
-    margin: float = 0.6,
-    head: float = 2.15,
-) -> None:
-    """Adds a row of windows to each storey of a wing.
-
-    Windows of the ground floor are the widest.
-
-    Args:
-        openings: of the wing.
-        edges: its walls with windows.
-        floor: height of the ground floor [m].
-        storey: height of a storey [m].
-        count: of storeys.
-        pitch, width: of the windows [m].
-        margin: kept from corners [m].
-        head: of the windows above the floor [m].
-    """
-    for k in range(count):
-        z = floor + k * storey
-        wide = round(width * (1.25 if k == 0 else 1.0), 2)
-        choices = [sash(wide, z, 0.85, head), sash(width, z, 0.85, head)]
-        openings.row(edges, z + 0.7, pitch, choices, margin)
-
-
-def add_door(
-    out: Assembly,
-    wing: Wing,
-    openings: Openings,
-    edge: int,
-    x: float,
-    floor: float,
-    *,
-    width: float = 1.0,
-    height: float = 2.1,
-    lights: float = 0.0,
-    material: str = "accent",
-) -> None:
-    """Adds a door with its leaf, and windows of `lights` width beside it."""
-    half, top = width / 2, round(floor + height, 2)
-
-    def bay(x0: float, x1: float) -> list[Relief]:
-        a, b = round(x - half, 2), round(x + half, 2)
-        relief: list[Relief] = [Patch(a, b, floor, top, DOOR_M)]
-        if lights > 0:
-            for u0, u1 in ((a - lights, a - 0.08), (b + 0.08, b + lights)):
-                relief.append(
-                    Patch(u0, u1, round(floor + 0.3, 2), top, GLASS_M)
-                )
-        return relief
-
-    openings.put(edge, x, width + 2 * lights + 0.5, bay)
-    leaf = _leaf(x - half, x + half, floor, top)
-    out.add_to(material, *(wing.wall(edge).place(part) for part in leaf))
-
-
 def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
     """A door leaf with a raised frame, in wall coordinates."""
     shift = (0.0, -DOOR_M, 0.0)
@@ -245,97 +327,8 @@ def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
     return [panel.moved(shift) for panel in panels]
 
 
-def add_garage_door(
-    out: Assembly,
-    wing: Wing,
-    openings: Openings,
-    edge: int,
-    x: float,
-    width: float,
-    height: float = 2.15,
-) -> None:
-    """Adds a sectional door with ribs, as `trim`."""
-    a, b = round(x - width / 2, 2), round(x + width / 2, 2)
-    hole: list[Relief] = [Patch(a, b, 0.0, height, DOOR_M)]
-    openings.put(edge, x, width + 0.3, lambda x0, x1: hole)
-    count = 4
-    step = height / count
-    for k in range(count):
-        low, high = round(k * step + 0.02, 2), round((k + 1) * step - 0.02, 2)
-        panel = details.board(a, b, low, high, 0.06)
-        panel = panel.moved((0.0, -DOOR_M, 0.0))
-        out.add_to("trim", wing.wall(edge).place(panel))
-
-
-def add_casings(
-    out: Assembly,
-    wing: Wing,
-    openings: Openings,
-    edges: Sequence[int],
-    style: str,
-) -> None:
-    """Frames the windows of some walls, see `details.casings`."""
-    material = "accent" if style == "shutters" else "trim"
-    for edge in edges:
-        wall = wing.wall(edge)
-        boards = details.casings(
-            openings.layout(edge, wall.length), (GLASS_M,), style
-        )
-        out.add_to(material, *(wall.place(board) for board in boards))
-
-
 # Depths of shop windows and of the doors between them [m].
 SHOP_GLASS_M = (0.35, 0.95)
-
-
-def add_shops(
-    out: Assembly,
-    wall: details.WallFrame,
-    openings: Openings,
-    edge: int,
-    start: float,
-    end: float,
-    height: float,
-    *,
-    width: float = 5.5,
-    awnings: float = 0.6,
-    reach: float = 1.2,
-) -> None:
-    """Adds shops side by side between two points of a wall.
-
-    Args:
-        out: gets `trim` (fascias), `awning` and `sign`; its `rng` draws the
-            differences between shops.
-        wall, openings, edge: the wall.
-        start, end: the stretch [m].
-        height: of the ground floor [m].
-        width: wanted, of a shop [m].
-        awnings: part of the shops with an awning.
-        reach: of awnings out of the wall [m].
-    """
-    head, rng = round(height - 1.15, 2), out.rng
-    for a, b in bays.stretches(end - start, width, 0.1):
-        x0, x1 = round(start + a, 2), round(start + b, 2)
-        if x1 - x0 < 2.4:
-            continue
-        shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
-        if rng.random() < 0.5:
-            shop = _reversed(shop)
-        openings.put(edge, (x0 + x1) / 2, x1 - x0, shop)
-        z, tall = head + 0.08, round(float(rng.uniform(0.55, 0.8)), 2)
-        fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
-        out.add_to("sign", fascia)
-        if rng.random() < awnings:
-            shade = details.awning(
-                x0 + 0.3, x1 - 0.3, reach, max(2.4, head - 0.8), head + 0.05
-            )
-            out.add_to("awning", wall.place(shade))
-        if rng.random() < 0.4:
-            x = x0 + 0.25 if rng.random() < 0.5 else x1 - 0.25
-            # Blades hang above heads, like awnings.
-            z = max(2.4, head + 0.1)
-            blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
-            out.add_to("trim", blade)
 
 
 def _reversed(bay: bays.Bay) -> bays.Bay:

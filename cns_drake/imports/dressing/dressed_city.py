@@ -14,11 +14,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.structures import (
-    MeshShape,
-    Model,
-    Part,
-)
+from cns_drake.city.geometry.structures import MeshShape, Model, Part
 from cns_drake.imports.dressing.facade_pieces import (
     FacadePlan,
     Faces,

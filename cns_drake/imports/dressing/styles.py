@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 import re
 
 from matplotlib.colors import to_rgb
 import numpy as np
+import yaml
 
 from cns_drake.city.facades.assembly import Rgb, pick
 from cns_drake.imports.openstreetmap.tags import count
@@ -27,24 +29,6 @@ class Use(Enum):
     SHED = "shed"
 
 
-# Words of tags and attributes -> use, the more specific first.
-_USES = (
-    (Use.CHURCH, "church cathedral chapel mosque synagogue temple worship"),
-    (Use.SHED, "garage garages carport shed hut roof service barn cabin"),
-    (Use.RETAIL, "retail supermarket kiosk shop mall store restaurant cafe"),
-    (Use.OFFICE, "office commercial government bank"),
-    (Use.INDUSTRIAL, "industrial warehouse hangar manufacture factory"),
-    (
-        Use.PUBLIC,
-        "public civic school university college hospital kindergarten museum"
-        " theatre train_station library townhall hotel",
-    ),
-    (Use.FLATS, "apartments residential dormitory flats woonfunctie"),
-    (
-        Use.HOUSE,
-        "house detached semidetached_house terrace bungalow villa farm",
-    ),
-)
 _USE_KEYS = (
     "building",
     "building:use",
@@ -54,96 +38,9 @@ _USE_KEYS = (
     "class",
     "building:part",
 )
-_BRICK: Rgb = (0.58, 0.33, 0.25)
-_PLASTER: tuple[Rgb, ...] = (
-    (0.86, 0.80, 0.66),
-    (0.80, 0.70, 0.55),
-    (0.88, 0.85, 0.78),
-    (0.78, 0.62, 0.50),
-    (0.72, 0.73, 0.70),
-    (0.84, 0.74, 0.58),
-    (0.66, 0.70, 0.72),
-    (0.90, 0.87, 0.74),
+_LOOKS = yaml.safe_load(
+    Path(__file__).with_name("styles.yaml").read_text(encoding="utf-8")
 )
-_BRICKS: tuple[Rgb, ...] = (
-    _BRICK,
-    (0.50, 0.28, 0.22),
-    (0.66, 0.44, 0.33),
-    (0.70, 0.55, 0.42),
-    (0.44, 0.33, 0.29),
-)
-_GREYS: tuple[Rgb, ...] = (
-    (0.62, 0.63, 0.64),
-    (0.74, 0.73, 0.70),
-    (0.52, 0.54, 0.57),
-    (0.80, 0.79, 0.77),
-)
-_STONES: tuple[Rgb, ...] = (
-    (0.72, 0.66, 0.56),
-    (0.64, 0.58, 0.50),
-    (0.78, 0.73, 0.65),
-)
-_WALLS = {
-    Use.HOUSE: _BRICKS + _PLASTER,
-    Use.FLATS: _PLASTER + _BRICKS,
-    Use.OFFICE: _GREYS + _STONES,
-    Use.RETAIL: _PLASTER + _GREYS,
-    Use.PUBLIC: _STONES + _BRICKS,
-    Use.INDUSTRIAL: _GREYS,
-    Use.CHURCH: _STONES + _BRICKS[:2],
-    Use.SHED: _GREYS + _BRICKS[:2],
-}
-_TILES: tuple[Rgb, ...] = (
-    (0.55, 0.30, 0.24),
-    (0.47, 0.26, 0.21),
-    (0.61, 0.37, 0.27),
-    (0.35, 0.33, 0.33),
-    (0.42, 0.32, 0.28),
-)
-_FELTS: tuple[Rgb, ...] = (
-    (0.42, 0.42, 0.43),
-    (0.53, 0.52, 0.50),
-    (0.35, 0.36, 0.38),
-    (0.60, 0.58, 0.55),
-)
-_DOORS: tuple[Rgb, ...] = (
-    (0.28, 0.20, 0.15),
-    (0.16, 0.26, 0.22),
-    (0.22, 0.25, 0.32),
-    (0.45, 0.30, 0.18),
-    (0.40, 0.14, 0.13),
-)
-_SIGNS: tuple[Rgb, ...] = (
-    (0.55, 0.15, 0.14),
-    (0.16, 0.30, 0.24),
-    (0.18, 0.24, 0.42),
-    (0.75, 0.60, 0.20),
-    (0.25, 0.25, 0.27),
-)
-_GLASS: tuple[Rgb, ...] = ((0.20, 0.26, 0.31), (0.24, 0.30, 0.34))
-_FRAMES: tuple[Rgb, ...] = (
-    (0.90, 0.90, 0.88),
-    (0.88, 0.87, 0.82),
-    (0.34, 0.27, 0.21),
-    (0.30, 0.32, 0.34),
-)
-_MATERIALS: Mapping[str, Rgb] = {
-    "brick": _BRICK,
-    "concrete": (0.66, 0.66, 0.64),
-    "glass": (0.45, 0.55, 0.62),
-    "metal": (0.62, 0.64, 0.66),
-    "plaster": (0.86, 0.80, 0.66),
-    "stone": (0.70, 0.65, 0.56),
-    "sandstone": (0.76, 0.66, 0.50),
-    "wood": (0.52, 0.38, 0.26),
-    "timber_framing": (0.80, 0.74, 0.64),
-    "roof_tiles": (0.55, 0.30, 0.24),
-    "slate": (0.34, 0.36, 0.39),
-    "copper": (0.40, 0.58, 0.50),
-    "tar_paper": (0.30, 0.30, 0.31),
-    "grass": (0.38, 0.50, 0.28),
-    "thatch": (0.55, 0.46, 0.32),
-}
 # A house is old if built before the first year, and new if after the second.
 _OLD, _NEW = 1930, 1965
 # Range of storey heights that a tag's levels may lead to [m].
@@ -192,19 +89,6 @@ class Style:
     by_tag: frozenset[str]
 
 
-# Use -> storey, pitch, width and height of windows, least and greatest [m].
-_SIZES = {
-    Use.HOUSE: ((2.7, 3.0), (2.6, 3.4), (1.0, 1.4), (1.2, 1.5)),
-    Use.FLATS: ((2.9, 3.3), (2.3, 3.0), (1.0, 1.4), (1.4, 1.8)),
-    Use.OFFICE: ((3.3, 3.8), (2.2, 3.0), (1.4, 2.1), (1.6, 2.0)),
-    Use.RETAIL: ((3.2, 3.8), (2.6, 3.4), (1.3, 2.0), (1.4, 1.8)),
-    Use.PUBLIC: ((3.4, 4.0), (2.8, 3.6), (1.3, 1.8), (1.8, 2.2)),
-    Use.INDUSTRIAL: ((4.0, 5.0), (4.0, 6.0), (2.0, 3.4), (1.0, 1.4)),
-    Use.CHURCH: ((7.0, 9.0), (3.6, 4.6), (1.1, 1.5), (3.4, 4.6)),
-    Use.SHED: ((2.6, 2.8), (3.4, 4.4), (0.8, 1.0), (0.7, 0.9)),
-}
-
-
 def building_use(
     tags: Mapping[str, str], area: float, height: float
 ) -> tuple[Use, bool]:
@@ -221,9 +105,9 @@ def building_use(
     if "office" in tags:
         words.append("office")
     found = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
-    for use, names in _USES:
-        if found & set(names.split()):
-            return use, True
+    for use, look in _LOOKS["uses"].items():
+        if found & set(look["words"].split()):
+            return Use(use), True
     if area < _SMALL and height < 4.0:
         return Use.SHED, False
     if area < _LARGE_HOUSE and height < _HIGH_HOUSE:
@@ -244,7 +128,8 @@ def tagged_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
                 continue
             return red, green, blue
     material = tags.get(f"{part}:material", "").strip().lower()
-    return _MATERIALS.get(material)
+    rgb = _LOOKS["materials"].get(material)
+    return None if rgb is None else (rgb[0], rgb[1], rgb[2])
 
 
 def make_style(
@@ -267,13 +152,13 @@ def make_style(
     """
     use, is_tagged = building_use(tags, area, height)
     by_tag = {"use"} if is_tagged else set()
-    storeys, pitches, widths, tall = _SIZES[use]
+    look = _LOOKS["uses"][use.value]
     storey, pitch, width, window = (
-        float(rng.uniform(*limits))
-        for limits in (storeys, pitches, widths, tall)
+        float(rng.uniform(*look[size]))
+        for size in ("storey", "pitch", "width", "height")
     )
-    drawn_wall = pick(rng, _WALLS[use])
-    drawn_roof = pick(rng, _FELTS if is_flat else _TILES)
+    drawn_wall = _colour(rng, *look["walls"].split())
+    drawn_roof = _colour(rng, "felts" if is_flat else "tiles")
     tint = float(rng.uniform(0.92, 1.06))
     is_old = float(rng.random()) < 0.6
     if year is not None:
@@ -307,11 +192,11 @@ def make_style(
         depth=0.22 if is_old else 0.14,
         wall=wall,
         roof=roof or drawn_roof,
-        glass=pick(rng, _GLASS),
-        frame=pick(rng, _FRAMES),
+        glass=_colour(rng, "glass"),
+        frame=_colour(rng, "frames"),
         trim=_tinted(wall, 1.16 if is_old else 0.82),
-        door=pick(rng, _DOORS),
-        sign=pick(rng, _SIGNS),
+        door=_colour(rng, "doors"),
+        sign=_colour(rng, "signs"),
         shops=bool(shops),
         balconies=bool(
             use is Use.FLATS and numbered >= 3 and chances[1] < 0.45
@@ -333,3 +218,11 @@ def _cornice(use: Use, is_flat: bool, is_old: bool, chance: float) -> float:
 def _tinted(rgb: Rgb, factor: float) -> Rgb:
     red, green, blue = np.clip(np.multiply(rgb, factor), 0.0, 1.0).round(3)
     return float(red), float(green), float(blue)
+
+
+def _colour(rng: np.random.Generator, *palettes: str) -> Rgb:
+    """Draws one of the colours of palettes."""
+    red, green, blue = pick(
+        rng, [rgb for name in palettes for rgb in _LOOKS["palettes"][name]]
+    )
+    return red, green, blue
