@@ -409,7 +409,7 @@ def _chosen_method(
     name: str, assignments: list[str] | None, height: float
 ) -> Method:
     from evaluation.methods import make_method
-    from evaluation.methods.own_file import load_method
+    from evaluation.methods.method import load_method
     from evaluation.study.chosen_methods import parse_setting
 
     parameters: dict[str, object] = {"sensor_height": height}

@@ -313,7 +313,9 @@ def hash_table_order(codes: np.ndarray) -> np.ndarray:
         # assigned last.
         first = np.empty(num_buckets, dtype=np.int64)
         first[buckets[::-1]] = np.arange(len(order))[::-1]
-        order = order[np.argsort(first[buckets], kind="stable")[::-1]]
+        # The last bucket leads, and in each its last element.
+        ranks = first[buckets] * len(order) + np.arange(len(order))
+        order = order[np.argsort(ranks)[::-1]]
         if len(order) == len(codes):
             break
     return order

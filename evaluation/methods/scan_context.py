@@ -17,9 +17,9 @@ code for), and so are those of their C++ program with `variant: polar`,
 heights). Deliberate differences:
 
 - Voxels of the thinning are counted from the sensor. The T-RO program leaves
-that to MATLAB, the C++ program to its caller. - The sensor's height is a
-parameter, 1.6 m for CNS, instead of 1.9 or 2 m. - One T-RO function adds up the
-shifts that it tries; its corrected twin is
+  that to MATLAB, the C++ program to its caller.
+- The sensor's height is a parameter, 1.6 m for CNS, instead of 1.9 or 2 m.
+- One T-RO function adds up the shifts that it tries; its corrected twin is
   followed.
 - A cell may hold more than 500 points.
 - Two scans without a column in common have no score.
@@ -262,12 +262,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         half = _round_half_up(0.5 * self.config.search_ratio * num_columns)
         window = np.arange(-half, half + 1)
         shifts = (first[:, None] + window) % num_columns
-        cosines = np.einsum(
-            "rj,crk->cjk",
-            columns[0],
-            database.columns[chosen],
-            optimize=True,
-        )
+        cosines = columns[0].T @ database.columns[chosen]
         column = np.arange(num_columns)
         partner = (column - shifts[:, :, None]) % num_columns
         row = np.arange(len(chosen))[:, None, None]
@@ -376,13 +371,12 @@ def _key_shift(key: np.ndarray, others: np.ndarray) -> np.ndarray:
         others: (C, columns).
 
     Returns:
-        (C,) the s that minimises |key - roll(other, s)|; the lowest of
-        equal ones.
+        (C,) the s that minimises |key - roll(other, s)|, which is the one that
+        maximises their product; the lowest of equal ones.
     """
     column = np.arange(len(key))
-    rolled = others[:, (column - column[:, None]) % len(key)]
-    distances = ((key - rolled) ** 2).sum(axis=2)
-    return distances.argmin(axis=1)
+    rolled = key[(column + column[:, None]) % len(key)]
+    return (others @ rolled.T).argmax(axis=1)
 
 
 def _round_half_up(value: float) -> int:

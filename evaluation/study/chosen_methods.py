@@ -15,7 +15,7 @@ from evaluation.methods import (
     optional_methods,
     shipped_methods,
 )
-from evaluation.methods.own_file import load_method
+from evaluation.methods.method import load_method
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]

@@ -12,7 +12,7 @@ from cns_drake.scene import foreign_meshes
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.methods import method
-from evaluation.methods.own_file import load_method
+from evaluation.methods.method import load_method
 
 
 def rows():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evaluation.methods import method
-from evaluation.methods.own_file import load_method
+from evaluation.methods.method import load_method
 
 
 def shown_method(folder):
