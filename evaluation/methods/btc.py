@@ -83,8 +83,8 @@ class BtcConfig(MethodConfig):
             [O] 0.01.
         merge_normal_limit: difference of two normals below which two planes
             may be one; [O] 0.1.
-        merge_distance_limit: likewise, of the centres from the other plane
-            [m]; [O] 0.3.
+        merge_distance_limit: likewise, distance of each centre from the other
+            plane [m]; [O] 0.3.
         image_axes: whether keypoints are placed as by the public program,
             whose second axis leaves the plane by a wrong term (see
             `btc_keypoints.image_axes`), or by orthogonal axes. [P] public.
@@ -110,7 +110,8 @@ class BtcConfig(MethodConfig):
         min_votes: matches that a candidate needs; [P] 5.
         candidates: places with most votes that are verified; [O] 50.
         normal_limit: difference of the normals of planes that fit; [O] 0.2.
-        distance_limit: likewise, of the center from the plane [m]; [O] 0.5.
+        distance_limit: likewise, distance of the centre from the plane [m];
+            [O] 0.5.
     """
 
     voxel_size: PositiveFloat = 2.0
@@ -147,7 +148,7 @@ class BtcDescription:
 
     Attributes:
         planes: patches, one a voxel.
-        triangles: of its keypoints.
+        triangles: between its keypoints.
     """
 
     planes: Planes
@@ -373,7 +374,8 @@ def plane_overlap(
         place_centers: tree of the centers of the latter.
         X_PQ: (4, 4) the query's frame in that of the place.
         normal_limit: upper limit of the difference of the two normals.
-        distance_limit: of the center from the other's plane [m].
+        distance_limit: upper limit of a center's distance from the other's
+            plane [m].
     """
     centers = poses.transform(X_PQ, query.centers)
     normals = query.normals @ X_PQ[:3, :3].T

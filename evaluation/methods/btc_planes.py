@@ -89,9 +89,9 @@ def base_plane(
     the merged ones merged once more, the largest first.
 
     Args:
-        planes: of the voxels.
+        planes: patches of the voxels.
         normal_limit: difference of the normals of patches that are alike.
-        distance_limit: of each center from the other's plane [m].
+        distance_limit: distance of each center from the other's plane [m].
 
     Returns:
         Its center (3,) and normal (3,), pointing up; None without alike

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import itertools
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -59,8 +60,7 @@ class Keypoints:
         return len(self.heights)
 
 
-@dataclass(frozen=True)
-class HeightImage:
+class HeightImage(NamedTuple):
     """A cloud seen along the normal of a plane.
 
     Attributes:
@@ -103,11 +103,11 @@ def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
     return np.stack([across / np.linalg.norm(across), along, normal])
 
 
+@compiled
 def height_image(
     points: np.ndarray,
     center: np.ndarray,
     axes: np.ndarray,
-    *,
     resolution: float,
     height_range: tuple[float, float],
     height_step: float,
@@ -120,24 +120,58 @@ def height_image(
     Args:
         points: (N, 3) [m].
         center: (3,) a point of the plane [m].
-        axes: (3, 3) of the image.
+        axes: (3, 3) directions of the image, one a row.
         resolution: length of a cell [m].
         height_range: limits of the heights above the plane [m].
-        height_step: of the layers of height [m].
+        height_step: thickness of the layers of height [m].
         num_layers: how many layers; points above them only count for the
             means.
     """
-    return HeightImage(
-        *_draw(
-            points,
-            center,
-            axes,
-            resolution,
-            height_range,
-            height_step,
-            num_layers,
-        )
-    )
+    # Rows, columns and heights of the points between the limits.
+    near = np.empty((len(points), 3))
+    num_near = 0
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for i in range(len(points)):
+        x = points[i, 0] - center[0]
+        y = points[i, 1] - center[1]
+        z = points[i, 2] - center[2]
+        height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+        if height_range[0] <= height <= height_range[1]:
+            # On the plane: the other axes need not be orthogonal to it.
+            x -= height * axes[2, 0]
+            y -= height * axes[2, 1]
+            z -= height * axes[2, 2]
+            for axis in range(2):
+                place = (
+                    axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
+                )
+                near[num_near, axis] = place
+                low[axis] = min(low[axis], place)
+                high[axis] = max(high[axis], place)
+            near[num_near, 2] = height
+            num_near += 1
+    shape = (_SEGMENT, _SEGMENT)
+    if num_near < _MIN_POINTS:
+        num_near = 0
+    else:
+        rows = int((high[0] - low[0]) / resolution) // _SEGMENT + 2
+        columns = int((high[1] - low[1]) / resolution) // _SEGMENT + 2
+        shape = (rows * _SEGMENT, columns * _SEGMENT)
+    heights = np.zeros(shape, dtype=np.int64)
+    counts = np.zeros(shape)
+    means = np.zeros((shape[0], shape[1], 2))
+    for i in range(num_near):
+        row = int((near[i, 0] - low[0]) / resolution)
+        column = int((near[i, 1] - low[1]) / resolution)
+        layer = int((near[i, 2] - height_range[0]) / height_step)
+        if layer < num_layers:
+            heights[row, column] |= 1 << layer
+        counts[row, column] += 1.0
+        means[row, column, 0] += near[i, 0]
+        means[row, column, 1] += near[i, 1]
+    # Without points, 0 / 0 is NaN.
+    means /= counts.reshape(shape[0], shape[1], 1)
+    return HeightImage(heights, means)
 
 
 def peaks(
@@ -189,7 +223,7 @@ def find_keypoints(
     """Returns the peaks of an image, as places on its plane.
 
     Args:
-        image: of a cloud.
+        image: cloud seen along the normal.
         center: (3,) with which the image was drawn [m].
         axes: (3, 3) likewise.
         min_heights: that a keypoint needs.
@@ -208,7 +242,7 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
 
     Args:
         keypoints: all.
-        radius: of the neighbourhood [m].
+        radius: distance that is nearby [m].
         max_number: greatest number of kept ones, those with most heights.
     """
     tree = cKDTree(keypoints.positions)
@@ -236,63 +270,6 @@ def count_bits(words: np.ndarray) -> np.ndarray:
     words = (words & 0x3333333333333333) + ((words >> 2) & 0x3333333333333333)
     words = (words + (words >> 4)) & 0x0F0F0F0F0F0F0F0F
     return (words * 0x0101010101010101) >> 56
-
-
-@compiled
-def _draw(
-    points: np.ndarray,
-    center: np.ndarray,
-    axes: np.ndarray,
-    resolution: float,
-    height_range: tuple[float, float],
-    height_step: float,
-    num_layers: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns heights and means as of a `HeightImage`; see `height_image`."""
-    # Rows, columns and heights of the points between the limits.
-    near = np.empty((len(points), 3))
-    num_near = 0
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for i in range(len(points)):
-        x = points[i, 0] - center[0]
-        y = points[i, 1] - center[1]
-        z = points[i, 2] - center[2]
-        height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
-        if height_range[0] <= height <= height_range[1]:
-            # On the plane: the other axes need not be orthogonal to it.
-            x -= height * axes[2, 0]
-            y -= height * axes[2, 1]
-            z -= height * axes[2, 2]
-            for axis in range(2):
-                place = (
-                    axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
-                )
-                near[num_near, axis] = place
-                low[axis] = min(low[axis], place)
-                high[axis] = max(high[axis], place)
-            near[num_near, 2] = height
-            num_near += 1
-    shape = (_SEGMENT, _SEGMENT)
-    if num_near < _MIN_POINTS:
-        num_near = 0
-    else:
-        rows = int((high[0] - low[0]) / resolution) // _SEGMENT + 2
-        columns = int((high[1] - low[1]) / resolution) // _SEGMENT + 2
-        shape = (rows * _SEGMENT, columns * _SEGMENT)
-    heights = np.zeros(shape, dtype=np.int64)
-    counts = np.zeros(shape)
-    means = np.zeros((shape[0], shape[1], 2))
-    for i in range(num_near):
-        row = int((near[i, 0] - low[0]) / resolution)
-        column = int((near[i, 1] - low[1]) / resolution)
-        layer = int((near[i, 2] - height_range[0]) / height_step)
-        if layer < num_layers:
-            heights[row, column] |= 1 << layer
-        counts[row, column] += 1.0
-        means[row, column, 0] += near[i, 0]
-        means[row, column, 1] += near[i, 1]
-    # Without points, 0 / 0 is NaN.
-    return heights, means / counts.reshape(shape[0], shape[1], 1)
 
 
 @dataclass(frozen=True)
@@ -333,7 +310,7 @@ class TriangleTable:
         triangles: T of them.
         clouds: (T,) number of each triangle's cloud.
         resolution: length that is one unit of the sides [m].
-        tree: of the sides [m].
+        tree: search tree over the sides [m].
     """
 
     triangles: Triangles

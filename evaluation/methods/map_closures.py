@@ -57,7 +57,7 @@ class MapClosuresDatabase:
 
     Attributes:
         num_places: local maps that queries may find.
-        program: of the package, which keeps all of them.
+        program: the package's, which keeps all of them.
         num_queries: number of queries that have joined them.
         query: the last one.
         found: place -> inliers and pose X_PQ (4, 4) of the last one.

@@ -27,8 +27,8 @@ class MethodConfig(BaseModel):
     """Parameters of a method; each default has its source.
 
     Attributes:
-        sensor_height: of the LiDAR above the ground [m]. Default: the mount
-            of the CNS vehicle.
+        sensor_height: height of the LiDAR above the ground [m]. Default: the
+            mount of the CNS vehicle.
 
     Example:
         from evaluation import MethodConfig
@@ -119,7 +119,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         Args:
             query: made by `describe`.
-            database: of D places.
+            database: D places.
             exhaustive: compare also with places that a search would skip only
                 to save time.
 
@@ -138,7 +138,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Compares the last of some queries, for methods that match drives.
 
         Args:
-            queries: of a drive, from its first to the present one.
+            queries: those of a drive, from its first to the present one.
             database: see `score`.
             exhaustive: see `score`.
 

@@ -194,7 +194,8 @@ def coarse_maps(
         cells: (M,) uint16, see `layer_cells`.
         starts: (layers + 1,) where layers begin.
         turns: (H, 2) int64 by which the cells are turned about the sensor.
-        halvings: of the number of rows and columns; at least 2.
+        halvings: how often the number of rows and columns is halved; at
+            least 2.
         maps: (layers,) int64, in which map each layer is drawn.
 
     Returns:

@@ -206,7 +206,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         Args:
             weighted: see `_weigh`.
             turned: returns the spectrum of the query's map at a heading.
-            database: of the places.
+            database: the places.
             place: which of them.
         """
         num_cells = self.config.cells

@@ -118,7 +118,7 @@ class ContextDatabase:
         filled: (M, columns) float64, 1 where a column is not all zero.
         aligning_keys: (M, columns).
         places: (M,) place of each context.
-        tree: of the retrieval keys.
+        tree: search tree over the retrieval keys.
         num_places: D.
     """
 
@@ -342,7 +342,7 @@ def _highest(
     Args:
         heights: (N,) [m].
         cells: (N,) number of each point's cell.
-        shape: of the result.
+        shape: rows and columns of the result.
         min_points: that a cell needs.
         floor: what a filled cell holds at least.
     """
