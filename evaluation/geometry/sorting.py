@@ -22,27 +22,6 @@ def stable_order(numbers: np.ndarray) -> np.ndarray:
     return np.sort(numbers * count + np.arange(count)) % count
 
 
-def sort_into_grid(
-    places: np.ndarray, shape: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Sorts points by the cell of a grid that they are in.
-
-    Cells are numbered along x, then y, then z; points of one cell keep their
-    order.
-
-    Args:
-        places: (N, 3) int64 cells of the points, inside the grid.
-        shape: (3,) numbers of cells.
-
-    Returns:
-        The order (N,) that sorts the points, and where in it each cell starts;
-        the last entry is N.
-    """
-    cells = np.ravel_multi_index(tuple(places.T), tuple(shape))
-    counts = np.bincount(cells, minlength=int(np.prod(shape)))
-    return stable_order(cells), np.concatenate([[0], np.cumsum(counts)])
-
-
 def cell_order(indices: np.ndarray) -> np.ndarray:
     """Returns the order (N,) that sorts cells along x, then y, then z.
 

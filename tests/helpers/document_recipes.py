@@ -583,8 +583,6 @@ NOT_RUN = {
     "test_fields compares the pages with what is there",
     "cns-drake import neukolln": "needs a file that is not shipped",
     "cns-drake reproduce neukolln": "needs that import",
-    "cns-drake import helsinki": "needs another such file",
-    "cns-drake reproduce helsinki": "needs the import of that file",
     "python docs/weather_pictures.py": "renders shipped cities, for minutes",
     "python docs/noise_figures.py": "runs many drives, for minutes",
     "mkdocs serve": "a server, which does not end; test_site builds the site",
