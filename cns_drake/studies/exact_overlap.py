@@ -35,10 +35,10 @@ class VisibleSurfaces:
     """The surfaces that a LiDAR sees from a place of a simulated drive.
 
     Attributes:
-        scene: of the world as it was then.
+        scene: the world as it was then.
         X_WS: pose of the sensor.
-        pattern: of its beams.
-        coverage: of their directions.
+        pattern: the pattern of its beams.
+        coverage: what their directions cover.
         max_range: greatest coordinate of a point in the sensor's frame [m].
     """
 

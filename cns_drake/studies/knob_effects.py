@@ -45,7 +45,7 @@ class Effect:
     """A pair of drives with one of the knobs taken back.
 
     Attributes:
-        title: of the variant.
+        title: the title of the variant.
         points: a point for each method.
     """
 

@@ -85,7 +85,7 @@ def climb_ladder(
         cluster: where the work is done.
         methods: the methods to measure.
         extent: the part of the ladder.
-        protocol: of place recognition; its gate does not matter.
+        protocol: that of place recognition; its gate does not matter.
         on_note: receives notes on things that a map lacks.
 
     Returns:
@@ -285,7 +285,7 @@ def distracting_drives(
     Args:
         query: a drive through the city whose places are not to stand among
             these; its LiDARs measure the others, too.
-        number: of places.
+        number: the number of places.
         spacing: between two places [m].
         output: folder for redrawn cities.
         cluster: where these are drawn.

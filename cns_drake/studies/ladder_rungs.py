@@ -138,7 +138,7 @@ def plain_drives(scenario: Scenario) -> RungDrives:
     """Returns the drives without a change: one route, one city.
 
     Args:
-        scenario: of the query.
+        scenario: the drive of the query.
     """
     database = scenario.model_copy(update={"name": f"{scenario.name}_database"})
     return RungDrives(_mapped_from(database, _AHEAD, _LEFT, 0.0), scenario)
@@ -152,7 +152,7 @@ def changed_drives(
     Args:
         plain: drives without a change.
         strengths: cause -> its strength.
-        seed: of random draws.
+        seed: the seed of random draws.
     """
     drives = plain
     # The order is fixed, since returns depend on the sensor.
@@ -271,7 +271,7 @@ class Rung:
     Attributes:
         cause: one of `CAUSES`.
         level: from 1 to 4; 0 for `none`.
-        seed: of random draws.
+        seed: the seed of random draws.
         strength: in words.
         drives: to simulate.
     """
@@ -301,7 +301,7 @@ class Extent:
         causes: some of `CAUSES`, without `none`, which is always there.
         levels: from 1 to 4. A cause that lacks one gets its nearest lower
             level.
-        seeds: of random draws.
+        seeds: the seeds of random draws.
         most_places: most places of other cities.
         strengths: cause -> level -> strength; construction's are the map's
             stages.
@@ -322,8 +322,8 @@ def plan_rungs(
     """Returns the rungs of a ladder, `none` first, and notes on missing ones.
 
     Args:
-        scenario: of the query, through a stage of a map.
-        extent: of the ladder.
+        scenario: the drive of the query, through a stage of a map.
+        extent: the part of the ladder.
 
     Raises:
         InputError: the map's roads cannot be used.

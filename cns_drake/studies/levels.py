@@ -54,7 +54,7 @@ class LevelResult:
     """A method on a level of a map.
 
     Attributes:
-        map_name: of the city.
+        map_name: the name of the city.
         level: from 0 to 4.
         method: its name.
         is_gated: whether the gate was used (the method had the radius).
@@ -96,7 +96,7 @@ def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
     Args:
         files: tables like `ladder.csv`, of one or several methods. Other rungs
             than levels are ignored.
-        levels: of the benchmark.
+        levels: the levels of the benchmark.
 
     Raises:
         InputError: a table cannot be read; a method lacks a level of a map, was

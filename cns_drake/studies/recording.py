@@ -129,7 +129,7 @@ class Record(Step):
         folder: the folder of recordings.
         overwrite: replace another recording of that name.
         page: file of the page, if any.
-        survey: of the recording, made during the simulation. After an
+        survey: surveys the recording, made during the simulation. After an
             interruption, the step that needs the survey makes it.
     """
 
@@ -227,7 +227,7 @@ def is_recorded(scenario: Scenario, folder: Path) -> bool:
     It must be of the present world, roads and program.
 
     Args:
-        scenario: of the recording.
+        scenario: the scenario of the recording.
         folder: the folder of recordings.
 
     Raises:

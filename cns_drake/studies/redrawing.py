@@ -49,7 +49,7 @@ def redraw_cities(
     Args:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city.
-        seeds: of the cities.
+        seeds: the seed of each city.
         output: the folder of cities; created if need be.
         cluster: where.
 
@@ -86,7 +86,7 @@ class RedrawCity(Step):
     Attributes:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city.
-        seed: of the city.
+        seed: the seed of the city.
         folder: the map folder to write; an older redrawn city of this name is
             replaced, anything else is refused.
     """
@@ -152,7 +152,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city. The map's own
             stages name structures that another draw need not have.
-        seed: of the city.
+        seed: the seed of the city.
 
     Returns:
         Name -> content of `roads.yaml`, which is the map's own, `city.yaml`

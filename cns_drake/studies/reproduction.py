@@ -65,7 +65,7 @@ def reproduce_maps(
         quick: make only the report, of the same frames: drives that are not
             recorded yet are evaluated while they are simulated, and not
             recorded.
-        protocol: of place recognition.
+        protocol: that of place recognition.
         settings: see `choose_methods`.
         with_costs: measure the costs of methods, too.
         on_note: receives notes on cities without drives to compare.
@@ -188,7 +188,7 @@ def recording_info(
     """Returns the description of a recording before it is made.
 
     Args:
-        scenario: of a map.
+        scenario: a drive through a map.
         output: the folder of recordings.
         is_waiting: whether the recording's job has to be done first.
     """

@@ -70,8 +70,8 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
     """Returns name and value of a setting, the text after `--set`.
 
     Args:
-        text: of the setting; commas separate several values.
-        form: of the text, for the error message.
+        text: the setting; commas separate several values.
+        form: what the text should be, for the error message.
 
     Raises:
         InputError: if it has no name or no equals sign.

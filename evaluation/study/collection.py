@@ -22,10 +22,10 @@ class RecordingInfo:
     """A recording that exists or will be made, and its place in a study.
 
     Attributes:
-        name: of the recording.
-        path: of the recording, which may not exist yet.
-        map_name: of the city.
-        stage: of the city's life; stages sort by name.
+        name: the name of the recording.
+        path: its file or folder, which may not exist yet.
+        map_name: the name of the city.
+        stage: the stage of the city's life; stages sort by name.
         way: where the drive leads (see `driven_way`); None if it is unknown.
         needs: names of the jobs that make the recording.
         made_by: opens the drive if it is not read from `path`.
@@ -54,7 +54,7 @@ class City:
     """The drives through one map.
 
     Attributes:
-        name: of the map.
+        name: the name of the map.
         stages: one recording a stage, by stage: `<map>_<stage>`.
         others: further drives through one of the stages, which may serve as
             controls.
@@ -137,7 +137,7 @@ def find_recordings(
     out.
 
     Args:
-        folder: of the recordings.
+        folder: the folder of the recordings.
         on_note: gets a note on each recording that is left out.
         lidar: name of the LiDAR, for recordings with several.
 
@@ -180,7 +180,7 @@ def group_cities(
     """Returns the cities of recordings, by name.
 
     Args:
-        recordings: of any cities.
+        recordings: drives through any cities.
         reference: names the pairs that are compared both ways.
 
     Raises:

@@ -78,8 +78,8 @@ def find_evidence(
     Args:
         database: the drive of the places.
         query: the drive of the queries, in the same world frame.
-        results: of one method or several on the two.
-        protocol: of these results.
+        results: what one method or several found on the two.
+        protocol: that of these results.
         track: reports progress.
 
     Raises:
@@ -230,7 +230,7 @@ def _change(
     Args:
         place: scan of the right place of the query.
         query: its own scan.
-        classes: of the structures, by instance.
+        classes: instance -> class of the structure.
     """
     changed: Counter[str] = Counter()
     total = 0

@@ -166,7 +166,7 @@ def auc_illustration(folder: Path, beside: str = "") -> Illustration:
     """Returns the figure of all cities together.
 
     Args:
-        folder: of figures.
+        folder: the folder of figures.
         beside: title of the reference in the figure; empty for none.
     """
     others = f", and of {beside}" if beside else ""

@@ -77,7 +77,7 @@ def plan_study(
             controls.
         output: folder to write.
         methods: by default those of this package.
-        protocol: of place recognition.
+        protocol: that of place recognition.
         with_costs: whether to measure the costs of the methods, too, after all
             other jobs.
         reference: published numbers beside those of the report.
@@ -125,7 +125,7 @@ def write_report(
         cluster: where the work is done.
         own_methods: Python files with one method each, to run besides those
             of this package.
-        protocol: of place recognition.
+        protocol: that of place recognition.
         on_note: gets notes on recordings that are left out, and on cities
             without a pair to compare.
         settings: see `choose_methods`.

@@ -53,7 +53,7 @@ def measure_rung(
             are added to the database.
         num_distractors: number of these places.
         methods: to run.
-        protocol: of place recognition.
+        protocol: that of place recognition.
     """
     place_scans, places = _describe(
         database, "places", methods, protocol, reporter

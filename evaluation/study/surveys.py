@@ -65,7 +65,7 @@ class RecordedDrive:
     """A drive on disk, in any format that can be read.
 
     Attributes:
-        path: of the drive.
+        path: the file or folder of the drive.
         lidar: name of the LiDAR, for a drive with several.
     """
 
@@ -163,7 +163,7 @@ def survey_recording(
 
     Args:
         recording: the drive.
-        roles: of the drive in place recognition; may be empty.
+        roles: the roles of the drive in place recognition; may be empty.
         methods: that describe it; may be none.
         protocol: sets the places and queries.
         track: reports progress.
@@ -394,7 +394,7 @@ def describe(
 
     Args:
         source: opens the drive.
-        role: of the drive.
+        role: the role of the drive.
         methods: that describe it.
         protocol: where it has places and queries.
         reporter: takes the progress.

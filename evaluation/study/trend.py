@@ -78,7 +78,7 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
     A second panel shows the kept share of AUC, if databases have controls.
 
     Args:
-        points: of all databases and methods.
+        points: those of all databases and methods.
         stem: path to write, without ending.
     """
     survives = any(not math.isnan(point.kept) for point in points)

@@ -48,8 +48,8 @@ class TrendPoint:
         auc, auc_low, auc_high: with its 95 % interval over queries.
         recall_at_1: over queries with a match.
         queries, with_match: numbers of queries, and of those with a match.
-        protocol: of place recognition.
-        auc_unchanged: of the database's control; NaN without one.
+        protocol: that of place recognition.
+        auc_unchanged: that of the database's control; NaN without one.
     """
 
     database: str
@@ -110,7 +110,7 @@ def measure_trend(
         cluster: where the work is done.
         own_methods: Python files with one method each, to run besides those
             of this package.
-        protocol: of place recognition.
+        protocol: that of place recognition.
         controls: drives on the routes of databases through the stage of the
             query; each serves the databases whose route it has.
         lidar: name of the LiDAR, for recordings with several.
@@ -183,7 +183,7 @@ def measure_drives(
         output: folder for intermediate results, made if needed.
         cluster: where the work is done.
         methods: to run.
-        protocol: of place recognition.
+        protocol: that of place recognition.
 
     Raises:
         InputError: see `measure_trend`.
@@ -245,7 +245,7 @@ def measure_database(
         surveyed: the `SurveyedDrive` of the query drive.
         described: each method's descriptions of the query drive.
         methods: to run.
-        protocol: of place recognition.
+        protocol: that of place recognition.
     """
     running = [method.make() for method in methods]
     database = survey_recording(

@@ -33,7 +33,7 @@ class Workers(Protocol):
         Args:
             name: the job's name.
             job: see `run_process`.
-            priority: of several jobs that wait, the one with the highest comes
+            priority: among jobs that wait, the one with the highest comes
                 first.
         """
 

@@ -147,7 +147,7 @@ def work(name: str, job: bytes, topic: str) -> None:
     """Runs a job; what a worker of Dask does.
 
     Args:
-        name: of the job.
+        name: the name of the job.
         job: see `run_process`.
         topic: the Dask topic of the job's messages.
 
