@@ -162,7 +162,7 @@ class DriveSimulation:
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
-            "code": code_digest(__name__),
+            "code": code_digest(__name__, without=("cns_drake.pictures",)),
         }
 
 
