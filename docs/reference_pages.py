@@ -21,7 +21,7 @@ import typer
 
 from cns_drake.city.plan import city_plan, stages
 from cns_drake.command_line import cli
-from cns_drake.roads import road_schema
+from cns_drake.roads import road
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.scenarios import variation
@@ -57,10 +57,10 @@ FAMILY: Sections = {
     "Routes at random": variation.DrawnRoutes,
 }
 CITY: Sections = {
-    "roads.yaml": road_schema.RoadsFile,
-    "A road's style": road_schema.RoadStyle,
-    "A road": road_schema.RoadEntry,
-    "A junction": road_schema.JunctionEntry,
+    "roads.yaml": road.RoadsFile,
+    "A road's style": road.RoadStyle,
+    "A road": road.RoadEntry,
+    "A junction": road.JunctionEntry,
     "city.yaml": city_plan.CityPlan,
     "A district": city_plan.DistrictPlan,
     "A patch": city_plan.PatchPlan,
@@ -143,7 +143,7 @@ def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
     methods, is in the tables of those.
     """
     shared: dict[str, FieldInfo] = {}
-    for base in (road_schema.RoadStyle, MethodConfig):
+    for base in (road.RoadStyle, MethodConfig):
         if issubclass(model, base) and model is not base:
             shared |= base.model_fields
     fields = model.model_fields

@@ -18,8 +18,12 @@ from cns_drake.base.angles import wrapped
 from cns_drake.base.errors import InputError
 from cns_drake.roads import carriageway
 from cns_drake.roads.centreline import Centreline, blend
-from cns_drake.roads.road import DIRECTIONS, ENDS, End, LaneRef, Road
-from cns_drake.roads.road_schema import (
+from cns_drake.roads.road import (
+    DIRECTIONS,
+    ENDS,
+    End,
+    LaneRef,
+    Road,
     RoadEntry,
     RoadsFile,
     read_roads_file,

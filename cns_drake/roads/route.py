@@ -1,7 +1,8 @@
-"""A lane-level route over a road network, and the path that it describes."""
+"""Lane-level routes over a road network, and the paths that they describe."""
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from typing import Annotated
 
 import numpy as np
@@ -337,3 +338,84 @@ def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> np.ndarray:
             f"{way.outgoing.lane}: {rule}"
         )
     return way.points[1:-1]
+
+
+# Strength with which roads that were driven before are avoided.
+_WEIGHT_OF_NEW = 6.0
+
+
+def draw_route(
+    network: RoadNetwork, length: float, rng: np.random.Generator
+) -> Route:
+    """Draws a legal route that prefers roads that it has not seen yet.
+
+    Args:
+        network: the roads.
+        length: least length of the roads of the route [m].
+        rng: decides.
+
+    Raises:
+        InputError: the network has no route of any length.
+    """
+    successors = _successors(network)
+    if not successors:
+        raise InputError(
+            "roads: every lane comes to an end, so that no endless route exists"
+        )
+    lanes = sorted(successors)
+    lane = lanes[int(rng.integers(len(lanes)))]
+    visits: Counter[str] = Counter()
+    legs: list[tuple[LaneRef, int]] = []
+    driven = 0.0
+    while driven < length:
+        visits[lane.road] += 1
+        driven += network.roads[lane.road].length
+        choices = successors[lane]
+        weights = np.array(
+            [_WEIGHT_OF_NEW ** -visits[after.road] for _, after in choices]
+        )
+        chosen = int(rng.choice(len(choices), p=weights / weights.sum()))
+        exit_lane, after = choices[chosen]
+        legs.append((lane, exit_lane))
+        lane = after
+    # No road follows the last one, so the drive keeps its lane.
+    legs[-1] = (legs[-1][0], legs[-1][0].lane)
+    return Route([_leg(entry, exit_lane) for entry, exit_lane in legs])
+
+
+def _leg(entry: LaneRef, exit_lane: int) -> RouteLeg:
+    lane = entry.lane if exit_lane == entry.lane else (entry.lane, exit_lane)
+    return RouteLeg(road=entry.road, direction=entry.direction, lane=lane)
+
+
+def _successors(
+    network: RoadNetwork,
+) -> dict[LaneRef, list[tuple[int, LaneRef]]]:
+    """Returns for each lane its continuations: exit lane, next lane.
+
+    Lanes without an endless continuation are left out.
+    """
+    ways = defaultdict(list)
+    for junction in network.junctions:
+        for way in network.connections(junction):
+            ways[way.incoming].append(way.outgoing)
+    successors = {}
+    for lane in network.lanes():
+        road = network.roads[lane.road]
+        exits = range(lane.lane, lane.lane + 1)
+        if road.length > MIN_LANE_CHANGE_LENGTH:
+            exits = range(1, road.lanes[lane.direction] + 1)
+        successors[lane] = [
+            (number, after)
+            for number in exits
+            for after in sorted(ways[lane._replace(lane=number)])
+        ]
+    while True:
+        alive = {
+            lane: [way for way in choices if way[1] in successors]
+            for lane, choices in successors.items()
+            if any(way[1] in successors for way in choices)
+        }
+        if alive == successors:
+            return alive
+        successors = alive

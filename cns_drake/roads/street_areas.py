@@ -1,4 +1,4 @@
-"""The interface of streets to a city, for any source of streets."""
+"""Areas of streets, and heights of their surface."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 from shapely.geometry import MultiPolygon
+
+from cns_drake.roads.network import RoadNetwork
 
 
 class StreetAreas(Protocol):
@@ -40,3 +43,55 @@ class SurfaceHeights(Protocol):
     def heights(self, xy: ArrayLike) -> np.ndarray:
         """Returns the (N,) heights at (N, 2) places [m]."""
         ...
+
+
+# Distance of the places on the centrelines that are searched first [m].
+_SPACING = 0.5
+
+
+class RoadSurface:
+    """The height of the carriageway, continued to both sides of it.
+
+    A road is level across, so the height at a place is that of the nearest
+    point of a centreline. Away from the roads it steps where that point
+    changes from one road to another.
+    """
+
+    def __init__(self, network: RoadNetwork):
+        """Prepares the surface of a network."""
+        self._roads = list(network.roads.values())
+        places, owners, stations = [], [], []
+        for k, road in enumerate(self._roads):
+            count = int(np.ceil(road.full_length / _SPACING)) + 1
+            along = np.linspace(0.0, road.full_length, count)
+            places.append(road.evaluate(along))
+            owners.append(np.full(count, k))
+            stations.append(along)
+        self._places = np.concatenate(places)
+        self._owners = np.concatenate(owners)
+        self._stations = np.concatenate(stations)
+        self._tree = cKDTree(self._places[:, :2])
+
+    @property
+    def is_level(self) -> bool:
+        """Whether all roads lie at z = 0 throughout."""
+        return not self._places[:, 2].any()
+
+    def heights(self, xy: ArrayLike) -> np.ndarray:
+        """Returns the (N,) heights at (N, 2) places [m]."""
+        xy = np.asarray(xy, dtype=float).reshape(-1, 2)
+        _, index = self._tree.query(xy)
+        x, y, _, heading = self._places[index].T
+        ahead = (xy[:, 0] - x) * np.cos(heading) + (xy[:, 1] - y) * np.sin(
+            heading
+        )
+        # On the inside of a bend the tangent would lead past the neighbour.
+        ahead = np.clip(ahead, -_SPACING, _SPACING)
+        stations = self._stations[index] + ahead
+        z = np.empty(len(xy))
+        owners = self._owners[index]
+        for k in np.unique(owners):
+            chosen, road = owners == k, self._roads[k]
+            inside = np.clip(stations[chosen], 0.0, road.full_length)
+            z[chosen] = road.height(inside)
+        return z

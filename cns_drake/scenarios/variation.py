@@ -29,19 +29,11 @@ from pydantic import (
 import yaml
 
 from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import (
-    InputError,
-    describe_validation_error,
-)
-from cns_drake.base.files import (
-    complete_part,
-    user_errors,
-    write_part,
-)
+from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.files import complete_part, user_errors, write_part
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import Route
-from cns_drake.roads.route_drawing import draw_route
+from cns_drake.roads.route import Route, draw_route
 from cns_drake.scenarios.scenario import RideConfig, Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,

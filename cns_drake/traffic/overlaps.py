@@ -1,4 +1,4 @@
-"""Finds overlapping boxes, and the bodies to leave out so that none overlap."""
+"""Finds overlapping boxes."""
 
 from __future__ import annotations
 
@@ -65,22 +65,3 @@ def find_overlaps(
                     )
                 ):
                     found[i, j] = found[j, i] = True
-
-
-def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
-    """Returns the bodies to remove until none overlap, the most involved first.
-
-    Args:
-        overlaps: (N, N) symmetric bool.
-        kept: number of first bodies that always stay.
-    """
-    overlaps = overlaps.copy()
-    out: list[int] = []
-    while True:
-        involved = overlaps.sum(axis=0)
-        involved[:kept] = 0
-        worst = int(involved.argmax()) if len(involved) else 0
-        if not len(involved) or involved[worst] == 0:
-            return sorted(out)
-        out.append(worst)
-        overlaps[worst] = overlaps[:, worst] = False

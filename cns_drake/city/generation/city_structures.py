@@ -48,8 +48,11 @@ from cns_drake.city.placement.sidewalks import (
 )
 from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.road_surface import RoadSurface
-from cns_drake.roads.street_areas import StreetAreas, SurfaceHeights
+from cns_drake.roads.street_areas import (
+    RoadSurface,
+    StreetAreas,
+    SurfaceHeights,
+)
 
 
 @dataclass(frozen=True)

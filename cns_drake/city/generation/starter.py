@@ -24,7 +24,7 @@ from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.route_drawing import draw_route
+from cns_drake.roads.route import draw_route
 from cns_drake.roads.street_areas import StreetAreas
 
 # The world reaches this far beyond the roads [m].

@@ -25,8 +25,11 @@ from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
 from cns_drake.roads.centreline import sample_stations
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import ENDS, Direction, End, Road
-from cns_drake.roads.road_surface import RoadSurface
-from cns_drake.roads.street_areas import StreetAreas, SurfaceHeights
+from cns_drake.roads.street_areas import (
+    RoadSurface,
+    StreetAreas,
+    SurfaceHeights,
+)
 
 # Marks the structures that are ground: no stage lacks them.
 GROUND_TAG = "ground"

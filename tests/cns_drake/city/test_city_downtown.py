@@ -10,7 +10,7 @@ import shapely
 
 from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG, kerb_height
-from cns_drake.roads.road_surface import RoadSurface
+from cns_drake.roads.street_areas import RoadSurface
 
 pytestmark = pytest.mark.slow
 

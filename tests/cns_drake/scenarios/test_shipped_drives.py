@@ -8,7 +8,7 @@ from shapely import contains, distance, linestrings, points, polygons, prepare
 
 from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.road_surface import RoadSurface
+from cns_drake.roads.street_areas import RoadSurface
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario_files import make_scenario, map_folder
 from cns_drake.scenarios.shipped import shipped_drives

@@ -13,7 +13,6 @@ from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_adding import (
     connect_traffic,
     make_traffic,
@@ -21,7 +20,7 @@ from cns_drake.traffic.traffic_adding import (
     traffic_structures,
 )
 from cns_drake.traffic.traffic_motion import MOVING_SPEED, bodies_at
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
+from cns_drake.traffic.traffic_plan import WALKER_SIZE, Tracks, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS
 
 T = 2.0
