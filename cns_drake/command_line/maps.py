@@ -151,7 +151,7 @@ def import_city(
     undated: Annotated[
         Undated,
         typer.Option(help="First stage with the buildings that have no year."),
-    ] = Undated.FIRST,
+    ] = "first",
     lod: Annotated[
         float | None,
         typer.Option(

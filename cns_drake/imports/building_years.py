@@ -155,6 +155,6 @@ def stands_at(
         return False
     if year is not None:
         return year <= years[stage]
-    if undated is Undated.FIRST:
+    if undated == "first":
         return True
-    return undated is Undated.LAST and stage == len(years) - 1
+    return undated == "last" and stage == len(years) - 1

@@ -220,7 +220,7 @@ def _side(city: ForeignCity, options: ImportOptions) -> DriveOn:
     """Returns the side of the streets on which traffic keeps."""
     if options.drive_on is not None:
         return options.drive_on
-    return DriveOn.LEFT if city.keeps_left else DriveOn.RIGHT
+    return "left" if city.keeps_left else "right"
 
 
 def drive_along(path: Path) -> WaypointDrive:

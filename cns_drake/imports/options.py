@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
+from typing import Literal
 
+# The first stage that has the buildings without a year.
+Undated = Literal["first", "last", "never"]
+# The side of a street on which cars drive.
+DriveOn = Literal["right", "left"]
 _LONGEST = 100
 
 
@@ -57,21 +61,6 @@ def _printable(text: str) -> str:
     return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST - 3]}..."
 
 
-class Undated(str, Enum):
-    """The first stage that has the buildings without a year."""
-
-    FIRST = "first"
-    LAST = "last"
-    NEVER = "never"
-
-
-class DriveOn(str, Enum):
-    """The side of a street on which cars drive."""
-
-    RIGHT = "right"
-    LEFT = "left"
-
-
 @dataclass(frozen=True)
 class ImportOptions:
     """The options of an import.
@@ -94,7 +83,7 @@ class ImportOptions:
 
     years: tuple[int, ...] = ()
     year_attribute: str | None = None
-    undated: Undated = Undated.FIRST
+    undated: Undated = "first"
     lod: float | None = None
     seed: int = 0
     along: Path | None = None

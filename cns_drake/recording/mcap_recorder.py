@@ -221,7 +221,7 @@ class McapRecorder(LeafSystem):
         if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
             outgoing |= self._motion.messages(context, stamp_ns)
         if IMU_TOPIC.name in due or self._imu_samples is not None:
-            outgoing |= self._feel(context, tick, stamp_ns)
+            outgoing |= self._imu_messages(context, tick, stamp_ns)
         self._last_tick = tick
         for ports in self._scenery:
             if ports.due_topic.name in due:
@@ -232,7 +232,7 @@ class McapRecorder(LeafSystem):
                 self._write(topic, message, stamp_ns, number)
         return EventStatus.Succeeded()
 
-    def _feel(
+    def _imu_messages(
         self, context: Context, tick: int, stamp_ns: int
     ) -> dict[Topic, Any]:
         """Writes the IMU's samples of earlier ticks; returns that of this one.

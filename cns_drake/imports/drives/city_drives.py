@@ -255,7 +255,7 @@ class StreetGraph(WayGraph):
         ]
         self._ways = np.array([lane.way for lane in self.lanes], dtype=int)
         self._space = space
-        self._side = 1.0 if drive_on is DriveOn.RIGHT else -1.0
+        self._side = 1.0 if drive_on == "right" else -1.0
         lengths = np.array([lane.length for lane in self.lanes])
         super().__init__(lengths, *lane_links(self.lanes))
 

@@ -400,7 +400,7 @@ def lanes_of_streets(
             if line.dwithin(paths, 2.0 * _WITHIN)
         ]
     )
-    side = 1.0 if drive_on is DriveOn.RIGHT else -1.0
+    side = 1.0 if drive_on == "right" else -1.0
     traffic = StreetTraffic(near, set(walks.crossings), surface, side)
     free = _free(traffic, structures)
     outer = traffic.beside

@@ -14,7 +14,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import year_of_date
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.options import ImportOptions, Undated
+from cns_drake.imports.options import ImportOptions
 
 
 def run(*arguments):
@@ -200,10 +200,10 @@ def write_gone(path):
     ("undated", "first", "second", "third"),
     [
         # In 2000 the house of 1990 was there, and its predecessor was not.
-        (Undated.FIRST, "old razed was historic until",
+        ("first", "old razed was historic until",
          "old razed dated historic", "old new dated"),
-        (Undated.LAST, "was", "razed historic dated", "old new dated"),
-        (Undated.NEVER, "was", "dated", "dated"),
+        ("last", "was", "razed historic dated", "old new dated"),
+        ("never", "was", "dated", "dated"),
     ],
 )  # fmt: skip
 def test_demolished_buildings_without_a_date_stood_before_the_last_stage(

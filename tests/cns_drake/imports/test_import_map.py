@@ -17,7 +17,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.options import ImportOptions, Undated
+from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from evaluation.clouds.cloud_files import read_cloud
@@ -75,8 +75,8 @@ def test_stages_are_what_was_built_until_then(blocks):
 
 @pytest.mark.parametrize(
     ("undated", "numbers"),
-    [(Undated.FIRST, [12, 24, 36]), (Undated.LAST, [8, 20, 36]),
-     (Undated.NEVER, [8, 20, 32])],
+    [("first", [12, 24, 36]), ("last", [8, 20, 36]),
+     ("never", [8, 20, 32])],
 )  # fmt: skip
 def test_what_becomes_of_buildings_without_a_year(tmp_path, undated, numbers):
     source = write_blocks(tmp_path / "blocks.json")
@@ -269,8 +269,8 @@ def test_years_that_are_none_or_to_come_are_counted(tmp_path):
         )  # fmt: skip
     source = city.write(tmp_path / "city.json")
     for undated, more in (
-        (Undated.FIRST, set()),
-        (Undated.NEVER, {("building without a year, left out", 3, "house_0")}),
+        ("first", set()),
+        ("never", {("building without a year, left out", 3, "house_0")}),
     ):
         report = import_city(
             source,

@@ -19,7 +19,7 @@ from cns_drake.imports.openstreetmap.tags import (
     street_width,
     why_absent,
 )
-from cns_drake.imports.options import ImportFaults, Undated
+from cns_drake.imports.options import ImportFaults
 
 
 def read(path, year_attribute=None):
@@ -107,7 +107,7 @@ def test_only_buildings_lack_a_year(tmp_path):
     report = import_city(
         osm.write(tmp_path / "a.osm"),
         tmp_path / "town",
-        ImportOptions(years=(1980, 1995, 2020), undated=Undated.LAST),
+        ImportOptions(years=(1980, 1995, 2020), undated="last"),
     )
     assert report.undated == 1
     first, second, third = report.stages.values()
