@@ -298,7 +298,9 @@ def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
                 m.outcomes.one_percent_rank
             ),
             "mean_reciprocal_rank": lambda m: m.outcomes.mean_reciprocal_rank,
-            "recall_at_full_precision": lambda m: _full_precision(m.result),
+            "recall_at_full_precision": lambda m: (
+                m.result.metrics["all"].curve.recall_at_full_precision
+            ),
             "match_auroc": lambda m: m.outcomes.match_auroc,
             "pose_success": lambda m: m.result.outcome.pose.success,
             **keyed(
@@ -318,27 +320,30 @@ class _Metrics(NamedTuple):
     areas: Mapping[float, float]
 
 
+# Name in files -> value.
+_POSE_ERRORS: Columns[RecognitionResult] = {
+    "translation_median": lambda r: r.outcome.pose.translation_median,
+    "translation_90": lambda r: r.outcome.pose.translation_90,
+    "rotation_median_deg": lambda r: r.outcome.pose.rotation_median_deg,
+    "rotation_90_deg": lambda r: r.outcome.pose.rotation_90_deg,
+    "success": lambda r: r.outcome.pose.success,
+    "recall_at_100_precision": lambda r: (
+        r.metrics["all"].curve.recall_at_full_precision
+    ),
+}
+
+
 def pose_table(results: Sequence[RecognitionResult]) -> Table:
     """Returns the errors of estimated poses for print."""
+    names: list[str | tuple[str, str]] = [
+        *(("translation [m]", part) for part in ("median", "90 %")),
+        *(("rotation [deg]", part) for part in ("median", "90 %")),
+        "success",
+        "recall at full precision",
+    ]
     return Table.of(
         _by_pair_and_method(results),
-        {
-            **_SHOWN,
-            ("translation [m]", "median"): lambda r: (
-                r.outcome.pose.translation_median
-            ),
-            ("translation [m]", "90 %"): lambda r: (
-                r.outcome.pose.translation_90
-            ),
-            ("rotation [deg]", "median"): lambda r: (
-                r.outcome.pose.rotation_median_deg
-            ),
-            ("rotation [deg]", "90 %"): lambda r: (
-                r.outcome.pose.rotation_90_deg
-            ),
-            "success": lambda r: r.outcome.pose.success,
-            "recall at full precision": _full_precision,
-        },
+        {**_SHOWN, **dict(zip(names, _POSE_ERRORS.values(), strict=True))},
         _POSE_CAPTION,
     )
 
@@ -350,19 +355,10 @@ def pose_numbers(results: Sequence[RecognitionResult]) -> Table:
         {
             **_KEYS,
             "accepted_matches": lambda r: r.outcome.pose.num_accepted,
-            "translation_median": lambda r: r.outcome.pose.translation_median,
-            "translation_90": lambda r: r.outcome.pose.translation_90,
-            "rotation_median_deg": lambda r: r.outcome.pose.rotation_median_deg,
-            "rotation_90_deg": lambda r: r.outcome.pose.rotation_90_deg,
-            "success": lambda r: r.outcome.pose.success,
-            "recall_at_100_precision": _full_precision,
+            **_POSE_ERRORS,
             **_PROTOCOL,
         },
     )
-
-
-def _full_precision(result: RecognitionResult) -> float:
-    return result.metrics["all"].curve.recall_at_full_precision
 
 
 class _Faults(NamedTuple):
