@@ -15,7 +15,7 @@ from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     merge_surfaces,
 )
-from cns_drake.scene.surfaces import merge_triangles
+from cns_drake.scene.surfaces import TriangleSurface, merge_triangles
 
 # Vertices are put on an invisible grid of 4 mm: the zeros at the end of each
 # float compress well.
@@ -67,17 +67,11 @@ def draw_parts(
         surface, owners = merge_triangles(
             [(k, RigidTransform(), m.surface) for k, m in enumerate(members)]
         )
-        mesh_path = f"{path}/{semantic_class}"
-        vertices = _columns(_on_grid(surface.p_GVset))
-        triangles = _columns(surface.triangles, np.int32)
-        if rgba is not None:
-            meshcat.SetTriangleMesh(mesh_path, vertices, triangles, rgba)
-            continue
         rgb = np.zeros_like(surface.p_GVset)
         rgb[surface.triangles] = np.array([m.rgb for m in members])[
             owners, None
         ]
-        _draw_colored(meshcat, mesh_path, vertices, triangles, rgb)
+        _draw_mesh(meshcat, f"{path}/{semantic_class}", surface, rgba or rgb)
 
 
 def draw_body(
@@ -89,12 +83,8 @@ def draw_body(
         rgb = geometry.rgb or _DEFAULT_RGB
         by_color.setdefault(rgb, []).append(geometry)
     for k, (rgb, members) in enumerate(by_color.items()):
-        _draw_merged(
-            meshcat,
-            f"{path}/{k}",
-            members,
-            Rgba(*rgb),
-        )
+        surface = merge_surfaces(members, lambda frame_id: RigidTransform())
+        _draw_mesh(meshcat, f"{path}/{k}", surface, Rgba(*rgb))
 
 
 def draw_marker(meshcat: Meshcat, path: str) -> None:
@@ -134,13 +124,8 @@ def draw_route(
             np.column_stack([left, right + 1, left + 1]),
         ]
     )
-    _draw_colored(
-        meshcat,
-        path,
-        _columns(_on_grid(vertices)),
-        _columns(triangles, np.int32),
-        np.concatenate([rgb, rgb]),
-    )
+    surface = TriangleSurface(vertices, triangles.astype(np.int32))
+    _draw_mesh(meshcat, path, surface, np.concatenate([rgb, rgb]))
     meshcat.SetProperty(f"{path}/<object>", "castShadow", False)
 
 
@@ -235,35 +220,22 @@ def _set_lights(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     meshcat.SetProperty(sun, "castShadow", True)
 
 
-def _draw_colored(
+def _draw_mesh(
     meshcat: Meshcat,
     path: str,
-    vertices: np.ndarray,
-    triangles: np.ndarray,
-    rgb: np.ndarray,
+    surface: TriangleSurface,
+    colours: Rgba | np.ndarray,
 ) -> None:
-    """Draws a mesh with an sRGB colour, (N, 3), for each vertex."""
-    meshcat.SetTriangleColorMesh(
-        path, vertices, triangles, _columns(_linear(rgb))
-    )
+    """Draws a mesh with one colour, or an sRGB colour (N, 3) of each vertex."""
+    vertices = _columns(_on_grid(surface.p_GVset))
+    triangles = _columns(surface.triangles, np.int32)
+    if isinstance(colours, Rgba):
+        meshcat.SetTriangleMesh(path, vertices, triangles, colours)
+        return
+    rgb = _columns(_linear(colours))
+    meshcat.SetTriangleColorMesh(path, vertices, triangles, rgb)
     # Drake's default is light grey, which would darken the colours.
     meshcat.SetProperty(path, "color", _WHITE)
-
-
-def _draw_merged(
-    meshcat: Meshcat,
-    path: str,
-    geometries: Sequence[PerceptionGeometry],
-    rgba: Rgba,
-) -> None:
-    """Draws geometries of one frame in that frame."""
-    surface = merge_surfaces(geometries, lambda frame_id: RigidTransform())
-    meshcat.SetTriangleMesh(
-        path,
-        _columns(_on_grid(surface.p_GVset)),
-        _columns(surface.triangles, np.int32),
-        rgba,
-    )
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
