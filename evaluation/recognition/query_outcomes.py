@@ -45,6 +45,13 @@ class QueryOutcomes:
             self.num_places,
         )
 
+    @property
+    def known_ranks(self) -> list[int | None]:
+        """`first_right_ranks` as whole numbers; None where infinite."""
+        return [
+            int(r) if np.isfinite(r) else None for r in self.first_right_ranks
+        ]
+
     def recall_at(self, rank: int) -> float:
         """Returns R@N; NaN if no query has a match."""
         return _mean(self.first_right_ranks[self.has_match] <= rank)

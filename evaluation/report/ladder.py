@@ -30,7 +30,6 @@ from evaluation.recognition.resampling import (
 from evaluation.recognition.rung_outcome import FAULTS, RungOutcome
 from evaluation.recognition.survival import Kept
 from evaluation.report.drawing import plain, save
-from evaluation.report.result_tables import finite_ranks
 from evaluation.report.tables import (
     Columns,
     Table,
@@ -280,7 +279,7 @@ _ANSWER_COLUMNS: Columns[_Answers] = {
     "correct": lambda a: a.outcome.outcomes.is_right,
     "has_match": lambda a: a.outcome.outcomes.has_match,
     "score": lambda a: a.outcome.outcomes.best_scores,
-    "first_right_rank": lambda a: finite_ranks(a.outcome.outcomes),
+    "first_right_rank": lambda a: a.outcome.outcomes.known_ranks,
     "why": lambda a: a.outcome.faults(a.rung.radius),
     "match_drive": lambda a: a.outcome.match_drives,
     "match_frame": lambda a: [

@@ -17,6 +17,7 @@ from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.scoring import ranking
 from evaluation.report.drawing import Legend
 from evaluation.report.figures import Picture
 from evaluation.report.tables import in_table_order, title
@@ -125,8 +126,8 @@ def browser_data(
 ) -> dict:
     """Returns what the query browser reads, ready for JSON.
 
-    The maps from above are not included; the browser takes them from
-    `evaluation.report.page_routes.route_picture`.
+    The maps from above are not included; the browser takes them from the
+    pictures that `evaluation.report.page.route_picture` makes.
 
     Args:
         recognitions: one for each pair and method.
@@ -224,16 +225,11 @@ def _method_data(
     result: RecognitionResult, evidence: PairEvidence | None
 ) -> dict:
     scores = result.outcome.retrieval.scores
-    outcomes = result.outcome.outcomes
     best, values = [], []
-    order = np.argsort(
-        np.where(np.isnan(scores), np.inf, -scores), axis=1, kind="stable"
-    )
-    for row, places in zip(scores, order[:, :_NUM_BEST], strict=True):
+    for row, places in zip(scores, ranking(scores)[:, :_NUM_BEST], strict=True):
         places = places[~np.isnan(row[places])]
         best.append(places.tolist())
         values.append(np.round(row[places], 4).tolist())
-    ranks = outcomes.first_right_ranks
     metrics = {
         mode: {
             "auc": round(result.metrics[mode].auc, 4),
@@ -247,7 +243,7 @@ def _method_data(
         "title": title(result.method),
         "best": best,
         "scores": values,
-        "ranks": [int(r) if np.isfinite(r) else None for r in ranks],
+        "ranks": result.outcome.outcomes.known_ranks,
         "why": fault_kinds(result, evidence) if evidence else None,
         "metrics": metrics,
         "recall": None if np.isnan(recall) else round(recall, 4),

@@ -541,7 +541,7 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     "correct": lambda q: q.outcomes.is_right,
     "has_match": lambda q: q.outcomes.has_match,
     "score": lambda q: q.outcomes.best_scores,
-    "first_right_rank": lambda q: finite_ranks(q.outcomes),
+    "first_right_rank": lambda q: q.outcomes.known_ranks,
     "places": lambda q: q.outcomes.num_places,
     "query_drive": lambda q: q.result.outcome.query,
     **_moment_columns("query"),
@@ -591,9 +591,3 @@ def query_table(
             )
 
     return Table.of(queries(), _QUERY_COLUMNS)
-
-
-def finite_ranks(outcomes: QueryOutcomes) -> list[int | None]:
-    """Returns the rank of each query's best true match, None without one."""
-    ranks = outcomes.first_right_ranks
-    return [int(rank) if np.isfinite(rank) else None for rank in ranks]
