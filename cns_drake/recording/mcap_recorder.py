@@ -28,11 +28,12 @@ from cns_drake.recording.sensor_ports import (
     ImuPorts,
     ImuSamplesPort,
     MotionPorts,
-    ObjectsPort,
     RecordedCamera,
     RecordedSensor,
-    ScanPort,
-    SensorPort,
+    ValuePort,
+    objects_port,
+    scan_port,
+    sensor_port,
 )
 
 # Events of a periodic schedule come at multiples of the period. Their times
@@ -165,14 +166,12 @@ class McapRecorder(LeafSystem):
             self._imu_samples = ImuSamplesPort(self, imu_variances)
         else:
             self._imu = ImuPorts(self, imu_variances)
-        self._scenery: list[
-            ScanPort | CameraPorts | ObjectsPort | SensorPort
-        ] = []
+        self._scenery: list[CameraPorts | ValuePort] = []
         if with_objects:
-            self._scenery.append(ObjectsPort(self))
+            self._scenery.append(objects_port(self))
         for name in X_BSs:
             layout = layouts.get(name, "cns")
-            self._scenery.append(ScanPort(self, name, layout))
+            self._scenery.append(scan_port(self, name, layout))
         for name, X_BS in X_BSs.items():
             if X_BS is None:
                 self._motion.add(self, name, RigidTransform())
@@ -180,7 +179,7 @@ class McapRecorder(LeafSystem):
             self._scenery.append(CameraPorts(self, name, camera))
             self._motion.add(self, name, camera.X_BC)
         for name, sensor in further.items():
-            self._scenery.append(SensorPort(self, name, sensor))
+            self._scenery.append(sensor_port(self, name, sensor))
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
         self._declare_events()
         self.DeclareForcedPublishEvent(self._publish)

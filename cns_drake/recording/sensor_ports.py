@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, InputPort, LeafSystem
@@ -20,6 +21,7 @@ from cns_drake.recording import messages
 from cns_drake.recording.messages import ENCODINGS, make_camera_info, make_image
 from cns_drake.recording.object_messages import (
     BoxMessages,
+    RecordedObjects,
     marked_boxes,
     marked_detections,
     motion_table,
@@ -64,7 +66,7 @@ class MotionPorts:
 
         Args:
             system: the recorder.
-            name: of the frame C.
+            name: name of the frame C.
             X_PC: pose of C in the frame P whose pose the port has.
         """
         port = system.DeclareAbstractInputPort(
@@ -118,7 +120,7 @@ class ImuPorts:
         """Returns the message; None if no port is connected.
 
         Args:
-            context: of the recorder.
+            context: the recorder's.
             R_WI: orientation of the imu frame I; None if it is not known.
             stamp_ns: time of the message [ns].
         """
@@ -155,7 +157,7 @@ class ImuSamplesPort:
         """Yields number, stamp [ns] and message of each new sample.
 
         Args:
-            context: of the recorder.
+            context: the recorder's.
             schedule: of the recording.
             since: the last tick whose sample is written.
             tick: the present one.
@@ -221,48 +223,74 @@ class RecordedSensor(NamedTuple):
     make_message: Callable[[Any, str, int], Any]
 
 
-class SensorPort:
-    """The port of a further sensor."""
+class ValuePort:
+    """A port whose value makes messages, on the due topic and others.
 
-    def __init__(self, system: LeafSystem, name: str, sensor: RecordedSensor):
-        """Declares the port."""
-        self._name, self._sensor = name, sensor
+    Attributes:
+        due_topic: at its times there are messages.
+    """
+
+    def __init__(
+        self,
+        system: LeafSystem,
+        name: str,
+        due_topic: Topic,
+        make: Callable[[Any, int], dict[Topic, Any]],
+    ):
+        """Declares the port; `make` takes its value and the time [ns]."""
         self._port = declare_object(system, name)
-        self.due_topic = sensor.topic
+        self.due_topic = due_topic
+        self._make = make
 
     def messages(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
-        """Returns the message of the present value."""
+        """Returns the messages of the present value."""
         value = value_of(self._port, context)
-        if value is None:
-            return {}
-        message = self._sensor.make_message(value, self._name, stamp_ns)
-        return {self.due_topic: message}
+        return {} if value is None else self._make(value, stamp_ns)
 
 
-class ScanPort:
-    """The port `<lidar>_scan`."""
+def sensor_port(
+    system: LeafSystem, name: str, sensor: RecordedSensor
+) -> ValuePort:
+    """Declares the port of a further sensor, `<name>`."""
 
-    def __init__(self, system: LeafSystem, name: str, layout: str):
-        """Declares the port of a LiDAR with a layout of its points."""
-        self._name, self._layout = name, layout
-        self._scan = declare_object(system, f"{name}_scan")
-        self.due_topic = points_topic(name)
+    def make(value: Any, stamp_ns: int) -> dict[Topic, Any]:
+        return {sensor.topic: sensor.make_message(value, name, stamp_ns)}
 
-    def messages(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
-        """Returns the messages of points, and of labels beside them."""
-        scan = value_of(self._scan, context)
-        if scan is None:
-            return {}
-        outgoing = {
-            self.due_topic: messages.encode_point_cloud(
-                to_layout(scan, self._layout), self._name, stamp_ns
-            )
-        }
-        if self._layout != "cns":
-            outgoing[labels_topic(self._name)] = messages.encode_point_cloud(
-                to_labels(scan), self._name, stamp_ns
-            )
+    return ValuePort(system, name, sensor.topic, make)
+
+
+def scan_port(system: LeafSystem, name: str, layout: str) -> ValuePort:
+    """Declares the port `<lidar>_scan`, of points and labels beside them."""
+    encode = messages.encode_point_cloud
+
+    def make(scan: np.ndarray, stamp_ns: int) -> dict[Topic, Any]:
+        points = to_layout(scan, layout)
+        outgoing = {points_topic(name): encode(points, name, stamp_ns)}
+        if layout != "cns":
+            labels = encode(to_labels(scan), name, stamp_ns)
+            outgoing[labels_topic(name)] = labels
         return outgoing
+
+    return ValuePort(system, f"{name}_scan", points_topic(name), make)
+
+
+def objects_port(system: LeafSystem) -> ValuePort:
+    """Declares the port `objects`, of moving objects."""
+    detections, boxes = (
+        BoxMessages(marked_detections),
+        BoxMessages(marked_boxes),
+    )
+
+    def make(objects: RecordedObjects, stamp_ns: int) -> dict[Topic, Any]:
+        return {
+            OBJECTS_TOPIC: detections.encode(objects, stamp_ns),
+            BOXES_TOPIC: boxes.encode(objects, stamp_ns),
+            MOTION_TOPIC: messages.encode_point_cloud(
+                motion_table(objects), messages.MAP_FRAME, stamp_ns
+            ),
+        }
+
+    return ValuePort(system, "objects", OBJECTS_TOPIC, make)
 
 
 class CameraPorts:
@@ -293,28 +321,3 @@ class CameraPorts:
                 self._info, self._name, stamp_ns
             )
         return outgoing
-
-
-class ObjectsPort:
-    """The port `objects`."""
-
-    due_topic = OBJECTS_TOPIC
-
-    def __init__(self, system: LeafSystem):
-        """Declares the port."""
-        self._objects = declare_object(system, "objects")
-        self._detections = BoxMessages(marked_detections)
-        self._boxes = BoxMessages(marked_boxes)
-
-    def messages(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
-        """Returns the messages of moving objects."""
-        objects = value_of(self._objects, context)
-        if objects is None:
-            return {}
-        return {
-            OBJECTS_TOPIC: self._detections.encode(objects, stamp_ns),
-            BOXES_TOPIC: self._boxes.encode(objects, stamp_ns),
-            MOTION_TOPIC: messages.encode_point_cloud(
-                motion_table(objects), messages.MAP_FRAME, stamp_ns
-            ),
-        }

@@ -83,5 +83,5 @@ def test_lidar_presets():
             str(preset.num_columns or "-"),
             f"{preset.min_range:g} to {preset.max_range:g}",
         )
-        for name, preset in LIDAR_PRESETS.items()
+        for name, (preset, _) in LIDAR_PRESETS.items()
     }

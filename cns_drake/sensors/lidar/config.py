@@ -123,7 +123,7 @@ class LidarConfig(Mount):
 
     @model_validator(mode="after")
     def _check_unit(self) -> LidarConfig:
-        unit = LIDAR_PRESETS[self.preset]
+        unit = LIDAR_PRESETS[self.preset].pattern
         if self.columns and unit.num_columns is None:
             raise ValueError(f"the preset '{self.preset}' has no columns")
         nearest = unit.min_range if self.min_range is None else self.min_range

@@ -8,6 +8,7 @@ Directions depend only on the time, so that a frame is always the same.
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
@@ -25,23 +26,38 @@ _TURNS_HZ = 100.0
 _NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
 
 
+@dataclass(frozen=True)
 class _TimedPattern(BeamPattern):
-    """Lines of beams that fire together, at a constant rate."""
+    """Lines of beams that fire together, at a constant rate.
+
+    Attributes:
+        points_per_second: rate of all lines together.
+        min_range: nearest range that is measured [m].
+        max_range: farthest range that is measured [m].
+        period: duration of a frame [s].
+        num_lines: lasers; line 0 is the highest.
+    """
+
+    _: KW_ONLY
+    points_per_second: float
+    min_range: float
+    max_range: float
+    period: float
+    num_lines: int = 1
 
     repeats = False
+    # Firing times follow from the duration of a frame.
+    num_columns = None
 
-    def __init__(
-        self,
-        num_lines: int,
-        points_per_second: float,
-        min_range: float,
-        max_range: float,
-        period: float,
-    ):
-        self.min_range, self.max_range = min_range, max_range
-        self.period = period
-        self.num_lines = num_lines
-        self.num_firings = max(round(points_per_second * period / num_lines), 1)
+    @property
+    def num_rings(self) -> int:
+        return self.num_lines
+
+    @property
+    def num_firings(self) -> int:
+        """Number of times in a frame at which all lines fire."""
+        points = self.points_per_second * self.period
+        return max(round(points / self.num_lines), 1)
 
     def beams(self, frame: int) -> Beams:
         firing = np.arange(self.num_firings)
@@ -60,6 +76,7 @@ class _TimedPattern(BeamPattern):
         """Returns the (num_firings, num_lines, 3) directions at times [s]."""
 
 
+@dataclass(frozen=True)
 class RosettePattern(_TimedPattern):
     """Two wedge prisms that turn against each other, before a row of lasers.
 
@@ -67,6 +84,10 @@ class RosettePattern(_TimedPattern):
     is a disc about x, densest in its middle; the bends add up as vectors
     (of first order: a real prism bends an oblique beam somewhat more). Lasers
     one above the other give as many discs.
+
+    Attributes:
+        fov_deg: full angle of a disc.
+        height_deg: angle between the highest and the lowest laser.
 
     Example:
         from cns_drake import RosettePattern
@@ -77,47 +98,21 @@ class RosettePattern(_TimedPattern):
         )
     """
 
-    def __init__(
-        self,
-        fov_deg: float,
-        *,
-        points_per_second: float,
-        min_range: float,
-        max_range: float,
-        period: float,
-        num_lines: int = 1,
-        height_deg: float = 0.0,
-    ):
-        """Makes the pattern from the figures of a data sheet.
-
-        Args:
-            fov_deg: full angle of a disc.
-            points_per_second: of all lines together.
-            min_range: nearest range that is measured [m].
-            max_range: farthest range that is measured [m].
-            period: duration of a frame [s].
-            num_lines: lasers; line 0 is the highest.
-            height_deg: angle between the highest and the lowest.
-        """
-        super().__init__(
-            num_lines, points_per_second, min_range, max_range, period
-        )
-        self._bend = np.deg2rad(fov_deg) / 4.0
-        self._lines = np.deg2rad(
-            np.linspace(height_deg / 2.0, -height_deg / 2.0, num_lines)
-            if num_lines > 1
-            else np.zeros(1)
-        )
+    fov_deg: float
+    height_deg: float = field(default=0.0, kw_only=True)
 
     def _directions(self, times: np.ndarray) -> np.ndarray:
         first, second = (2.0 * np.pi * hz * times for hz in _PRISMS_HZ)
-        left = self._bend * (np.cos(first) + np.cos(second))
-        up = self._bend * (np.sin(first) + np.sin(second))
+        bend = np.deg2rad(self.fov_deg) / 4.0
+        left = bend * (np.cos(first) + np.cos(second))
+        up = bend * (np.sin(first) + np.sin(second))
         angle = np.hypot(left, up)
         x = np.cos(angle)
         # sin(angle) / angle, which numpy has with pi in it.
         y, z = left * np.sinc(angle / np.pi), up * np.sinc(angle / np.pi)
-        cos, sin = np.cos(self._lines), np.sin(self._lines)
+        top = self.height_deg / 2.0 if self.num_lines > 1 else 0.0
+        lines = np.deg2rad(np.linspace(top, -top, self.num_lines))
+        cos, sin = np.cos(lines), np.sin(lines)
         return np.stack(
             [
                 x[:, None] * cos - z[:, None] * sin,
@@ -128,12 +123,17 @@ class RosettePattern(_TimedPattern):
         )
 
 
+@dataclass(frozen=True)
 class NoddingPattern(_TimedPattern):
     """Lines that rotate and, slowly, move up and down, each in its own band.
 
     Bands of equal height fill the field of view. The turns about z, 100 a
     second, and the ups and downs, 6.18 a second, are of no simple ratio, so
     that frame after frame fills the gaps.
+
+    Attributes:
+        elevations_deg: lowest and highest elevation; line 0 has the highest
+            band between them.
 
     Example:
         from cns_drake import NoddingPattern
@@ -144,38 +144,16 @@ class NoddingPattern(_TimedPattern):
         )
     """
 
-    def __init__(
-        self,
-        elevations_deg: tuple[float, float],
-        *,
-        num_lines: int,
-        points_per_second: float,
-        min_range: float,
-        max_range: float,
-        period: float,
-    ):
-        """Makes the pattern from the figures of a data sheet.
-
-        Args:
-            elevations_deg: lowest and highest.
-            num_lines: lasers; line 0 has the highest band.
-            points_per_second: of all lines together.
-            min_range: nearest range that is measured [m].
-            max_range: farthest range that is measured [m].
-            period: duration of a frame [s].
-        """
-        super().__init__(
-            num_lines, points_per_second, min_range, max_range, period
-        )
-        self._low, self._high = np.deg2rad(elevations_deg)
+    elevations_deg: tuple[float, float]
 
     def _directions(self, times: np.ndarray) -> np.ndarray:
         azimuth = (np.pi - 2.0 * np.pi * _TURNS_HZ * times)[:, None]
         phase = _NODS_HZ * times % 1.0
         height = 1.0 - np.abs(2.0 * phase - 1.0)  # 0 up to 1, and down.
-        band = (self._high - self._low) / self.num_lines
+        low, high = np.deg2rad(self.elevations_deg)
+        band = (high - low) / self.num_lines
         lines = np.arange(self.num_lines)
-        elevation = self._high - band * (lines + 1.0 - height[:, None])
+        elevation = high - band * (lines + 1.0 - height[:, None])
         return np.stack(
             [
                 np.cos(elevation) * np.cos(azimuth),

@@ -240,31 +240,28 @@ class SpinningPattern(BeamPattern):
     def beams(self, frame: int) -> Beams:
         return self._beams
 
-    @cached_property
-    def _beams(self) -> Beams:
-        return Beams(
-            self.d_Sset,
-            self.ring,
-            self.column,
-            self.column_t_ns,
-            self.packet_order,
-        )
-
     @property
     def num_beams(self) -> int:
         return self.num_rings * self.num_columns
 
-    @cached_property
+    @property
     def d_Sset(self) -> np.ndarray:
         """(num_beams, 3) float64 unit directions, expressed in S."""
-        column = np.arange(self.num_columns)
-        if self.azimuths_rad is None:
-            azimuth = np.pi - 2.0 * np.pi * column / self.num_columns
-        else:
-            azimuth = np.linspace(*self.azimuths_rad, self.num_columns)
+        return self._beams.d_Sset
+
+    @cached_property
+    def _beams(self) -> Beams:
+        columns, rings = np.arange(self.num_columns), np.arange(self.num_rings)
+        azimuth = np.pi - 2.0 * np.pi * columns / self.num_columns
+        column_ns = self.period * 1e9 / self.num_columns
+        if self.azimuths_rad is not None:
+            first, last = self.azimuths_rad
+            azimuth = np.linspace(first, last, self.num_columns)
+            part = abs(last - first) / (2.0 * np.pi)
+            column_ns = part * self.period * 1e9 / max(self.num_columns - 1, 1)
         azimuth = azimuth[:, None]
         elevation = np.asarray(self.elevations_rad)[None, :]
-        d = np.stack(
+        d_Sset = np.stack(
             np.broadcast_arrays(
                 np.cos(elevation) * np.cos(azimuth),
                 np.cos(elevation) * np.sin(azimuth),
@@ -272,48 +269,17 @@ class SpinningPattern(BeamPattern):
             ),
             axis=-1,
         ).reshape(-1, 3)
-        d.flags.writeable = False
-        return d
-
-    @cached_property
-    def packet_order(self) -> np.ndarray:
-        """(num_beams,) beams in the order of casting.
-
-        The order is ring by ring: neighbours point nearly the same way and meet
-        the same geometry, which makes packets of rays faster (by 1.6 against
-        the firing order, in Metropolis).
-        """
+        d_Sset.flags.writeable = False
         beams = np.arange(self.num_beams)
-        return beams.reshape(self.num_columns, self.num_rings).T.ravel()
-
-    @cached_property
-    def ring(self) -> np.ndarray:
-        """(num_beams,) uint16 ring of each beam."""
-        rings = np.arange(self.num_rings, dtype=np.uint16)
-        return np.tile(rings, self.num_columns)
-
-    @cached_property
-    def column(self) -> np.ndarray:
-        """(num_beams,) int column of each beam."""
-        return np.repeat(np.arange(self.num_columns), self.num_rings)
-
-    @cached_property
-    def column_t_ns(
-        self,
-    ) -> np.ndarray:
-        """(num_columns,) uint32 firing time since the start of the turn."""
-        column_ns = self.period * 1e9 / self.num_columns
-        if self.azimuths_rad is not None:
-            first, last = self.azimuths_rad
-            part = abs(last - first) / (2.0 * np.pi)
-            column_ns = part * self.period * 1e9 / max(self.num_columns - 1, 1)
-        columns = np.arange(self.num_columns)
-        return np.round(columns * column_ns).astype(np.uint32)
-
-    @cached_property
-    def t_ns(self) -> np.ndarray:
-        """(num_beams,) uint32 firing time since the start of the turn."""
-        return self.column_t_ns[self.column]
+        return Beams(
+            d_Sset,
+            ring=np.tile(rings.astype(np.uint16), self.num_columns),
+            column=np.repeat(columns, self.num_rings),
+            column_t_ns=np.round(columns * column_ns).astype(np.uint32),
+            # Ring by ring, which is faster than in the order of firing, by 1.6
+            # in Metropolis.
+            packet_order=beams.reshape(self.num_columns, -1).T.ravel(),
+        )
 
 
 class DirectionPattern(BeamPattern):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,28 +14,16 @@ from cns_drake.sensors.lidar.livox_patterns import (
 from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
 
 
-@dataclass(frozen=True)
-class LidarPreset:
+class LidarPreset(NamedTuple):
     """A unit.
 
     Attributes:
-        num_rings: its emitters.
-        num_columns: firings in a turn; None if it follows from the turn's
-            duration.
-        min_range: nearest range that is measured [m].
-        max_range: farthest range that is measured [m].
-        period: default duration of a turn [s].
-        source: of these numbers.
-        make: makes the pattern, from columns, ranges and period.
+        pattern: its beams.
+        source: where their numbers come from.
     """
 
-    num_rings: int
-    num_columns: int | None
-    min_range: float
-    max_range: float
-    period: float
+    pattern: SpinningPattern | RosettePattern | NoddingPattern
     source: str
-    make: Callable[[int | None, float, float, float], BeamPattern]
 
 
 def _spinning(
@@ -48,64 +36,16 @@ def _spinning(
     period: float = 0.05,
     azimuths_rad: tuple[float, float] | None = None,
 ) -> LidarPreset:
-    def make(
-        columns: int | None, nearest: float, farthest: float, period: float
-    ) -> BeamPattern:
-        return SpinningPattern(
-            elevations_rad=elevations_rad,
-            num_columns=num_columns if columns is None else columns,
-            min_range=nearest,
-            max_range=farthest,
-            period=period,
-            azimuths_rad=azimuths_rad,
-        )
-
     return LidarPreset(
-        len(elevations_rad),
-        num_columns,
-        min_range,
-        max_range,
-        period,
+        SpinningPattern(
+            elevations_rad,
+            num_columns,
+            min_range,
+            max_range,
+            period,
+            azimuths_rad,
+        ),
         source,
-        make,
-    )
-
-
-def _rosette(
-    fov_deg: float,
-    num_lines: int,
-    height_deg: float,
-    points_per_second: float,
-    min_range: float,
-    max_range: float,
-    source: str,
-) -> LidarPreset:
-    def make(
-        _: int | None, nearest: float, farthest: float, period: float
-    ) -> BeamPattern:
-        return RosettePattern(
-            fov_deg,
-            points_per_second=points_per_second,
-            min_range=nearest,
-            max_range=farthest,
-            period=period,
-            num_lines=num_lines,
-            height_deg=height_deg,
-        )
-
-    return LidarPreset(num_lines, None, min_range, max_range, 0.1, source, make)
-
-
-def _make_mid_360(
-    _: int | None, nearest: float, farthest: float, period: float
-) -> BeamPattern:
-    return NoddingPattern(
-        (-7.0, 52.0),
-        num_lines=4,
-        points_per_second=200_000.0,
-        min_range=nearest,
-        max_range=farthest,
-        period=period,
     )
 
 
@@ -194,36 +134,42 @@ LIDAR_PRESETS: dict[str, LidarPreset] = {
         period=0.025,
         azimuths_rad=(-0.75 * np.pi, 0.75 * np.pi),
     ),
-    "mid-70": _rosette(
-        70.4,
-        1,
-        0.0,
-        100_000.0,
-        0.05,
-        130.0,
+    "mid-70": LidarPreset(
+        RosettePattern(
+            70.4,
+            points_per_second=100_000.0,
+            min_range=0.05,
+            max_range=130.0,
+            period=0.1,
+        ),
         "Livox Mid-70 user manual: a disc of 70.4 deg, 100,000 points/s, "
         "0.05 m to 130 m at 20 %; prisms as in `RosettePattern`",
     ),
-    "avia": _rosette(
-        70.4,
-        6,
-        6.8,
-        240_000.0,
-        1.0,
-        320.0,
+    "avia": LidarPreset(
+        RosettePattern(
+            70.4,
+            points_per_second=240_000.0,
+            min_range=1.0,
+            max_range=320.0,
+            period=0.1,
+            num_lines=6,
+            height_deg=6.8,
+        ),
         "Livox Avia user manual: 6 lines, 70.4 x 77.2 deg without repeating, "
         "240,000 points/s, 1 m to 320 m at 80 %; prisms as in "
         "`RosettePattern`, whose discs of 70.4 deg then span 6.8 deg",
     ),
     "mid-360": LidarPreset(
-        4,
-        None,
-        0.1,
-        70.0,
-        0.1,
+        NoddingPattern(
+            (-7.0, 52.0),
+            points_per_second=200_000.0,
+            min_range=0.1,
+            max_range=70.0,
+            period=0.1,
+            num_lines=4,
+        ),
         "Livox Mid-360 user manual: 4 lines, 360 deg, -7 to 52 deg, 200,000 "
         "points/s, 0.1 m to 70 m at 80 %; its motion as in `NoddingPattern`",
-        _make_mid_360,
     ),
 }
 
@@ -258,12 +204,16 @@ def make_beam_pattern(
         raise KeyError(
             f"no LiDAR preset '{preset}'; there are: {', '.join(LIDAR_PRESETS)}"
         )
-    base = LIDAR_PRESETS[preset]
+    base = LIDAR_PRESETS[preset].pattern
     if num_columns is not None and base.num_columns is None:
         raise ValueError(f"the preset '{preset}' has no columns")
-    return base.make(
-        num_columns,
-        base.min_range if min_range is None else min_range,
-        base.max_range if max_range is None else max_range,
-        base.period if period is None else period,
+    changes = {
+        "period": period,
+        "num_columns": num_columns,
+        "min_range": min_range,
+        "max_range": max_range,
+    }
+    return replace(
+        base,
+        **{name: one for name, one in changes.items() if one is not None},
     )

@@ -40,15 +40,15 @@ def test_cns_pattern():
     np.testing.assert_allclose(d[0, 0, 1], 0.0, atol=1e-12)
     assert d[0, 0, 0] < 0
     assert d[256, 0, 1] > 0.9
-    assert pattern.t_ns[0] == 0
-    assert pattern.t_ns[-1] == round(1023 * 0.05e9 / 1024)
-    assert (np.diff(pattern.t_ns.astype(int)) >= 0).all()
+    assert pattern.beams(0).t_ns[0] == 0
+    assert pattern.beams(0).t_ns[-1] == round(1023 * 0.05e9 / 1024)
+    assert (np.diff(pattern.beams(0).t_ns.astype(int)) >= 0).all()
 
 
 @pytest.mark.parametrize("preset", LIDAR_PRESETS)
 def test_presets_make_usable_patterns(preset):
     pattern = make_beam_pattern(preset)
-    base = LIDAR_PRESETS[preset]
+    base, source = LIDAR_PRESETS[preset]
     beams = pattern.beams(3)
     assert len(np.unique(beams.ring)) == base.num_rings
     assert pattern.period == base.period
@@ -62,7 +62,7 @@ def test_presets_make_usable_patterns(preset):
     assert beams.t_ns[-1] < pattern.period * 1e9
     assert (np.sort(beams.packet_order) == np.arange(pattern.num_beams)).all()
     np.testing.assert_array_equal(beams.column_t_ns, pattern.column_t_ns)
-    assert len(base.source) > 20
+    assert len(source) > 20
 
 
 def test_no_preset_of_that_name():

@@ -15,8 +15,8 @@ def test_points_are_what_numpy_makes_of_the_beams(step):
     num = pattern.num_beams
     table = BeamTable(
         pattern.d_Sset.astype(np.float32),
-        pattern.ring,
-        pattern.t_ns,
+        pattern.beams(0).ring,
+        pattern.beams(0).t_ns,
         rng.permutation(num),
     )
     beams = np.flatnonzero(rng.random(num) < 0.7)
@@ -38,8 +38,8 @@ def test_points_are_what_numpy_makes_of_the_beams(step):
     for axis, name in enumerate("xyz"):
         np.testing.assert_array_equal(scan[name], expected[:, axis])
     np.testing.assert_array_equal(scan["intensity"], intensity)
-    np.testing.assert_array_equal(scan["ring"], pattern.ring[beams])
-    np.testing.assert_array_equal(scan["t"], pattern.t_ns[beams])
+    np.testing.assert_array_equal(scan["ring"], pattern.beams(0).ring[beams])
+    np.testing.assert_array_equal(scan["t"], pattern.beams(0).t_ns[beams])
     np.testing.assert_array_equal(scan["label"][3:], label[met[3:]])
     np.testing.assert_array_equal(scan["instance"][3:], instance[met[3:]])
     assert (scan["label"][:3] == 1).all()
