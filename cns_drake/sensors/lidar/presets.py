@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -207,7 +207,7 @@ def make_beam_pattern(
     base = LIDAR_PRESETS[preset].pattern
     if num_columns is not None and base.num_columns is None:
         raise ValueError(f"the preset '{preset}' has no columns")
-    changes = {
+    changes: dict[str, Any] = {
         "period": period,
         "num_columns": num_columns,
         "min_range": min_range,
