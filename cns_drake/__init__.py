@@ -10,10 +10,7 @@ from cns_drake.base.version import __version__
 
 if TYPE_CHECKING:
     from cns_drake.base.errors import InputError
-    from cns_drake.command_line.drive_script import (
-        run_drive,
-        run_script,
-    )
+    from cns_drake.command_line.drive_script import run_drive, run_script
     from cns_drake.motion.vehicle_motion import VehicleMotion
     from cns_drake.pictures.static_page import save_meshcat_page
     from cns_drake.recording.bag_writer import BagWriter
@@ -21,10 +18,7 @@ if TYPE_CHECKING:
     from cns_drake.recording.recorded_topics import recording_topics
     from cns_drake.scenarios.planning import plan_drive
     from cns_drake.scenarios.scenario import Scenario
-    from cns_drake.scenarios.scenario_files import (
-        load_scenario,
-        make_scenario,
-    )
+    from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
     from cns_drake.scene.world import World, load_world
     from cns_drake.sensors.imu.imu import Imu, add_imu
     from cns_drake.sensors.imu.noise import ImuNoise

@@ -9,11 +9,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.geometry import FrameId, QueryObject
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import (
-    Context,
-    EventStatus,
-    LeafSystem,
-)
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from cns_drake.base.files import complete_part, write_part
 from cns_drake.pictures.drive_page import (

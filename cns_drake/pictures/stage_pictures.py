@@ -11,10 +11,7 @@ from matplotlib.figure import Figure
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from cns_drake.base.errors import (
-    InputError,
-    describe_validation_error,
-)
+from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.files import completing, make_folder
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.pictures.stage_scene import StageScene, View

@@ -14,10 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cns_drake.ray_casting.ray_casting_scene import (
-    RayCastingScene,
-    RayHits,
-)
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, RayHits
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     read_perception_geometry,

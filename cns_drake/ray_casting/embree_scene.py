@@ -16,10 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cns_drake.ray_casting.curved_shapes import (
-    CapsuleAxes,
-    NearCurvedShapes,
-)
+from cns_drake.ray_casting.curved_shapes import CapsuleAxes, NearCurvedShapes
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
     PROXY_OWNER,

@@ -8,12 +8,7 @@ import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
-from shapely import (
-    GEOSException,
-    make_valid,
-    set_precision,
-    unary_union,
-)
+from shapely import GEOSException, make_valid, set_precision, unary_union
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 

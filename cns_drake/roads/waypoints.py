@@ -12,11 +12,7 @@ from cns_drake.base.angles import wrapped
 from cns_drake.base.csv_files import read_rows
 from cns_drake.base.errors import InputError
 from cns_drake.roads.centreline import Centreline
-from cns_drake.roads.lane_path import (
-    LanePath,
-    check_length,
-    sample_lane_path,
-)
+from cns_drake.roads.lane_path import LanePath, check_length, sample_lane_path
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
 
 # Radius of the arcs that round corners, if it fits between the neighbouring

@@ -17,11 +17,7 @@ import zlib
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    complete_part,
-    user_errors,
-    write_part,
-)
+from cns_drake.base.files import complete_part, user_errors, write_part
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios.scenario import Scenario

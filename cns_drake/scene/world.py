@@ -23,10 +23,7 @@ from cns_drake.scene.gazebo_worlds import (
 )
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.perception_geometry import check_shape, structure_name
-from cns_drake.scene.structure_table import (
-    StructureTable,
-    load_structure_table,
-)
+from cns_drake.scene.structure_table import StructureTable, load_structure_table
 
 
 @dataclass(frozen=True)

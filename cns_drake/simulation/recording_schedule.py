@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cns_drake.recording.recorded_topics import (
-    OBJECT_TOPICS,
-    recording_topics,
-)
+from cns_drake.recording.recorded_topics import OBJECT_TOPICS, recording_topics
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.scenarios.scenario import Scenario

@@ -12,16 +12,8 @@ from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    complete_part,
-    part_path,
-    user_errors,
-)
-from cns_drake.base.points import (
-    encode_bin,
-    encode_pcd,
-    to_xyzi,
-)
+from cns_drake.base.files import complete_part, part_path, user_errors
+from cns_drake.base.points import encode_bin, encode_pcd, to_xyzi
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar

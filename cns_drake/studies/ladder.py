@@ -33,10 +33,7 @@ from cns_drake.studies.redrawing import redraw_cities
 from cns_drake.studies.reproduction import recordable_map
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.report.ladder import (
     LadderRung,
     MeasuredRung,

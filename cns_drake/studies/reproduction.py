@@ -21,16 +21,9 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures
-from cns_drake.studies.recording import (
-    Record,
-    is_recorded,
-    plan_recordings,
-)
+from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo

@@ -8,10 +8,7 @@ import shapely
 from shapely import Polygon
 
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.geometry.structures import (
-    Model,
-    part_triangles,
-)
+from cns_drake.city.geometry.structures import Model, part_triangles
 from cns_drake.transient.scene_editing import SceneEditing, Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,

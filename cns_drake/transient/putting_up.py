@@ -7,9 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.furniture.pavilions import (
-    FENCES,
-)
+from cns_drake.city.furniture.pavilions import FENCES
 from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
 from cns_drake.city.geometry.structures import (
     Builder,

@@ -26,12 +26,7 @@ from evaluation.change.tcr import (
     temporal_change,
 )
 from evaluation.clouds.cloud_files import is_cloud, read_blocks
-from evaluation.drives import (
-    Drive,
-    Placed,
-    check_same_world,
-    open_drive,
-)
+from evaluation.drives import Drive, Placed, check_same_world, open_drive
 from evaluation.maps.voxel_maps import (
     VOXEL_SIZE,
     VoxelAccumulator,

@@ -13,10 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from cns_drake.base.errors import InputError
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 
 class ModeName(str, Enum):

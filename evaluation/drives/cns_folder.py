@@ -27,10 +27,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.yaml_files import parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
-from evaluation.drives.scan_files import (
-    FileDrive,
-    list_stamped,
-)
+from evaluation.drives.scan_files import FileDrive, list_stamped
 from evaluation.drives.text_tables import (
     pose_matrices,
     read_quaternions,

@@ -36,10 +36,7 @@ from cns_drake.base.drives.drive import index_instances, read_scenario
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
-from evaluation.drives.scan_files import (
-    FileDrive,
-    read_packed,
-)
+from evaluation.drives.scan_files import FileDrive, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,

@@ -13,10 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.points import FARTHEST_RETURN
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
-from evaluation.drives.text_tables import (
-    check_increasing,
-    parse_stamps_ns,
-)
+from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
 
 class FileDrive(Drive):

@@ -9,11 +9,7 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.drive_views import DriveView
-from evaluation.maps.voxel_maps import (
-    VOXEL_SIZE,
-    VoxelAccumulator,
-    VoxelMap,
-)
+from evaluation.maps.voxel_maps import VOXEL_SIZE, VoxelAccumulator, VoxelMap
 
 # Divisions of a voxel's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 10

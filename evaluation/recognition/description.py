@@ -13,10 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.method import Method
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 # The role of a drive.
 Role = Literal["places", "queries"]

@@ -20,10 +20,7 @@ from evaluation.recognition.metrics import (
 )
 from evaluation.recognition.pose_errors import PoseMetrics, pose_metrics
 from evaluation.recognition.pr_curve import pr_curve
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.resampling import Interval
 from evaluation.recognition.retrieval import Retrieval, retrieve

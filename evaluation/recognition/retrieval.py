@@ -14,20 +14,14 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.progress import Track, silent
 from evaluation.methods.method import Method
-from evaluation.recognition.description import (
-    DescribedDrive,
-    describe_drive,
-)
+from evaluation.recognition.description import DescribedDrive, describe_drive
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.pose_errors import (
     PoseErrors,
     checked_pose,
     pose_error,
 )
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.scoring import gated, ranking, score_places
 
 

@@ -11,12 +11,7 @@ import numpy as np
 
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.report.drawing import (
-    method_entry,
-    method_style,
-    plain,
-    save,
-)
+from evaluation.report.drawing import method_entry, method_style, plain, save
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.tables import in_table_order, title
 

@@ -8,15 +8,9 @@ from pathlib import Path
 from cns_drake.base.files import make_folder
 from evaluation.change.drive_change import symmetric_changes
 from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.survival import Survival
-from evaluation.report.curve_figures import (
-    draw_auc_over_change,
-    draw_pr_curves,
-)
+from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
 from evaluation.report.page import Report, write_report
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.result_tables import DriveTrack

@@ -10,10 +10,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
 from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import MethodChoice, choose_methods

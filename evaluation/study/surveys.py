@@ -29,10 +29,7 @@ from evaluation.recognition.description import (
     Role,
     describe_drive,
 )
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
 

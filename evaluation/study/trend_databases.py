@@ -19,10 +19,7 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.change.tcr import temporal_change
 from evaluation.drives import Drive, check_same_world, open_drive
 from evaluation.recognition.place_recognition import judge_retrieval
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.parts import MakePart, Part, StudyFiles

@@ -30,11 +30,7 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.scene.structure_table import StructureTable
-from cns_drake.sensors.lidar.measurement import (
-    IDEAL,
-    MeasurementModel,
-    Returns,
-)
+from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
 from cns_drake.sensors.lidar.seen_geometry import SeenGeometry, Sight
 from cns_drake.sensors.returns.calibrated import (

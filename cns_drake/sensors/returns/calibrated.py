@@ -7,31 +7,18 @@ from functools import cached_property
 
 import numpy as np
 
-from cns_drake.ray_casting.ray_casting_scene import (
-    RayCastingScene,
-    RayHits,
-)
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, RayHits
 from cns_drake.ray_casting.rays import rotate
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
-from cns_drake.sensors.returns.echoes import (
-    Receiver,
-    Reported,
-    report_echoes,
-)
+from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides
 from cns_drake.sensors.returns.light import BeamHits, join
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key
-from cns_drake.sensors.returns.unit_sheets import (
-    UNIT_SHEETS,
-    UnitSheet,
-)
-from cns_drake.sensors.returns.weather import (
-    Weather,
-    tabulate_scattering,
-)
+from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
+from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
 
 CLEAR = Weather()
 

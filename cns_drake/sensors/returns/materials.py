@@ -17,11 +17,7 @@ import numpy as np
 
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.structure_table import StructureTable
-from cns_drake.scene.surfaces import (
-    HalfSpaceSurface,
-    Surface,
-    TriangleSurface,
-)
+from cns_drake.scene.surfaces import HalfSpaceSurface, Surface, TriangleSurface
 
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS = range(5)

@@ -8,11 +8,7 @@ import pytest
 import shapely
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.generation.city_structures import (
-    City,
-    lay_out,
-    make_city,
-)
+from cns_drake.city.generation.city_structures import City, lay_out, make_city
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
 

@@ -6,12 +6,8 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting import (
-    open3d_scene,
-)
-from cns_drake.ray_casting import (
-    ray_casting_scene as ray_casting,
-)
+from cns_drake.ray_casting import open3d_scene
+from cns_drake.ray_casting import ray_casting_scene as ray_casting
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.surfaces import (

@@ -10,10 +10,7 @@ from cns_drake.base.drives.point_layouts import (
     to_points,
     to_records,
 )
-from cns_drake.base.drives.ros_types import (
-    POINT_CLOUD,
-    deserialize,
-)
+from cns_drake.base.drives.ros_types import POINT_CLOUD, deserialize
 from cns_drake.recording.messages import encode_point_cloud
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 

@@ -17,11 +17,7 @@ import zstandard
 
 from cns_drake.base.drives.mcap_file import CHUNK_LIMIT_BYTES
 from cns_drake.base.errors import InputError
-from cns_drake.recording.repair import (
-    Fault,
-    read_records,
-    repair_mcap,
-)
+from cns_drake.recording.repair import Fault, read_records, repair_mcap
 
 COMPRESSIONS = (CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD)
 

@@ -5,10 +5,7 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
-from cns_drake.roads.waypoints import (
-    load_waypoint_path,
-    make_waypoint_path,
-)
+from cns_drake.roads.waypoints import load_waypoint_path, make_waypoint_path
 
 
 @pytest.fixture

@@ -14,10 +14,7 @@ from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction
 from cns_drake.studies.recording import Record
-from cns_drake.studies.reproduction import (
-    control_drives,
-    recording_info,
-)
+from cns_drake.studies.reproduction import control_drives, recording_info
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.collection import find_recordings, group_cities
 

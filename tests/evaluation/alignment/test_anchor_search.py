@@ -2,11 +2,7 @@ from helpers.towns import rigid
 import numpy as np
 import pytest
 
-from evaluation.alignment.anchor_search import (
-    Candidates,
-    find_guesses,
-    upright,
-)
+from evaluation.alignment.anchor_search import Candidates, find_guesses, upright
 
 
 def make_candidates(X_TS, right, wrong, seed=1, drift=0.0):

@@ -4,11 +4,7 @@ import pytest
 
 from cns_drake.base.points import from_xyz
 from evaluation.drives import open_drive
-from evaluation.maps.voxel_maps import (
-    VoxelAccumulator,
-    map_drive,
-    voxelise,
-)
+from evaluation.maps.voxel_maps import VoxelAccumulator, map_drive, voxelise
 
 
 def reference_map(points, voxel_size):

@@ -5,11 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from cns_drake.base import poses
-from evaluation.methods.btc import (
-    align,
-    find_motion,
-    plane_overlap,
-)
+from evaluation.methods.btc import align, find_motion, plane_overlap
 from evaluation.methods.btc_planes import Planes
 
 

@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.methods.btc_planes import (
-    hash_table_order,
-    voxel_order,
-)
+from evaluation.methods.btc_planes import hash_table_order, voxel_order
 
 # The order of these 40 voxels, inserted one after the other, in a
 # std::unordered_map with the public program's hash (GCC 12.2, x86-64). The

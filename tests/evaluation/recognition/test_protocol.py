@@ -8,10 +8,7 @@ from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.place_recognition import run
-from evaluation.recognition.protocol import (
-    PROTOCOL_COLUMNS,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PROTOCOL_COLUMNS, RetrievalProtocol
 from evaluation.recognition.retrieval import retrieve
 
 

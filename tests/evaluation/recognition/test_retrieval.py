@@ -4,11 +4,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
-from evaluation.drives.sampling import (
-    gather,
-    sample_frames,
-    within_range,
-)
+from evaluation.drives.sampling import gather, sample_frames, within_range
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.place_recognition import run

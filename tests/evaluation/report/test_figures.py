@@ -13,11 +13,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report import curve_figures
 from evaluation.report.curve_figures import draw_auc_over_change
 from evaluation.report.drawing import PIXELS, save
-from evaluation.report.figures import (
-    judge_points,
-    top_view,
-    voxel_of_each,
-)
+from evaluation.report.figures import judge_points, top_view, voxel_of_each
 
 
 def test_change_picture_has_the_colours_of_the_metric():
