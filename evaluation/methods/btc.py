@@ -87,7 +87,7 @@ class BtcConfig(MethodConfig):
             plane [m]; [O] 0.3.
         image_axes: whether keypoints are placed as by the public program,
             whose second axis leaves the plane by a wrong term (see
-            `btc_keypoints.image_axes`), or by orthogonal axes. [P] public.
+            `btc_triangles.image_axes`), or by orthogonal axes. [P] public.
         resolution: length of a cell of the image [m]; [O] 0.5.
         height_range: heights above the ground of the points in it [m];
             [O] -1, 4.

@@ -238,7 +238,7 @@ def best_overlaps(
             steps of a full turn.
         places: (D, R + 2 m, S) uint64: maps of the places, with m rows without
             bits on either side.
-        weights: (S,) uint64 of a common bit of each map.
+        weights: (S,) int64, how much a common bit of each map counts.
         starts: (N, 4) int64: which place, heading, and shift of the query along
             rows and along columns.
         moves: (K, 3) int64: what is added to heading and shifts.
@@ -264,13 +264,13 @@ def best_overlaps(
             up = starts[n, 3] + moves[k, 2]
             if abs(right) > margin:
                 continue
-            lower, raise_ = np.uint64(max(-up, 0)), np.uint64(max(up, 0))
+            to_right, to_left = np.uint64(max(-up, 0)), np.uint64(max(up, 0))
             first = (margin + right) * num_maps
             query = query_words[heading]
             place = place_words[starts[n, 0], first : first + size]
             total = np.uint64(0)
             for i in range(size):
-                bits = (query[i] << raise_ >> lower) & place[i]
+                bits = (query[i] << to_left >> to_right) & place[i]
                 # Bits are counted in pairs, nibbles, bytes, then all at once,
                 # for which compilers have an instruction.
                 bits -= (bits >> np.uint64(1)) & _EVERY_2ND

@@ -28,7 +28,7 @@ from evaluation.geometry.neighbours import nearest_neighbours
 from evaluation.methods.method import Method, MethodConfig, register
 
 # See `local_features`.
-NUM_FEATURES = 6
+_NUM_FEATURES = 6
 # Bounds the normalised spectrum of a channel that hardly varies. It is the
 # default of PyTorch's InstanceNorm2d, which the authors' program uses. It
 # removes a third of the power of the variance of z, and is therefore part of
@@ -90,9 +90,9 @@ class Ring:
 
     def bev(self, num_cells: int) -> np.ndarray:
         """Returns the map from above, (n, n, 6) float32."""
-        image = np.zeros((num_cells * num_cells, NUM_FEATURES), np.float32)
+        image = np.zeros((num_cells * num_cells, _NUM_FEATURES), np.float32)
         image[self.filled] = self.features
-        return image.reshape(num_cells, num_cells, NUM_FEATURES)
+        return image.reshape(num_cells, num_cells, _NUM_FEATURES)
 
 
 @dataclass(frozen=True)
@@ -136,9 +136,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         magnitudes = np.abs(np.fft.rfft(sinogram, axis=1, norm="ortho"))
         normalised = _normalise(magnitudes.transpose(2, 1, 0), num_cells)
         spectrum = np.fft.rfft(normalised, axis=2)
-        flat = image.reshape(-1, NUM_FEATURES)
+        flat = image.reshape(-1, _NUM_FEATURES)
         # No feature is negative: they only add up to 0 where all are 0.
-        filled = np.flatnonzero(flat @ np.ones(NUM_FEATURES))
+        filled = np.flatnonzero(flat @ np.ones(_NUM_FEATURES))
         return Ring(
             filled=filled,
             features=flat[filled].astype(np.float32),
@@ -251,7 +251,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             axis=0,
         )
         within = _without_duplicates(within)
-        image = np.zeros((config.cells, config.cells, NUM_FEATURES))
+        image = np.zeros((config.cells, config.cells, _NUM_FEATURES))
         if len(within) < 2:
             return image
         scaled = within / [
@@ -270,7 +270,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         order = np.argsort(cell)
         first = np.flatnonzero(np.diff(cell[order], prepend=-1))
         greatest = np.maximum.reduceat(features[order], first)
-        image.reshape(-1, NUM_FEATURES)[cell[order[first]]] = greatest
+        image.reshape(-1, _NUM_FEATURES)[cell[order[first]]] = greatest
         return image
 
     def _weigh(self, query: Ring) -> np.ndarray:
@@ -280,8 +280,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         the program, whose transforms are unitary.
         """
         n = self.config.cells
-        scale = _CORRELATION_SCALE * NUM_FEATURES * n * n * math.sqrt(n)
-        weights = np.tile(_frequency_weights(n) / scale, NUM_FEATURES)
+        scale = _CORRELATION_SCALE * _NUM_FEATURES * n * n * math.sqrt(n)
+        weights = np.tile(_frequency_weights(n) / scale, _NUM_FEATURES)
         return query.spectrum * weights[:, None].astype(np.float32)
 
     def _correlate(
