@@ -12,8 +12,7 @@ import time
 from typing import TYPE_CHECKING
 
 from cns_drake.base.errors import FailedJobsError, InputError, one_line
-from cns_drake.base.jobs.cluster import Cluster, Workers
-from cns_drake.base.jobs.dask_workers import LostSchedulerError
+from cns_drake.base.jobs.cluster import Cluster, LostSchedulerError, Workers
 from cns_drake.base.jobs.processes import (
     PATIENCE,
     JobError,

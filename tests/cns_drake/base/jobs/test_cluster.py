@@ -17,7 +17,7 @@ import psutil
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs import dask_workers
+from cns_drake.base.jobs import cluster
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.simulation.simulation import simulate
@@ -125,7 +125,7 @@ def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path):
     ["tcp://127.0.0.1:1", "nonsense://here", "nonsense", "tls://127.0.0.1:1"],
 )
 def test_a_scheduler_that_is_not_there(monkeypatch, address):
-    monkeypatch.setattr(dask_workers, "_ANSWER_TIMEOUT", 0.5)
+    monkeypatch.setattr(cluster, "_ANSWER_TIMEOUT", 0.5)
     with (
         pytest.raises(InputError, match=f"^--scheduler: {address}: no answer"),
         Cluster(scheduler=address).connect(print),
@@ -202,7 +202,7 @@ def test_a_scheduler_that_asks_for_certificates(certificates, tmp_path):
 
 
 def test_a_silent_scheduler(monkeypatch):
-    monkeypatch.setattr(dask_workers, "_ANSWER_TIMEOUT", 0.5)
+    monkeypatch.setattr(cluster, "_ANSWER_TIMEOUT", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (

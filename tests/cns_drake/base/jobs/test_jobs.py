@@ -15,8 +15,12 @@ import pytest
 
 from cns_drake.base.errors import FailedJobsError, InputError
 from cns_drake.base.files import exclusive
-from cns_drake.base.jobs.cluster import Cluster, choose_cluster
-from cns_drake.base.jobs.dask_workers import DaskWorkers, LostSchedulerError
+from cns_drake.base.jobs.cluster import (
+    Cluster,
+    DaskWorkers,
+    LostSchedulerError,
+    choose_cluster,
+)
 from cns_drake.base.jobs.processes import (
     JobError,
     ProcessDiedError,
