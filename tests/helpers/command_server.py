@@ -125,10 +125,8 @@ def _answer(client: socket.socket) -> None:
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = words
-        program = importlib.import_module(_PROGRAMS[Path(words[0]).name])
-        # The processes of its jobs import it, as they do elsewhere.
-        sys.modules["__main__"] = program
-        sys.exit(program.main())
+        module = _PROGRAMS[Path(words[0]).name]
+        sys.exit(importlib.import_module(module).main())
     status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
     client.send(bytes([status if status >= 0 else 128 - status]))
 

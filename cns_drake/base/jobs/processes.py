@@ -23,6 +23,7 @@ import sys
 import threading
 import time
 import traceback
+from types import ModuleType
 
 from cns_drake.base.errors import InputError, missing_library, one_line
 from cns_drake.base.files import exclusive
@@ -128,7 +129,7 @@ def _start(connection: Connection, job: bytes) -> BaseProcess:
 
 @contextlib.contextmanager
 def _environment_of_jobs() -> Iterator[None]:
-    """Sets what a new interpreter finds in its environment."""
+    """Sets what a new interpreter finds, as its environment and its script."""
     modules = [
         name
         for name in list(sys.modules)
@@ -142,9 +143,13 @@ def _environment_of_jobs() -> Iterator[None]:
     before = {name: os.environ.get(name) for name in changed}
     os.environ.update(changed)
     multiprocessing.set_forkserver_preload([__name__])
+    # The process of a job would run this process's script again.
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
     try:
         yield
     finally:
+        sys.modules["__main__"] = main
         for name, value in before.items():
             if value is None:
                 del os.environ[name]

@@ -232,9 +232,12 @@ def test_a_scheduler_that_is_lost():
 
 
 def test_local_jobs_open_no_port(tmp_path):
-    """Neither this process nor that of a job opens a port."""
-    path = tmp_path / "ports"
-    script = (
+    """Neither this process nor that of a job opens a port.
+
+    No process runs the script again.
+    """
+    path, script = tmp_path / "ports", tmp_path / "script.py"
+    script.write_text(
         "import sys\n"
         "from pathlib import Path\n"
         "from helpers import job_functions\n"
@@ -246,7 +249,7 @@ def test_local_jobs_open_no_port(tmp_path):
         "assert 'distributed' not in sys.modules\n"
     )
     subprocess.run(
-        [sys.executable, "-c", script, path],
+        [sys.executable, script, path],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         check=True,
     )
