@@ -26,9 +26,9 @@ def storeys_for(
     """Returns the storeys that bring a roof over `span` closest to a pitch.
 
     Args:
-        height: of the ridge [m].
+        height: height of the ridge [m].
         floor: height of the ground floor [m].
-        span: of the roof [m].
+        span: span of the roof [m].
         pitch_deg: wanted.
     """
     wanted = wings.ridge_rise(span, pitch_deg)
@@ -281,7 +281,7 @@ class _Plan:
 
     Attributes:
         main, wings, garage: its boxes.
-        storeys: of the main box.
+        storeys: storeys of the main box.
         free: part of the main front that no wing hides, in x [m].
         ahead: room in front of the main front [m].
     """

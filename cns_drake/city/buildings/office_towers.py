@@ -115,8 +115,8 @@ def _add_garden(
     Args:
         plan: outline of the floor.
         inner: the smallest outline of the storeys above.
-        z0, height: of the floor [m].
-        number: of the garden.
+        z0, height: those of the floor [m].
+        number: number of the garden.
     """
     limit = massing.inset_limit(inner)
     core = massing.inset(inner, min(2.8, 0.6 * limit))

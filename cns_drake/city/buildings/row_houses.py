@@ -35,14 +35,14 @@ class RowUnit:
     Attributes:
         roof: `gable` and `gambrel` along the street, `front` with its gable
             to the street, `stepped` with steps on it, `flat` with a cornice.
-        rise: of the roof, as a part of half its span.
+        rise: rise of the roof, as a part of half its span.
         storey: wanted height of a storey.
         floor: height of the ground floor above the street.
         door_left: whether the door is on the left.
-        window_pitch, window_width: of the windows.
+        window_pitch, window_width: those of the windows.
         casing: style of the windows' frames.
         bay: `none`, `canted`, `box` (on the ground) or `oriel` (above it).
-        bay_storeys: of the bay window.
+        bay_storeys: storeys of the bay window.
         dormers: how many at most, and their shape.
         canopy: whether there is a hood above the door.
         stoop: room in front of the wall for steps.
@@ -82,10 +82,10 @@ def add_unit(
         out: the building, with the materials of a family house.
         p: the house.
         area: x0, y0, x1, y1 of its walls; `p.stoop` in front stays free.
-        height: of its top [m].
+        height: height of its top [m].
         blind: edges against a neighbour.
         part: prefix of its own visuals.
-        door_material: of the door's leaf.
+        door_material: material of the door's leaf.
 
     Returns:
         The box of the house.

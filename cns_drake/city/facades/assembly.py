@@ -159,7 +159,7 @@ class Dice:
     Attributes:
         kind: the archetype of the building.
         site: its ground.
-        height: of its parapet, ridge or spire; only roof equipment and
+        height: height of its parapet, ridge or spire; only roof equipment and
             chimneys may rise above [m].
         rng: the source of all variation.
     """
@@ -216,8 +216,8 @@ class Assembly:
     Attributes:
         site: the ground it stands on.
         rng: the source of all variation that its parameters leave open.
-        rgb: of parts without a colour of their own.
-        glass_rgb: of its panes.
+        rgb: colour of parts without a colour of their own.
+        glass_rgb: colour of its panes.
     """
 
     site: Site
@@ -318,7 +318,7 @@ class Building(Assembly):
 
     Attributes:
         kind: its archetype.
-        height: of its parapet, ridge or spire; only roof equipment and
+        height: height of its parapet, ridge or spire; only roof equipment and
             chimneys may rise above [m].
         colours: part -> drawn colour.
     """

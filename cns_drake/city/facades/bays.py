@@ -48,7 +48,7 @@ def window(
         width: at most this, less where the bay is narrow [m].
         sill: bottom of the glass above the floor [m].
         head: top of the glass [m].
-        depth: of the glass behind the wall [m].
+        depth: depth of the glass behind the wall [m].
         mullions: upright bars that divide it.
         transom: height of a horizontal bar [m].
         ledge: how far the sill sticks out [m].

@@ -31,7 +31,7 @@ class WallFrame:
     """Carries geometry from a wall's own coordinates to the building's.
 
     Attributes:
-        length: of the wall [m].
+        length: length of the wall [m].
     """
 
     def __init__(self, outline: ArrayLike, edge: int):
@@ -116,7 +116,7 @@ def awnings(
         wall: the wall.
         cells: the shops along it.
         rng: draws which have one.
-        share: of the shops with one.
+        share: part of the shops with one.
         shape: how much narrower than its shop on either side, reach, lower
             edge and upper edge of an awning [m].
         door: half the stretch in the middle of the wall without any [m].
@@ -166,7 +166,7 @@ def piers(
     """Upright fins or pilasters along all walls of an outline.
 
     Args:
-        outline: of the walls.
+        outline: outline of the walls.
         pitch: about the distance between them [m].
         width: along the wall [m].
         reach: out of the wall [m].
@@ -210,10 +210,10 @@ def pilasters(
     """Pilasters between the bays that `bays.rhythm` gives these walls.
 
     Args:
-        outline: of the walls.
-        pitch, margin: of the bays [m].
+        outline: outline of the walls.
+        pitch, margin: those of the bays [m].
         every: one pilaster each so many bays.
-        width, reach: of a pilaster [m].
+        width, reach: those of a pilaster [m].
         z0, z1: bottom and top [m].
         skip: edges without pilasters.
     """
@@ -240,8 +240,8 @@ def corner_piers(
     """Angled piers around the convex corners of an outline.
 
     Args:
-        outline: of the walls.
-        width: of each flank along its wall [m].
+        outline: outline of the walls.
+        width: width of each flank along its wall [m].
         reach: out of the walls [m].
         depth: into the walls, past recessed glass [m].
         z0, z1: bottom and top [m].
@@ -349,10 +349,10 @@ def add_porch(
         out: gets `trim` and `roof`.
         wall: the wall behind it.
         x0, x1: its extent along the wall [m].
-        reach: of its posts out of the wall; the roof ends 0.25 m further.
+        reach: reach of its posts out of the wall; the roof ends 0.25 m further.
         deck: height of its floor [m].
         eaves: underside of the beam on the posts [m].
-        top: of the roof [m].
+        top: top of the roof [m].
         roof: `shed`, `gable` (a pediment over all of it) or `flat`.
         posts: how many along the front, at least 2.
     """
@@ -534,7 +534,7 @@ def casings(
         reliefs: the openings of the wall.
         glass: depths of the windows among them [m].
         style: `frame` (a ring of boards), `sill` or `shutters`.
-        reach: of the boards out of the wall [m].
+        reach: reach of the boards out of the wall [m].
     """
     pieces = []
     for r in reliefs:

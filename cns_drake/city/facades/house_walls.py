@@ -132,7 +132,7 @@ class Openings:
             materials: where to, the panes as `glass`.
             glass: depths of the openings that have panes [m].
             bands: strips around the wing.
-            material: of the walls.
+            material: material of the walls.
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)
@@ -177,10 +177,10 @@ class Openings:
             edges: its walls with windows.
             floor: height of the ground floor [m].
             storey: height of a storey [m].
-            count: of storeys.
-            pitch, width: of the windows [m].
+            count: count of storeys.
+            pitch, width: those of the windows [m].
             margin: kept from corners [m].
-            head: of the windows above the floor [m].
+            head: top of the windows above the floor [m].
         """
         for k in range(count):
             z = floor + k * storey
@@ -273,10 +273,10 @@ class Openings:
                 differences between shops.
             edge: number of the wall.
             start, end: the stretch [m].
-            height: of the ground floor [m].
+            height: height of the ground floor [m].
             width: wanted, of a shop [m].
             awnings: part of the shops with an awning.
-            reach: of awnings out of the wall [m].
+            reach: reach of awnings out of the wall [m].
         """
         wall = self._wing.wall(edge)
         head, rng = round(height - 1.15, 2), out.rng

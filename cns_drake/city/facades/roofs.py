@@ -189,7 +189,7 @@ def hip(
     """Returns a hipped roof over a rectangle, boxed in below its eaves.
 
     Args:
-        outline: of the walls, four corners.
+        outline: outline of the walls, four corners.
         z: underside of the eaves [m].
         top: height of the ridge [m].
         eaves: overhang, one or one per edge [m].
@@ -211,7 +211,7 @@ def mansard(
     """Returns a roof with steep sides up to a knee and a hip above.
 
     Args:
-        outline: of the walls, four corners.
+        outline: outline of the walls, four corners.
         z: underside of the eaves [m].
         knee, top: heights where the steep sides end and of the ridge [m].
         run: how far the steep sides lean inwards from the walls [m].
@@ -272,7 +272,7 @@ def add_chimney(
     Args:
         out: the building.
         part: name of the visual.
-        xyz: of its foot, below the roof's surface [m].
+        xyz: xyz of its foot, below the roof's surface [m].
         rgb: its colour.
         item: `chimney` or `chimney_row`.
         yaw: its heading [rad].
@@ -297,7 +297,7 @@ def equip_roof(
         z: height of the roof [m].
         items: what to stand there, the most important first.
         clear: distance kept from the edge [m].
-        prefix: of the names of the visuals.
+        prefix: start of the names of the visuals.
     """
     room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds

@@ -115,8 +115,8 @@ class Grooves:
         storey_height: wanted, of a storey [m].
         spandrel: height of the wall under the windows [m].
         ledge: how far a lip under the windows sticks out [m].
-        glass_depth: of the windows behind the spandrels [m].
-        pitch, width, reach: of the piers [m]; none where width is 0.
+        glass_depth: depth of the windows behind the spandrels [m].
+        pitch, width, reach: those of the piers [m]; none where width is 0.
         corner: width of solid corners [m]; 0 for glass around the corner.
     """
 
@@ -195,7 +195,7 @@ def shaft_walls(
     """Returns the walls of a stair: one bay in front, one behind.
 
     Args:
-        height: of the walls [m].
+        height: height of the walls [m].
         entry, slit: the bays, in the middle of the front and of the back.
         room: width that they get [m].
         rim: height and reach of a band at the top [m].

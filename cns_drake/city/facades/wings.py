@@ -33,9 +33,9 @@ class Roof:
             roof rises across the ridge's direction.
         eaves: overhang below the slopes [m].
         verge: overhang beyond the gables [m].
-        thickness: of the roof, measured upright [m].
+        thickness: thickness of the roof, measured upright [m].
         ridge: place of a gable roof's ridge as a part of the span.
-        parapet: of a flat roof [m].
+        parapet: parapet of a flat roof [m].
         falling: whether a shed roof falls along its line instead of rising:
             to the back, or to the right if `along_y`.
     """
@@ -57,7 +57,7 @@ class Wing:
     Attributes:
         x0, y0, x1, y1: its walls [m].
         wall_top: top of its walls [m].
-        top: of its roof [m]; of a flat roof, the parapet.
+        top: top of its roof [m]; of a flat roof, the parapet.
         roof: shape of its roof.
         blind: edges built against a neighbour: flush and plain.
     """
@@ -183,7 +183,7 @@ def add_roof(
         out: where to, the roof as `roof`.
         wing: the wing.
         attic: (x0, x1) -> holes for the windows of a gable, or None.
-        material: of the gables.
+        material: material of the gables.
     """
     roof, outline = wing.roof, wing.outline
     blind = np.array([k in wing.blind for k in range(4)])
@@ -317,8 +317,8 @@ def add_dormer(
         base: height of the slope's upper surface above the wall [m].
         slope: its rise per run.
         ridge: its upper end, above the dormer [m].
-        setback: of the dormer's front from the wall [m].
-        height: of its front above the slope [m].
+        setback: setback of the dormer's front from the wall [m].
+        height: height of its front above the slope [m].
         roof: `gable`, `shed` or `flat`.
     """
     a, b = x - width / 2, x + width / 2
@@ -375,7 +375,7 @@ def add_dormers(
         out: where to.
         wing: with a `gable` or `gambrel` roof along the front.
         start, end: the stretch of the front wall below them [m].
-        count: of dormers, at most.
+        count: count of dormers, at most.
         roof: their shape.
         pitch: greatest distance between two [m].
     """

@@ -88,7 +88,7 @@ def run(
     Args:
         rng: draws the colour.
         name: a key of `RUN_KINDS`.
-        length: of the run [m]; positive.
+        length: length of the run [m]; positive.
         height: [m], positive; the nominal one if not given.
     """
     kind = RUN_KINDS[name]
@@ -172,7 +172,7 @@ def obelisk(rng: np.random.Generator, *, height: float | None = None) -> Model:
 
     Args:
         rng: draws the height if it is not given.
-        height: of the tip [m].
+        height: height of the tip [m].
     """
     drawn = float(rng.uniform(9.0, 14.0))
     height = drawn if height is None else height
@@ -188,7 +188,7 @@ def fountain(rng: np.random.Generator, *, radius: float | None = None) -> Model:
 
     Args:
         rng: draws the radius if it is not given.
-        radius: of the basin [m].
+        radius: radius of the basin [m].
     """
     drawn = float(rng.uniform(2.5, 3.6))
     radius = drawn if radius is None else radius

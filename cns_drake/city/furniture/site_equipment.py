@@ -161,8 +161,8 @@ def tower_crane(
 
     Args:
         rng: draws the heading and each value that is not given.
-        height: of the jib, made up of whole mast sections of 4 m [m].
-        reach: of the jib, made up of whole sections of 4 m [m].
+        height: height of the jib, made up of whole mast sections of 4 m [m].
+        reach: reach of the jib, made up of whole sections of 4 m [m].
     """
     drawn_height, drawn_reach = rng.uniform(36.0, 56.0), rng.uniform(28, 44)
     heading = round(float(rng.uniform(-np.pi, np.pi)), 3)

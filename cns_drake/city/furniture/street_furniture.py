@@ -172,7 +172,7 @@ def straight_lamp(
 
     Args:
         rng: draws the height if it is not given.
-        height: of the lamps [m].
+        height: height of the lamps [m].
         arms: 1, or 2 for a mast between two carriageways (along +-x).
     """
     drawn = float(rng.uniform(8.0, 9.5))
@@ -211,7 +211,7 @@ def curved_lamp(
 
     Args:
         rng: draws the height if it is not given.
-        height: of the lamps [m].
+        height: height of the lamps [m].
         arms: 1 or 2, along +x and -x.
     """
     drawn = float(rng.uniform(7.0, 8.5))
@@ -239,7 +239,7 @@ def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
 
     Args:
         rng: draws the height if it is not given.
-        height: of the top of the lantern [m].
+        height: height of the top of the lantern [m].
     """
     drawn = float(rng.uniform(3.8, 4.4))
     height = drawn if height is None else height

@@ -73,9 +73,9 @@ class Streets:
     """Streets that a city is built along.
 
     Attributes:
-        areas: of them.
+        areas: their areas.
         surface: how high they lie.
-        kerb_height: of sidewalks above it [m].
+        kerb_height: height of sidewalks above it [m].
         junctions: the area of all junctions in W [m].
         margins: strips beside them that stay free; buildings stand along them,
             in W.
@@ -142,7 +142,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 
     Args:
         network: the roads.
-        plan: of the districts.
+        plan: plan of the districts.
         source: the plan's file name, for messages.
 
     Raises:
@@ -171,7 +171,7 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
 
     Args:
         streets: the streets of the city.
-        plan: of the districts.
+        plan: plan of the districts.
         source: the plan's file name, for messages.
 
     Raises:

@@ -68,7 +68,7 @@ def find_renaming(
     Args:
         stages: a `stages.yaml`.
         table: the `structures.csv` of the city for which it was written.
-        structures: of the city of today.
+        structures: structures of the city of today.
 
     Raises:
         InputError: a file cannot be read.

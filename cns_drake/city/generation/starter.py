@@ -56,7 +56,7 @@ def start_city(
 
     Args:
         world: folder with `roads.yaml`.
-        seed: of the draws.
+        seed: seed of the draws.
         progress: takes a line for each file that is written.
 
     Returns:
@@ -117,8 +117,8 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
     """Returns a plan in which every block has a character of its own.
 
     Args:
-        areas: of the streets.
-        seed: of the draws.
+        areas: areas of the streets.
+        seed: seed of the draws.
 
     Returns:
         What `CityPlan` validates.

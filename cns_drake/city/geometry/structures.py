@@ -209,9 +209,9 @@ def one_mesh(
     """Returns a builder of objects of one mesh.
 
     Args:
-        name: of the mesh.
+        name: name of the mesh.
         colours: to choose from.
-        semantic_class: of the objects.
+        semantic_class: class of the objects.
         stretch: x, y or z -> range of the scale along this axis.
     """
 

@@ -88,8 +88,8 @@ class SlopingGround:
         """Shapes the ground.
 
         Args:
-            surface: of the roads.
-            kerb_height: of sidewalks above the roads [m].
+            surface: surface of the roads.
+            kerb_height: height of sidewalks above the roads [m].
             streets: carriageways, sidewalks and medians in W [m].
             bounds: x0, y0, x1, y1 of the city [m].
             pads: outside the streets; of two that meet the first wins.
@@ -199,8 +199,8 @@ def make_ground(
     """Returns level ground where all roads and pads are level, else slopes.
 
     Args:
-        surface: of the roads.
-        kerb_height: of sidewalks above the roads [m].
+        surface: surface of the roads.
+        kerb_height: height of sidewalks above the roads [m].
         streets: carriageways, sidewalks and medians in W [m].
         bounds: x0, y0, x1, y1 of the city [m].
         pads: outside the streets; of two that meet the first wins.

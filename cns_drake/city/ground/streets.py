@@ -62,7 +62,7 @@ class Covering:
     """A part of the carriageway that is of another kind than the lanes.
 
     Attributes:
-        name: of its structure.
+        name: name of its structure.
         semantic_class: likewise.
         area: in W [m].
         rgb: colour.
@@ -102,7 +102,7 @@ def street_surfaces(
     Kinds of ground that are absent from these streets are left out.
 
     Args:
-        areas: of the streets.
+        areas: areas of the streets.
         surface: how high the carriageway lies.
         kerb: height of sidewalks and medians above it [m].
         coverings: within the carriageway.
@@ -171,12 +171,12 @@ def ground_structure(
     """Returns the upper side of an area, one part a tile.
 
     Args:
-        name: of the structure; also stem of its mesh names.
-        semantic_class: of the structure.
+        name: name of the structure; also stem of its mesh names.
+        semantic_class: class of the structure.
         area: polygons in W [m].
         height: in W [m], or a height map.
         rgb: colour.
-        spacing: of the mesh that follows a height map [m]; 0: only the
+        spacing: spacing of the mesh that follows a height map [m]; 0: only the
             polygons' own vertices.
     """
     pieces = {

@@ -48,10 +48,10 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
     Args:
         model: the whole building.
-        height: of the roof above the building's own ground [m]; its parapet and
-            the equipment on the roof reach higher.
-        name: of the building; its new meshes are called after it.
-        seed: of what stands on the roof.
+        height: height of the roof above the building's own ground [m]; its
+            parapet and the equipment on the roof reach higher.
+        name: name of the building; its new meshes are called after it.
+        seed: seed of what stands on the roof.
 
     Returns:
         A building with the same footprint; the model itself where less than
@@ -106,7 +106,7 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
 
     Args:
         mesh: with plane convex faces.
-        height: of the cut [m].
+        height: height of the cut [m].
 
     Returns:
         The lower part, open at the cut; (N, 2, 2) starts and ends of the

@@ -40,7 +40,7 @@ def younger(model: Model, height: float) -> Model:
 
     Args:
         model: the grown plant, on z = 0.
-        height: of its top [m].
+        height: height of its top [m].
 
     Returns:
         A plant with the same footprint; the model itself if it is lower.
@@ -91,9 +91,9 @@ def building_site(model: Model, height: float, name: str, seed: int) -> Model:
 
     Args:
         model: the finished building.
-        height: of the frame [m].
-        name: of the building.
-        seed: of the frame and the crane.
+        height: height of the frame [m].
+        name: name of the building.
+        seed: seed of the frame and the crane.
 
     Returns:
         A model within the building's footprint, except for the jib.
@@ -282,9 +282,9 @@ class GrowingCity:
     """A city and its stages.
 
     Attributes:
-        structures: of the whole city, then those on lots before they are built
-            on; a structure's instance id is its place in this order, counted
-            from 1, and the same at all stages.
+        structures: structures of the whole city, then those on lots before they
+            are built on; a structure's instance id is its place in this order,
+            counted from 1, and the same at all stages.
     """
 
     def __init__(
@@ -296,7 +296,7 @@ class GrowingCity:
         """Fills the lots.
 
         Args:
-            structures: of the whole city, the last stage.
+            structures: structures of the whole city, the last stage.
             stages: the structures that the others lack or have lower.
             cars: object -> weight of cars that are parked on lots.
         """

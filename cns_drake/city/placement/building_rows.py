@@ -45,7 +45,7 @@ class _House:
         archetype: key of the registry of buildings.
         footprint: in its own frame S [m].
         xy, yaw: where S lies in W [m, rad].
-        height: of the walls [m].
+        height: height of the walls [m].
         taken: the ground in W that was taken for it.
         blind_edges: edges of the footprint with a neighbour wall to wall.
     """

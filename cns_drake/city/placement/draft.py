@@ -42,7 +42,7 @@ class Draft:
     """Collects structures, gives them names and keeps them apart.
 
     Attributes:
-        areas: of the streets.
+        areas: areas of the streets.
         streets: all ground of the streets, sidewalks included, in W.
         frontage: line along which buildings stand; the streets by default.
         base: height of sidewalks and of the ground between them in W,
@@ -139,7 +139,7 @@ class Draft:
         others do not depend on whether it fits.
 
         Args:
-            name: of the object, a key of `OBJECTS`.
+            name: name of the object, a key of `OBJECTS`.
             model: its geometry.
             xy: position in W [m].
             yaw: heading in W [rad].

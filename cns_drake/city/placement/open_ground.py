@@ -168,7 +168,7 @@ def place_car(
         xy: position in W [m].
         yaw: heading in W [rad].
         rng: draws the car.
-        tags: of the structure.
+        tags: tags of the structure.
     """
     name = pick(cars, rng)
     draft.place(name, OBJECTS[name].build(rng), xy, yaw, tags)

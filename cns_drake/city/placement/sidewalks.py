@@ -56,7 +56,7 @@ def _furnish_arm(
         """Places an object beside the arm.
 
         Args:
-            name: of the object.
+            name: name of the object.
             distance: from the junction's edge along the arm [m].
             side: 1: to the left seen from the junction (incoming traffic has
                 it on the right), -1: to the right.
@@ -110,7 +110,7 @@ def furnish_sidewalks(
 
     Args:
         draft: the city so far.
-        plan: of its streets.
+        plan: plan of its streets.
         districts: along the sidewalks.
         junctions: the area of all junctions in W [m].
     """
@@ -232,10 +232,10 @@ def _place(
 
     Args:
         draft: the city so far.
-        name: of the object.
+        name: name of the object.
         at: place on the line; the street is on the line's right.
         rng: draws the object.
-        tags: of the structure.
+        tags: tags of the structure.
         facing_street: turn the object to the right and set it back, so that
             its front touches the line; else it stands on the line, along it.
     """

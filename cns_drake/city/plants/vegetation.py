@@ -72,7 +72,7 @@ def tree(
     Args:
         rng: draws each value that is not given.
         species: a key of `SPECIES`.
-        height: of the top, within the species' range for the promised
+        height: height of the top, within the species' range for the promised
             clearance below the crown [m].
         variant: number of the mesh variant.
     """

@@ -250,8 +250,8 @@ class PlannedBuildings:
         bare: the buildings.
         plans: number of a building -> its dressed walls.
         distances: number of a building -> their distances to the drives [m].
-        paths: of the drives.
-        seed: of the lot.
+        paths: paths of the drives.
+        seed: seed of the random draws.
     """
 
     bare: Sequence[Bare]
@@ -306,9 +306,9 @@ def plan_buildings(
     Args:
         structures: those of all stages.
         drives: through the city; without any no wall has windows.
-        streets: of the file; doors and shops face them.
+        streets: streets of the file; doors and shops face them.
         ground: below the city.
-        seed: of the lot.
+        seed: seed of the random draws.
         always: structures of all stages, which hide what is behind them; all
             structures if None.
     """
@@ -336,9 +336,10 @@ def _dressed(
 
     Args:
         some: the building.
-        plans: of its dressed walls, with their distances to the drives [m].
-        paths: of the drives.
-        seed: of the lot.
+        plans: plans of its dressed walls, with their distances to the drives
+            [m].
+        paths: paths of the drives.
+        seed: seed of the random draws.
     """
     faces = Faces()
     walls = _undressed_walls(some, [plan for plan, _ in plans])
@@ -446,7 +447,7 @@ def _seen(
     The nearest come first, within the budget of triangles.
 
     Args:
-        walls: of each building, upright triangles (M, 3, 3) [m].
+        walls: walls of each building, upright triangles (M, 3, 3) [m].
         views: from the drives.
     """
     panels = [

@@ -64,8 +64,8 @@ class FacadePlan:
 
     Attributes:
         panel: the wall.
-        style: of its building.
-        openings: of it.
+        style: style of its building.
+        openings: its openings.
         spacing: from one window to the next [m].
         floor: height of the lowest floor in the panel [m].
         ground: height of the ground in front, in the panel's coordinates [m].
@@ -143,7 +143,7 @@ def plan_facade(
 
     Args:
         panel: the wall.
-        style: of its building.
+        style: style of its building.
         base: height of the lowest floor of the building [m].
         ground: height of the ground before the panel [m].
     """
@@ -333,10 +333,10 @@ def add_facade(
     """Adds all faces of a wall.
 
     Args:
-        faces: of the building.
-        plan: of the wall.
+        faces: faces of the building.
+        plan: plan of the wall.
         to_drive: distance from the wall to the nearest drive [m].
-        rng: of the building.
+        rng: random draws of the building.
     """
     panel, style = plan.panel, plan.style
     has_balconies = style.balconies and bool(rng.random() < 0.6)
@@ -524,10 +524,10 @@ def roof_pieces(
 
     Args:
         roof: (M, 3, 3) its upper sides [m].
-        style: of the building.
+        style: style of the building.
         is_flat: whether its roof is flat.
-        rng: of the building.
-        name: of the structure.
+        rng: random draws of the building.
+        name: name of the structure.
     """
     footprint = box(0.0, 0.0, 1.0, 1.0)
     out = Assembly(Site(footprint, name), rng)

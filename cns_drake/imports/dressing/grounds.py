@@ -123,7 +123,7 @@ def missing_sidewalks(
 
     Args:
         structures: those of all stages, on level ground.
-        streets: of the file.
+        streets: streets of the file.
         drives: through the city.
     """
     paths = MultiLineString([drive.path for drive in drives])
@@ -418,7 +418,7 @@ def lane_marks(
     """Yields the middle lines of the larger streets near drives.
 
     Args:
-        streets: of the file, on level ground.
+        streets: streets of the file, on level ground.
         drives: through the city, at least one.
     """
     paths = MultiLineString([drive.path for drive in drives])

@@ -117,7 +117,7 @@ def _turned(
     Args:
         radii: from below.
         heights: at these radii.
-        sides: of the polygon, which has the area of the circle.
+        sides: sides of the polygon, which has the area of the circle.
         pole: where the axis is met, above and below; at the same heights as
             the first and the last radius if None.
     """
@@ -439,11 +439,11 @@ def dress_streets(
 
     Args:
         structures: those of all stages.
-        things: of the file.
-        streets: of the file.
+        things: things of the file.
+        streets: streets of the file.
         drives: kept free of things; without any nothing is placed.
         ground: below the city.
-        seed: of the random draws.
+        seed: seed of the random draws.
     """
     found = StreetThings()
     if not drives:

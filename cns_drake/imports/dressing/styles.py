@@ -58,8 +58,8 @@ class Style:
         use: the use of the building.
         storey: height of a storey.
         pitch: distance of windows from middle to middle.
-        width, sill, height: of a window; its sill from the floor.
-        depth: of its recess.
+        width, sill, height: those of a window; its sill from the floor.
+        depth: depth of its recess.
         wall, roof, glass, frame, trim, door, sign: colours.
         shops: whether the ground floor has shops on the street.
         balconies: whether every other window has a balcony.
@@ -95,9 +95,9 @@ def building_use(
     """Returns the use of a building, and whether it comes from its tags.
 
     Args:
-        tags: of the building, or attributes.
-        area: of its footprint, about [m^2].
-        height: of its walls [m].
+        tags: tags of the building, or attributes.
+        area: area of its footprint, about [m^2].
+        height: height of its walls [m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     if "shop" in tags:
@@ -143,12 +143,13 @@ def make_style(
     """Draws the style of a building; its tags take precedence.
 
     Args:
-        tags: of the building, or attributes; they win.
+        tags: tags of the building, or attributes; they win.
         year: in which it was built, if known.
-        area: of its footprint, about [m^2].
-        height: of its walls [m].
+        area: area of its footprint, about [m^2].
+        height: height of its walls [m].
         is_flat: whether its roof is.
-        rng: of the building; the number of draws does not depend on the tags.
+        rng: random draws of the building; the number of draws does not depend
+            on the tags.
     """
     use, is_tagged = building_use(tags, area, height)
     by_tag = {"use"} if is_tagged else set()

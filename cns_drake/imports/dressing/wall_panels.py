@@ -41,7 +41,7 @@ class Panel:
         building: number of its building.
         origin: (3,) where x = z = 0 [m].
         along: (2,) unit vector to the right, seen from outside.
-        length, height: of its bounding rectangle [m].
+        length, height: those of its bounding rectangle [m].
         outline: polygon in x and z [m]; None if it fills the rectangle.
         triangles: (M, 3, 3) its original triangles [m].
         is_plane: whether these are in one plane.
@@ -121,7 +121,7 @@ def find_panels(
     """Returns the panels of the walls of buildings.
 
     Args:
-        walls: of each building, upright triangles (M, 3, 3) that look
+        walls: walls of each building, upright triangles (M, 3, 3) that look
             outwards [m].
         is_wanted: maps the least and greatest x and y of N panels, (N, 2, 2)
             [m], to which (N,) are wanted; all if None.

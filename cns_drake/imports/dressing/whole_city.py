@@ -96,7 +96,7 @@ def dress_city(
             its faults.
         drives: through it.
         ground: below it.
-        seed: of the random draws.
+        seed: seed of the random draws.
 
     Raises:
         InputError: if there are more structures than a map may have.
