@@ -17,7 +17,7 @@ import numpy as np
 from shapely.geometry import Polygon
 import yaml
 
-from cns_drake.city.buildings import (
+from cns_drake.city.buildings import (  # noqa: F401
     family_houses,
     flats,
     halls,
@@ -47,23 +47,8 @@ ARCHETYPES = {
 # Name -> class, such as `brick_block` -> `BrickBlock`.
 BUILDERS: dict[str, type[Building]] = {
     re.sub("(?<!^)(?=[A-Z])", "_", one.__name__).lower(): one
-    for module in (
-        family_houses,
-        flats,
-        halls,
-        markets,
-        office_towers,
-        open_roofs,
-        public_buildings,
-        row_houses,
-        slabs,
-        street_blocks,
-        towers,
-    )
-    for one in vars(module).values()
-    if isinstance(one, type)
-    and issubclass(one, Building)
-    and one is not Building
+    for one in Building.__subclasses__()
+    if one is not Landmark
 } | dict.fromkeys(LANDMARKS, Landmark)
 
 
