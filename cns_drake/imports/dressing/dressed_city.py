@@ -31,6 +31,7 @@ from cns_drake.imports.dressing.wall_panels import (
     UpperSides,
     find_panels,
     is_upright,
+    joined,
     looks_up,
     turned_up,
 )
@@ -319,7 +320,7 @@ def plan_buildings(
     if drives and bare:
         lasting = set(buildings if always is None else always)
         hiding = [b.triangles for b in buildings if b in lasting]
-        solids = np.concatenate([np.zeros((0, 3, 3)), *hiding])
+        solids = joined(hiding)
         views = DriveViews(drives, ground, solids)
         plans, distances = _plans(bare, drives, streets, ground, views)
     paths = MultiLineString([drive.path for drive in drives])

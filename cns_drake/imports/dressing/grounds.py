@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape, Part, Structure
-from cns_drake.imports.dressing.wall_panels import looks_up, turned_up
+from cns_drake.imports.dressing.wall_panels import joined, looks_up, turned_up
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.faces import flat_surface, parts_of
 from cns_drake.imports.foreign_city import Imported, Rgb, Street, make_imported
@@ -141,15 +141,13 @@ def missing_sidewalks(
     if not lacking:
         return
     shapes = [
-        turned_up(one.triangles)[looks_up(turned_up(one.triangles))]
+        one
         for one in near_drives(structures, drives)
         if one.structure.semantic_class in ("building", "road", "sidewalk")
         or one.kind.startswith("Water")
     ]
-    triangles = np.concatenate([np.zeros((0, 3, 3)), *shapes])
-    rings = np.round(triangles[:, [0, 1, 2, 0], :2], 3)
     lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
-    taken = np.concatenate([shapely.polygons(rings), lanes])
+    taken = np.concatenate([_upper_sides(shapes), lanes])
     # The union of a whole city takes long: only polygons near each street
     # count.
     tree = STRtree(taken)
@@ -258,12 +256,7 @@ def guessed_streets(
 
 def _area(structures: Sequence[Imported], near: BaseGeometry) -> BaseGeometry:
     """Returns the area of structures near a place, from above."""
-    triangles = np.concatenate(
-        [np.zeros((0, 3, 3)), *(one.triangles for one in structures)]
-    )
-    triangles = triangles[looks_up(triangles)]
-    rings = np.round(triangles[:, [0, 1, 2, 0], :2], 3)
-    polygons = np.asarray(shapely.polygons(rings))
+    polygons = _upper_sides(structures, with_lower=False)
     shapely.prepare(near)
     return shapely.union_all(
         polygons[shapely.intersects(near, polygons)],
@@ -387,13 +380,13 @@ def paved_gaps(
         )
 
 
-def _upper_sides(structures: Sequence[Imported]) -> np.ndarray:
+def _upper_sides(
+    structures: Sequence[Imported], with_lower: bool = True
+) -> np.ndarray:
     """Returns the triangles that look up, or down, as polygons from above."""
-    triangles = turned_up(
-        np.concatenate(
-            [np.zeros((0, 3, 3)), *(one.triangles for one in structures)]
-        )
-    )
+    triangles = joined(one.triangles for one in structures)
+    if with_lower:
+        triangles = turned_up(triangles)
     rings = np.round(triangles[looks_up(triangles)][:, [0, 1, 2, 0], :2], 3)
     return np.asarray(shapely.polygons(rings))
 

@@ -25,7 +25,7 @@ from cns_drake.city.geometry.structures import (
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.imports.dressing.grounds import HALF_STREET
-from cns_drake.imports.dressing.wall_panels import UpperSides, turned_up
+from cns_drake.imports.dressing.wall_panels import UpperSides, joined, turned_up
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import (
     Imported,
@@ -199,11 +199,10 @@ class StreetRoom:
             for one in structures
             if one.is_ground or one.kind == "Sidewalk"
         ]
-        empty = np.zeros((0, 3, 3))
-        self._solids = UpperSides(np.concatenate([empty, *solids]))
+        self._solids = UpperSides(joined(solids))
         roads = [one.triangles for one in structures if one.kind == "Road"]
-        self._roads = UpperSides(turned_up(np.concatenate([empty, *roads])))
-        self._paved = UpperSides(turned_up(np.concatenate([empty, *paved])))
+        self._roads = UpperSides(turned_up(joined(roads)))
+        self._paved = UpperSides(turned_up(joined(paved)))
         self._taken = Occupancy()
         self._names = {one.structure.name for one in structures}
         self.lamps: list[tuple[float, float]] = []

@@ -5,7 +5,7 @@ Walls are found in the triangles of a file; so are the upper sides of solids.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -85,6 +85,11 @@ class Panel:
         return box(0.0, 0.0, self.length, self.height)
 
 
+def joined(some: Iterable[np.ndarray]) -> np.ndarray:
+    """Returns all triangles (M, 3, 3) of any number of arrays."""
+    return np.concatenate([np.zeros((0, 3, 3)), *some])
+
+
 def long_normals(triangles: np.ndarray) -> np.ndarray:
     """Returns normals (M, 3) twice as long as the areas of triangles [m^2].
 
@@ -126,7 +131,7 @@ def find_panels(
         is_wanted: maps the least and greatest x and y of N panels, (N, 2, 2)
             [m], to which (N,) are wanted; all if None.
     """
-    triangles = np.concatenate([np.zeros((0, 3, 3)), *walls])
+    triangles = joined(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
     if not len(triangles):
         return []

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import Structure
@@ -24,6 +22,7 @@ from cns_drake.imports.dressing.grounds import (
     with_kerb,
 )
 from cns_drake.imports.dressing.street_dressing import dress_streets
+from cns_drake.imports.dressing.wall_panels import joined
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.ground import Ground
@@ -118,7 +117,7 @@ def dress_city(
         for one in [*staged.kept, *laid]
         if one.is_ground or one.kind == "Sidewalk"
     ]
-    buildings = planned.dressed(np.concatenate([np.zeros((0, 3, 3)), *paving]))
+    buildings = planned.dressed(joined(paving))
     changed = dict(buildings.buildings)
     by_lot = Counter(buildings.by_lot)
     by_lot += Counter(one.kind for one in added)
