@@ -158,7 +158,7 @@ class ImuSamplesPort:
 
         Args:
             context: the recorder's.
-            schedule: of the recording.
+            schedule: the recording's.
             since: the last tick whose sample is written.
             tick: the present one.
             start_ns: the stamp of time zero [ns].

@@ -40,10 +40,10 @@ class DriveRow:
         sequence: the drive's name.
         map: the map's name.
         stage: the city's stage.
-        title: of the drive.
-        checksum: of the files that the figures depend on.
-        length: of the path [m].
-        duration: of the drive [s].
+        title: the drive's title.
+        checksum: that of the files that the figures depend on.
+        length: length of the path [m].
+        duration: duration of the drive [s].
         frames: number of recorded frames.
         structures: in the stage.
         triangles: in the stage.
@@ -69,7 +69,7 @@ def drive_rows(
     """Returns the rows of a map's drives whose stage is there.
 
     Args:
-        folder: of the map, with `sequence_NN.yaml` and `stage_NN.sdf`.
+        folder: the map's folder, with `sequence_NN.yaml` and `stage_NN.sdf`.
         progress: takes a line for each row that has to be measured.
         sizes: stage -> its structures and triangles; for other stages they are
             counted in the world, which takes long to load.

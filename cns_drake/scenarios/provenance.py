@@ -59,7 +59,7 @@ def digest_inputs(
     files they name.
 
     Args:
-        scenario: of the recording.
+        scenario: the scenario that is recorded.
         watch: also notes each file, before it is read.
 
     Returns:
@@ -113,7 +113,7 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     The folder of its files does not count, nor do settings of the drive's page.
 
     Args:
-        scenario: of the recording.
+        scenario: the scenario that is recorded.
         inputs: its `digest_inputs`.
     """
     places: dict[str, object] = {
@@ -148,7 +148,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
 
     Args:
-        path: of the model.
+        path: the model's file.
         watch: also notes each file, before it is read.
 
     Raises:

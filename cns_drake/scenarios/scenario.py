@@ -342,7 +342,7 @@ class Scenario(Section):
         """Returns the scenario with other traffic, of the same seed.
 
         Args:
-            number: of vehicles, and of walkers.
+            number: number of vehicles, and of walkers.
         """
         traffic = TrafficConfig(
             vehicles=number, walkers=number, seed=self.traffic.seed

@@ -296,7 +296,7 @@ def _check_redrawable(
     """Checks that the city can be drawn anew.
 
     Args:
-        base: of the family.
+        base: the family's base.
         family: the variations.
         last: the map's last stage.
         source: the file that errors name.
@@ -368,8 +368,8 @@ def _decay_order(
     """Returns the structures that can be missing, the first to go first.
 
     Args:
-        table: of all structures.
-        seed: of the place from which the city decays.
+        table: file of all structures.
+        seed: seed of the place from which the city decays.
         removable: names of structures that can be missing; all buildings and
             plants if None.
 
@@ -415,9 +415,9 @@ def draw_losses(
     A greater part includes all structures of a smaller one.
 
     Args:
-        table: of all structures.
+        table: file of all structures.
         parts: class -> missing part of its structures, 0 to 1.
-        seed: of the draw.
+        seed: seed of the draw.
         source: the file that errors name.
 
     Raises:

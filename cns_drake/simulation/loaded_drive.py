@@ -52,8 +52,8 @@ class LoadedDrive:
     Attributes:
         scenario: with `frames` given.
         inputs: digests of its files.
-        fingerprint: of the recording, for `fingerprint.txt`.
-        trajectory: of the vehicle.
+        fingerprint: that of the recording, for `fingerprint.txt`.
+        trajectory: motion of the vehicle.
         world: the stage.
         num_frames: number of frames.
         traffic: other moving objects, if any.
@@ -190,7 +190,7 @@ def plan_scenario_traffic(
 
     Args:
         scenario: with traffic.
-        trajectory: of its vehicle.
+        trajectory: motion of its vehicle.
 
     Raises:
         InputError: the map has no roads or sidewalks, or no room for that many;

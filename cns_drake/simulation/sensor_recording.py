@@ -49,7 +49,7 @@ def add_mcap_recorder(
     without a period, each LiDAR with one scan a turn.
 
     Args:
-        builder: of the diagram that holds the sensors.
+        builder: holds the sensors.
         folder: the rosbag2 folder to write.
         period: time between frames of all other sensors [s]; by default a
             turn of the first LiDAR.
@@ -61,7 +61,7 @@ def add_mcap_recorder(
         odometry: to record, if any.
         start_ns: the stamp of time zero [ns].
         overwrite: whether an existing recording may be replaced.
-        name: of the system.
+        name: name of the system.
 
     Returns:
         The recording, a context manager that is open while the diagram is

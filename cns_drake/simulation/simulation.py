@@ -56,7 +56,7 @@ class Run:
     """The result of a simulation.
 
     Attributes:
-        name: of the drive.
+        name: name of the drive.
         folder: the recording.
         num_frames: frames in the recording.
         resumed_frames: number of them that an interrupted run had recorded.
@@ -309,7 +309,7 @@ def _advance(
 
     Args:
         diagram: the station.
-        writer: of its recording.
+        writer: writes its recording.
         drive: the drive, simulated up to its last frame.
         first: the first frame to simulate.
         on_frame: receives the number of finished frames of the drive, after

@@ -28,16 +28,16 @@ class ImuNoise:
     independent and equally large.
 
     Attributes:
-        accelerometer_noise_density: of its white noise [m/s^2/sqrt(Hz)].
-        accelerometer_random_walk: of its bias [m/s^3/sqrt(Hz)].
-        gyroscope_noise_density: of its white noise [rad/s/sqrt(Hz)].
-        gyroscope_random_walk: of its bias [rad/s^2/sqrt(Hz)].
+        accelerometer_noise_density: white noise [m/s^2/sqrt(Hz)].
+        accelerometer_random_walk: walk of its bias [m/s^3/sqrt(Hz)].
+        gyroscope_noise_density: white noise [rad/s/sqrt(Hz)].
+        gyroscope_random_walk: walk of its bias [rad/s^2/sqrt(Hz)].
         accelerometer_turn_on_bias: standard deviation of the bias at time
             zero [m/s^2].
         gyroscope_turn_on_bias: likewise [rad/s].
         accelerometer_range: no axis measures more, either way [m/s^2].
         gyroscope_range: likewise [rad/s].
-        seed: of all random numbers.
+        seed: seed of all random numbers.
         sensor_name: distinguishes the errors of several IMUs.
 
     Example:
@@ -132,7 +132,7 @@ class ImuErrors:
         """Returns the errors of many samples.
 
         Args:
-            number: of a block of 1024 samples.
+            number: number of a block of 1024 samples.
 
         Returns:
             (1024, 6) errors from sample 1024 * number on.

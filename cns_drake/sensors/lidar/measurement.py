@@ -67,7 +67,7 @@ class MeasurementModel:
         faint_dropout: probability that a return of no intensity is lost on
             top of that. It falls linearly with intensity, to none for a
             return of full intensity.
-        seed: of the noise.
+        seed: seed of the noise.
         sensor_name: distinguishes the noise of several LiDARs.
 
     Example:

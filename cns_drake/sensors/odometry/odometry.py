@@ -112,7 +112,7 @@ def add_odometry(
     """Adds odometry of a body to a diagram and connects it to its motion.
 
     Args:
-        builder: of the diagram that holds the plant, or `motion`.
+        builder: holds the plant, or `motion`.
         body: the body to observe, or a frame fixed on it, of a finalized
             plant.
         motion: the source of body poses and velocities, if not the plant
