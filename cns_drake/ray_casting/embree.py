@@ -37,6 +37,10 @@ ALONE = b"user_threads=65536"
 _NATIVE_PACKETS = ((8, 33), (16, 34))
 
 
+# Of the addresses, numba takes its own as unsigned numbers.
+_PACKET_SIGNATURE = types.void(types.uintp, types.intp, types.uintp, types.intp)
+
+
 class IntersectArguments(ctypes.Structure):
     """RTCIntersectArguments."""
 
@@ -113,8 +117,7 @@ class PacketFunction(types.WrapperAddressProtocol):
         return self._address
 
     def signature(self) -> object:
-        own, given = types.uintp, types.intp
-        return types.void(own, given, own, given)
+        return _PACKET_SIGNATURE
 
 
 def native_packet(

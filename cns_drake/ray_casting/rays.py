@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
+
 
 class Rays(NamedTuple):
     """N rays from one pose of a sensor S or from several.
@@ -54,6 +56,7 @@ class Rays(NamedTuple):
         return rotate(self.R_OSset, self.d_Sset)
 
 
+@compiled
 def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
     """Returns the (N, 3) directions of rays in a frame F.
 
@@ -64,10 +67,12 @@ def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
         R_FSset: (L, 3, 3) orientations of S, taken in turn.
         d_Sset: (N, 3) directions.
     """
-    x, y, z = d_Sset.reshape(-1, len(R_FSset), 3).transpose(2, 0, 1)
-    d_Fset = np.empty(d_Sset.shape)
-    for axis, (a, b, c) in enumerate(R_FSset.transpose(1, 2, 0)):
-        d_Fset[:, axis] = (a * x + b * y + c * z).ravel()
+    d_Fset, turn = np.empty((len(d_Sset), 3)), -1
+    for ray in range(len(d_Sset)):
+        turn = turn + 1 if turn + 1 < len(R_FSset) else 0
+        R, d = R_FSset[turn], d_Sset[ray]
+        for i in range(3):
+            d_Fset[ray, i] = R[i, 0] * d[0] + R[i, 1] * d[1] + R[i, 2] * d[2]
     return d_Fset
 
 

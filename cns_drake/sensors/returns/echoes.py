@@ -282,16 +282,15 @@ def _detect(pulses: _Pulses, receiver: Receiver, key: np.uint64) -> _Pulses:
     is_seen = pulses.is_sure | (pulses.snr >= HOPELESS_SNR)
     is_seen &= receiver.min_range <= pulses.distance
     is_seen &= pulses.distance <= receiver.max_range
-    seen = select(pulses, is_seen)
-    draw = np.minimum(seen.number, _MOST_ECHOES)
-    draw = _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * draw
-    unsure = np.flatnonzero(~seen.is_sure & (seen.snr <= CERTAIN_SNR))
-    is_missed = uniform(
-        key, seen.beam[unsure], draw[unsure]
-    ) >= detection_probability(seen.snr[unsure])
-    kept = np.ones(len(draw), bool)
-    kept[unsure[is_missed]] = False
-    seen, draw = select(seen, kept), draw[kept]
+    is_unsure = is_seen & ~pulses.is_sure & (pulses.snr <= CERTAIN_SNR)
+    unsure = np.flatnonzero(is_unsure)
+    draw = _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * np.minimum(
+        pulses.number, _MOST_ECHOES
+    )
+    is_seen[unsure] = uniform(
+        key, pulses.beam[unsure], draw[unsure]
+    ) < detection_probability(pulses.snr[unsure])
+    seen, draw = select(pulses, is_seen), draw[is_seen]
     error = range_deviation(receiver.budget, seen.snr)
     error *= normal(key, seen.beam, draw + 1)
     return seen._replace(
