@@ -52,7 +52,7 @@ class RoadProfile:
 
         Args:
             roughness: the class.
-            seed: of the layers.
+            seed: seed of the layers.
         """
         self._level = ROUGHNESS[roughness] * _N0**2 * np.log(2) / _OVER_LAYERS
         self._seed = seed

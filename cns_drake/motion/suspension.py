@@ -38,10 +38,10 @@ class SuspensionRates(BaseModel):
     """Rates of springs, dampers and tyres.
 
     Attributes:
-        spring_rate: of one wheel's spring [N/m].
-        damping_rate: of one wheel's damper [N s/m].
-        tyre_rate: of one tyre [N/m].
-        roll_bar_rate: of an axle's anti-roll bar [N m/rad].
+        spring_rate: rate of one wheel's spring [N/m].
+        damping_rate: rate of one wheel's damper [N s/m].
+        tyre_rate: rate of one tyre [N/m].
+        roll_bar_rate: rate of an axle's anti-roll bar [N m/rad].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -72,8 +72,8 @@ class CarMasses:
 
     Attributes:
         body: mass on the springs [kg].
-        roll_inertia: of the body about its centre of mass [kg m^2].
-        pitch_inertia: of the body about its centre of mass [kg m^2].
+        roll_inertia: the body's, about its centre of mass [kg m^2].
+        pitch_inertia: the body's, about its centre of mass [kg m^2].
         center: x and z of that centre in the vehicle frame B [m].
         wheels: (W,) mass of each wheel with its moving parts [kg].
         p_BWset: (W, 2) x and y of the wheels in B [m].
@@ -139,8 +139,8 @@ class Suspension:
         """Sets the equations of motion up.
 
         Args:
-            masses: of the car.
-            rates: of its springs.
+            masses: the car's.
+            rates: those of its springs.
         """
         self.masses = masses
         x, y = masses.p_BWset.T
@@ -251,8 +251,8 @@ def ride_on_springs(
 
     Args:
         trajectory: without ride.
-        suspension: of the car.
-        profile: of the road.
+        suspension: the car's.
+        profile: the road's.
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS

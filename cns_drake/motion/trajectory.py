@@ -49,7 +49,7 @@ class FrameMotion(NamedTuple):
         """Returns the motion in E of a frame B that moves in F.
 
         Args:
-            motion: of B in F.
+            motion: motion of B in F.
         """
         p, w, v, alpha, a = (
             np.einsum("nij,nj->ni", self.R, vector) for vector in motion[1:]

@@ -55,7 +55,7 @@ class VehicleImu(LeafSystem):
         """Declares the ports.
 
         Args:
-            trajectory: of the vehicle B.
+            trajectory: motion of the vehicle B.
             X_BI: pose of the IMU on it.
             gravity_W: the acceleration of free fall [m/s^2].
             rate: samples per second [1/s].

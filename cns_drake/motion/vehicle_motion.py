@@ -60,7 +60,7 @@ class WheelMotion:
         """Prepares the wheel.
 
         Args:
-            trajectory: of the vehicle.
+            trajectory: motion of the vehicle.
             p_BC: position of the wheel's centre in the vehicle frame [m].
         """
         self._x, self._y, self._radius = p_BC
@@ -173,7 +173,7 @@ class VehicleMotion(LeafSystem):
         Args:
             plant: a finalized plant; only its model is used.
             vehicle: the model instance that moves.
-            trajectory: of its base.
+            trajectory: motion of its base.
 
         Raises:
             ValueError: a joint of the vehicle is of another kind.
@@ -338,7 +338,7 @@ class VehicleSweep(LeafSystem):
         """Declares the port.
 
         Args:
-            trajectory: of B.
+            trajectory: motion of B.
             offsets: (N,) times after the present one [s].
         """
         super().__init__()

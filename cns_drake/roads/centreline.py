@@ -142,7 +142,7 @@ def blend(
         p_start, p_end: (2,) points [m].
         heading_start, heading_end: directions of travel [rad].
         spacing: about the distance between the returned points [m].
-        max_radius: of the arc [m].
+        max_radius: radius of the arc [m].
 
     Returns:
         (N, 2) points [m], both ends included.

@@ -47,7 +47,7 @@ class Arm:
         road: name of the road.
         end: which end of the road it is.
         heading: direction of the centreline away from the junction [rad].
-        half_width: of the road's carriageway [m].
+        half_width: half the width of the road's carriageway [m].
         setback: distance from the junction's position to the road [m].
     """
 

@@ -49,8 +49,8 @@ def loop_corners(
 
     Args:
         centre: (2,) of the loop [m].
-        heading_in, heading_out: of both lines [rad].
-        radius: of the loop and of the bends at its ends [m].
+        heading_in, heading_out: headings of both lines [rad].
+        radius: that of the loop and of the bends at its ends [m].
         aside_in, aside_out: distance of the centre to the left of the lines, at
             most the radius [m].
 

@@ -26,10 +26,10 @@ class BodyShape(NamedTuple):
     """One shape of a body, in the frame of its limb.
 
     Attributes:
-        name: of the shape.
+        name: name of the shape.
         kind: "mesh", "box", "capsule" or "cylinder".
-        size: of a box; for capsules and cylinders radius and length of their
-            straight part; empty for meshes [m].
+        size: a box's sides; radius and length of the straight part of a capsule
+            or cylinder; empty for meshes [m].
         mesh: name of one of the city's meshes.
         start, end: ends of the axis of a capsule or cylinder; other shapes have
             their middle at the first [m].
@@ -49,7 +49,7 @@ class Limb(NamedTuple):
     """A part of a body that moves as one: it swings about its y axis.
 
     Attributes:
-        name: of the limb.
+        name: name of the limb.
         joint: its origin in the body's frame [m].
         swing: amplitude of its swing at a walk, negative if it begins backwards
             [rad].
@@ -93,7 +93,7 @@ def vehicle_limbs(
     """Returns a vehicle's only limb; its frame is on the ground below its box.
 
     Args:
-        kind: of the vehicle.
+        kind: kind of the vehicle.
         rng: draws the colours.
     """
     paint = PAINTS[int(rng.integers(len(PAINTS)))]

@@ -48,7 +48,7 @@ class TracedObject:
 
     Attributes:
         name: its id.
-        type_name: of its type, "" if it has none.
+        type_name: name of its type, "" if it has none.
         steps: (M,) numbers of the times at which it is there, ascending.
         xy: (M, 2) of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
@@ -197,9 +197,9 @@ def play_trace(
         trace: to play.
         path: its file, for errors.
         graph: lanes of the map, which give heights.
-        walkways: of the map; likewise.
-        seed: of the kinds of cars.
-        duration: of the drive [s].
+        walkways: strips of the map; likewise.
+        seed: seed of the kinds of cars.
+        duration: length of the drive [s].
         ego: place of the ego car.
         ego_box: its size.
 

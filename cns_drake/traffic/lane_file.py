@@ -75,7 +75,7 @@ class LaneFile(NamedTuple):
 
     Attributes:
         graph: lanes, their signals, and crossings.
-        walkways: of the walkers.
+        walkways: strips for the walkers.
         in_the_way: names of structures, such as parked cars, that stand where
             vehicles drive; a drive with traffic is without them.
     """

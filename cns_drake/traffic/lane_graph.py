@@ -29,7 +29,7 @@ class Piece:
             -1 for none.
         junction: number of the junction of a way; for a lane, of the one it
             leads to.
-        phase: of a way: the phase with a green signal; -1 without a signal.
+        phase: signal phase in which a way is green; -1 without a signal.
     """
 
     points: np.ndarray
@@ -53,7 +53,7 @@ class Crossing:
 
     Attributes:
         line: (2, 3) from kerb to kerb [m].
-        area: of walkers on it [m].
+        area: where walkers are on it [m].
     """
 
     line: np.ndarray
@@ -90,7 +90,7 @@ class LaneGraph:
 
     Attributes:
         pieces: all of them.
-        crossings: of walkers.
+        crossings: where walkers cross lanes.
         phases: number of phases of each junction's signals; 1 without signals.
     """
 

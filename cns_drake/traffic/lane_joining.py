@@ -46,7 +46,7 @@ def join_lanes(
     """Returns lanes with ways between them.
 
     Args:
-        lanes: of a map, cut at its own places.
+        lanes: all of a map, cut at its own places.
         links: pairs of lane numbers; the second lane follows the first.
         right_of: number of a lane -> that of the lane on its right, in the
             same direction; without it, vehicles do not change lanes.

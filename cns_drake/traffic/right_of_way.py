@@ -95,7 +95,7 @@ def grant_ways(
         permits: the users so far.
         k: number of the time.
         dt: the step [s].
-        seed: of the drawn ways.
+        seed: seed of the drawn ways.
     """
     t, pieces, num_cars = k * dt, streets.pieces, len(cars)
     users, crossings = permits

@@ -248,7 +248,7 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
 
     Args:
         network: the roads.
-        graph: of the same network; gives the crossings.
+        graph: lanes of the same network; gives the crossings.
     """
     nodes: dict[tuple[str, End, int], int] = {}
     for road in network.roads.values():

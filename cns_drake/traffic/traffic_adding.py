@@ -45,7 +45,7 @@ def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
     """Returns name, instance id and class of all bodies in a plan.
 
     Args:
-        plan: of the traffic.
+        plan: the traffic.
         first: the lowest id.
 
     Raises:
@@ -81,12 +81,12 @@ def make_traffic(
 
     Args:
         scene_graph: takes their geometry, on frames of a source of its own.
-        plan: of the traffic.
-        seed: of colours and sizes.
+        plan: the traffic.
+        seed: seed of colours and sizes.
         structures: has an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: duration of a LiDAR's turn with motion distortion [s].
-        name: of the source.
+        name: name of the source.
     """
     if structures is None:
         structures = traffic_structures(plan)
@@ -119,10 +119,10 @@ def add_traffic(
     """Adds vehicles and walkers to a diagram.
 
     Args:
-        builder: of the diagram that holds `scene_graph`.
+        builder: builder of the diagram that holds `scene_graph`.
         scene_graph: takes their geometry.
-        plan: of the traffic.
-        name: of the system, and of the source of geometry.
+        plan: the traffic.
+        name: name of the system, and of the source of geometry.
         options: further arguments of `make_traffic`.
 
     Returns:
@@ -161,7 +161,7 @@ def connect_traffic(
     """Connects traffic with a LiDAR.
 
     Args:
-        builder: of the diagram.
+        builder: builder of the diagram.
         traffic: the traffic.
         lidar: labels moving bodies as moving; its port `frame_poses` may be
             connected already.

@@ -175,7 +175,7 @@ def plan_traffic(
         graph: lanes of the vehicles.
         walkways: strips for the walkers.
         vehicles, walkers: wanted numbers.
-        seed: of all draws.
+        seed: seed of all draws.
         duration: length of the drive [s].
         ego: the ego car's motion.
         ego_box: its size.

@@ -16,9 +16,9 @@ class VehicleKind:
     and microscopic simulations", Phys. Rev. E 62 (2000).
 
     Attributes:
-        name: of the kind; the names of its meshes begin with it.
+        name: name of the kind; the names of its meshes begin with it.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        share: of all vehicles, relative to the other kinds.
+        share: part of all vehicles, relative to the other kinds.
         size: length, width, height of the box about the vehicle, mirrors and
             rider included [m].
         axles: x of the rear and front axle from the middle of the box [m].

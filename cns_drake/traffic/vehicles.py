@@ -513,7 +513,7 @@ def advance(
         accelerations: (N,) [m/s^2].
         gaps: (N,) distance to the next ahead [m].
         dt: the step [s].
-        seed: of the drawn ways.
+        seed: seed of the drawn ways.
     """
     pieces = streets.pieces
     for i in range(len(cars)):

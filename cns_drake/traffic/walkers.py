@@ -133,7 +133,7 @@ class Crowd:
         Args:
             count: wanted number.
             walkways: where they may go.
-            permits: of the crossings.
+            permits: permits of the crossings.
             rng: draws the places.
         """
         self._permits = permits
@@ -153,7 +153,7 @@ class Crowd:
 
         Args:
             t, dt: time and step [s].
-            seed: of the ways that are drawn.
+            seed: seed of the ways that are drawn.
         """
         crossings, walkers = self._permits.crossings, self.walkers
         opened = crossings["opened"]
@@ -209,7 +209,7 @@ class Crowd:
         Args:
             i: number of the walker.
             t: time [s].
-            seed: of the draw.
+            seed: seed of the draw.
             waited: (C,) bool; notes a crossing that somebody asks for.
 
         Returns:

@@ -49,7 +49,7 @@ class Bay:
 
     Attributes:
         middle: (2,) of the car [m].
-        yaw: of its long axis [rad].
+        yaw: heading of its long axis [rad].
         front, back, left, right: reach of the bay from there [m].
     """
 
@@ -73,7 +73,7 @@ class Bay:
         """Returns the bay, extended, seen from above [m].
 
         Args:
-            beyond: of front, back, left and right.
+            beyond: lengths at front, back, left and right [m].
         """
         reach = np.array([self.front, self.back, self.left, self.right])
         front, back, left, right = reach + beyond

@@ -175,10 +175,10 @@ class _Stretch:
     """A straight piece of kerb.
 
     Attributes:
-        name: of its cell.
+        name: name of its cell.
         middle: (2,) of it [m].
         yaw: heading of its x axis; y points away from the carriageway [rad].
-        length: of it [m].
+        length: distance of its ends [m].
     """
 
     def __init__(self, name: str, points: np.ndarray, outward: np.ndarray):

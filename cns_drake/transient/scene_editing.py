@@ -162,9 +162,9 @@ class SceneEditing:
         """Adds a new structure.
 
         Args:
-            name: of the structure; unique.
+            name: name of the structure; unique.
             semantic_class: a key of `CLASS_IDS`.
-            model: of the city generator's meshes.
+            model: made of the city generator's meshes.
             X_WS: its pose in the world.
             cause: the switch.
         """
@@ -212,11 +212,11 @@ class SceneEditing:
         """Adds a surface to the structure of a part.
 
         Args:
-            part: of the structure that it joins, in the frame of its geometry.
-            name: of the new part.
+            part: one of the structure that it joins, in whose frame it is.
+            name: name of the new part.
             vertices: (N, 3) in the world [m].
             triangles: (M, 3) vertex indices.
-            look: of it.
+            look: colour and reflectivity.
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
         mesh = memory_mesh((vertices - p) @ R, triangles)
@@ -235,11 +235,11 @@ class SceneEditing:
         """Adds a structure of triangles.
 
         Args:
-            name: of the structure.
+            name: name of the structure.
             semantic_class: a key of `CLASS_IDS`.
             vertices: (N, 3) in the world [m].
             triangles: (M, 3) vertex indices.
-            look: of it.
+            look: colour and reflectivity.
             cause: the switch.
         """
         middle = np.round(vertices.mean(axis=0))

@@ -87,7 +87,7 @@ class Structure:
     """A structure in the world.
 
     Attributes:
-        name: of the structure.
+        name: name of the structure.
         semantic_class: a key of `CLASS_IDS`.
         parts: its geometries.
     """
@@ -302,7 +302,7 @@ class GroundSurface:
         """Yields the edges of the carriageway within the area.
 
         Args:
-            spacing: of their points, at most [m].
+            spacing: distance of their points, at most [m].
         """
         inner = self.near.buffer(-1.0)  # The edge of `near` is no kerb.
         shapely.prepare(inner)
@@ -369,9 +369,9 @@ def draws(seed: int, cause: str, name: str) -> np.random.Generator:
     They do not depend on other structures or other causes.
 
     Args:
-        seed: of the scenario's section.
+        seed: seed of the scenario's section.
         cause: the switch.
-        name: of the structure.
+        name: name of the structure.
     """
     digest = hashlib.sha256(f"{seed}/{cause}/{name}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))
