@@ -160,6 +160,9 @@ def make_station(
             anchored_frames=world.anchored_frames(),
             num_threads=num_threads,
         )
+        builder.Connect(
+            poses.get_output_port(), lidar.GetInputPort("frame_poses")
+        )
         if moving is not None:
             connect_traffic(builder, moving, lidar, config.motion_distortion)
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
