@@ -37,7 +37,7 @@ ALONE = b"user_threads=65536"
 _NATIVE_PACKETS = ((8, 33), (16, 34))
 
 
-# Of the addresses, numba takes its own as unsigned numbers.
+# Numba takes its own addresses as unsigned numbers.
 _PACKET_SIGNATURE = types.void(types.uintp, types.intp, types.uintp, types.intp)
 
 

@@ -64,7 +64,7 @@ VEHICLE = np.dtype(
         ("front_axle", float),
         ("factor", float),  # Wanted part of the allowed speed.
         ("top", float),  # Greatest speed [m/s].
-        ("a", float),  # Of the car-following model, like b and headway.
+        ("a", float),  # Car-following model, with b and headway.
         ("b", float),
         ("headway", float),
         ("large", bool),  # Whether it sweeps more than its lane in turns.
@@ -76,7 +76,7 @@ VEHICLE = np.dtype(
         ("since", float),  # Start of its wait for its way, inf for none [s].
         ("refused", float),  # Time without room beyond its way [s].
         ("left_lane", int),  # The lane that it is changing from, or -1.
-        ("change_start", float),  # Of the lane change, along the lane [m].
+        ("change_start", float),  # Where a lane change begins, on the lane [m].
         ("change_length", float),
         ("draws", int),  # Number of random numbers that it has drawn.
     ],

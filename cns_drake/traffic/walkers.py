@@ -210,7 +210,7 @@ class Crowd:
             i: number of the walker.
             t: time [s].
             seed: seed of the draw.
-            waited: (C,) bool; notes a crossing that somebody asks for.
+            waited: (C,) bool; notes a crossing that a walker asks for.
 
         Returns:
             Whether it has begun.

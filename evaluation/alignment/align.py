@@ -82,8 +82,8 @@ class AlignmentReport:
         distance_95: 95 % of the inliers are nearer [m].
         angle_median_deg: between inliers and result.
         model: "anchor" for one rigid pose, "pose graph" for a bent drive.
-        move: of the source's middle frame, along x, y, z [m].
-        turn_deg: of that frame about the vertical.
+        move: move of the source's middle frame, along x, y, z [m].
+        turn_deg: turn of that frame about the vertical.
         bend: greatest difference of another frame's move from the middle one's
             [m].
         straightened: disagreement of the drives with themselves before they
@@ -385,7 +385,8 @@ class Straightened:
 
     Attributes:
         drive: with new poses, if it had drifted.
-        disagreement: of the drive with itself before, see `AlignmentReport`.
+        disagreement: disagreement of the drive with itself before, see
+            `AlignmentReport`.
     """
 
     drive: Submaps

@@ -47,7 +47,7 @@ class Surveyed:
     """A map, with the drive that made it.
 
     Attributes:
-        name: of the drive or file.
+        name: name of the drive or file.
         voxels: the map on the grid of the TCR.
         positions: (N, 3) of the sensor [m]; None for a map file.
         drive: the drive, or its world frame and map; None for a map file.
@@ -72,7 +72,7 @@ class ChangeReport:
         control: between two drives on the two routes in one stage; None if
             none was given.
         control_names: the two that `control` compares.
-        alignment: of the two; None if they had one world.
+        alignment: alignment of the two; None if they had one world.
     """
 
     source: str
@@ -145,7 +145,7 @@ def survey_in_one_world(
     """Maps drives, or reads map files, all in one world.
 
     Args:
-        paths: of drives or map files; map files must be in that world.
+        paths: paths of drives or map files; map files must be in that world.
         when: whether later drives are aligned with the first.
         track: reports progress.
         lidar: name of the LiDAR, for recordings with several.
@@ -201,7 +201,7 @@ def compare(
         control: a drive on A's route in B's stage, or on B's route in A's
             stage. Its route shows which one. It is compared with the drive of
             its own stage: these two have the routes of A and B in one stage.
-        alignment: of the two, for the report.
+        alignment: alignment of the two, for the report.
 
     Raises:
         InputError: if the three are not of one world, or the control is on

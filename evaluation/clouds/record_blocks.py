@@ -24,7 +24,7 @@ def read_binary(
 
     Args:
         path: the file.
-        dtype: of a record.
+        dtype: type of a record.
         offset: where they begin [bytes].
         count: how many there are.
         block: how many to yield at once.

@@ -34,10 +34,7 @@ from evaluation.command_line.options import (
     overlap_of,
     with_protocol,
 )
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport

@@ -51,7 +51,7 @@ class MovedDrive(DriveView):
         """Gives a drive other poses.
 
         Args:
-            drive: of N scans.
+            drive: drive of N scans.
             X_WS: (N, 4, 4).
             world_frame: name of W.
             datum: see `Drive.datum`.

@@ -199,7 +199,7 @@ def _rows_of_scans(
     Args:
         path: the table.
         rows: (M, ...): one for each scan, or one for each number.
-        numbers: of the N scans.
+        numbers: numbers of the N scans.
         notes: gets a note if scans are missing.
 
     Raises:

@@ -59,11 +59,11 @@ def gather(
 
     Args:
         drive: the drive.
-        frame: of the described place.
+        frame: frame of the described place.
         num_scans: number of consecutive scans that are merged; fewer at the
             ends of the drive.
         max_range: see `within_range`.
-        fields: of the points, beside their coordinates.
+        fields: fields of the points, beside their coordinates.
         num_before: how many of the scans come before the frame.
 
     Returns:
@@ -108,7 +108,7 @@ def cropped(
         scan: structured array (N,) in the frame S of a sensor.
         max_range: see `within_range`, in the frame F of the cloud.
         X_FS: (4, 4); identity if left out.
-        fields: of the points, beside their coordinates.
+        fields: fields of the points, beside their coordinates.
         source: name of the drive, for messages.
 
     Returns:

@@ -33,7 +33,7 @@ class FileDrive(Drive):
         """Describes a drive of N >= 1 scans.
 
         Args:
-            name: of the drive.
+            name: name of the drive.
             world_frame: name of W.
             files: N scans.
             stamps_ns: (N,) int64 [ns], strictly increasing.

@@ -255,7 +255,7 @@ def _squared_gaps(
     Args:
         box: least and greatest coordinates.
         others: (6, G) likewise.
-        number: of the others to look at, the first ones.
+        number: number of the others to look at, the first ones.
         gaps: (G,) to write to.
     """
     x0, y0, z0 = box[0], box[1], box[2]

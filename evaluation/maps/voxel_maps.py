@@ -97,11 +97,11 @@ def locate(
 
     Args:
         points: (3, N) in the frame of a sensor [m].
-        number: of the points to locate, the first ones.
+        number: number of the points to locate, the first ones.
         X: (4, 4) its pose in the world, which is lifted so that voxels begin at
             height 0.
         voxel_size: length of a voxel's side [m].
-        divisions: of a side into parts; 0 for no parts.
+        divisions: divisions of a side into parts; 0 for no parts.
         located: (3, 3, N) to fill, for each axis with the place in that world
             [m], the number of the voxel, and the distance from its corner [m].
         parts: (N,) float64 to fill with the number of the part.
@@ -143,14 +143,14 @@ def enter(
     Args:
         located: (3, 3, N), see `locate`.
         parts: (N,), likewise.
-        number: of the points to enter, the first ones.
+        number: number of the points to enter, the first ones.
         divisions: parts of a voxel's side; 0 for no samples.
         table: (S,) of `SLOT`, with room for all.
         size: number of its voxels up to now.
         sampled: (S, B) uint8, a bit for each part of a slot's voxel: whether it
             has a sample.
         samples: (K, 3) to add to, with room for all.
-        num_samples: of them up to now.
+        num_samples: number of them up to now.
 
     Returns:
         New size and number of samples, and how many points were skipped.
@@ -258,8 +258,8 @@ class VoxelAccumulator:
 
         Args:
             voxel_size: length of a voxel's side [m].
-            divisions: of a voxel's side into parts that have a sample each;
-                0 for no samples.
+            divisions: divisions of a voxel's side into parts that have a sample
+                each; 0 for no samples.
         """
         self._voxel_size = voxel_size
         self._divisions = divisions

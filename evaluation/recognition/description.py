@@ -49,9 +49,9 @@ class DescribedDrive:
     """A method's descriptions of a drive.
 
     Attributes:
-        name: of the drive.
+        name: name of the drive.
         places: for queries to find.
-        queries: of the drive.
+        queries: queries of the drive.
     """
 
     name: str
@@ -75,7 +75,7 @@ def describe_drive(
     Args:
         drive: the drive.
         methods: to run.
-        roles: of the drive.
+        roles: roles of the drive.
         protocol: for the frames of places and queries, and their clouds.
         track: reports progress.
         visit: also receives each described frame and its single scan (N, 3),

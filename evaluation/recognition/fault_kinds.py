@@ -64,8 +64,8 @@ def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
     """Returns the reason for each query's wrong best place.
 
     Args:
-        result: of a method on a pair.
-        evidence: of the pair.
+        result: result of a method on a pair.
+        evidence: evidence of the pair.
 
     Returns:
         Q of: "" if it is right; `no_place` if the query has no match;

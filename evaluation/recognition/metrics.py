@@ -81,7 +81,7 @@ def evaluate(
     """Computes all numbers of one pair and method.
 
     Args:
-        outcomes: of the queries.
+        outcomes: outcomes of the queries.
         mode: selects the queries of the precision-recall curve.
         seed: of the bootstrap.
 

@@ -38,7 +38,7 @@ class Seen(Protocol):
     """The surfaces that a sensor sees from a place.
 
     Attributes:
-        reach: of its farthest surface [m].
+        reach: reach of its farthest surface [m].
     """
 
     @property
@@ -202,7 +202,7 @@ def read_overlaps(
     """Returns the overlaps (Q, D) of a table.
 
     Args:
-        path: of the table.
+        path: path of the table.
         query_frames: (Q,) that it must have.
         database_frames: (D,) likewise.
 

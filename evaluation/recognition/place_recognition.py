@@ -39,10 +39,10 @@ class PlaceRecognition:
         database: name of the drive of the places.
         query: name of the drive of the queries.
         retrieval: scores and truth of all pairs.
-        outcomes: of the queries.
+        outcomes: outcomes of the queries.
         metrics: the numbers.
         pose: errors of the estimated poses.
-        protocol: of the run, without open choices.
+        protocol: protocol of the run, without open choices.
     """
 
     method: str
@@ -134,7 +134,7 @@ def run(
         query: the drive of the queries.
         method: the method.
         mode: which queries count.
-        protocol: of the comparison.
+        protocol: protocol of the comparison.
         track: reports progress.
         across_maps: the two may be of maps of different names.
         overlaps: (Q, D) for matches by overlap; by default those of the scans.
@@ -172,7 +172,7 @@ def judge_retrieval(
         database: name of the drive of the places.
         query: name of the drive of the queries.
         retrieval: scores and truth.
-        protocol: of the comparison.
+        protocol: protocol of the comparison.
         mode: which queries count.
 
     Raises:
@@ -222,9 +222,9 @@ class RecognitionResult:
     """The result of a method on two stages of a map.
 
     Attributes:
-        map_name: of the city.
-        stages: of the database, and of the query.
-        outcome: of the method.
+        map_name: name of the city.
+        stages: stages of the database, and of the query.
+        outcome: outcome of the method.
         metrics: in each mode.
     """
 

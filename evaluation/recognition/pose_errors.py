@@ -110,9 +110,9 @@ def pose_metrics(
     """Summarises errors.
 
     Args:
-        errors: of the queries.
-        outcomes: of the same queries.
-        metrics: of the same queries, in mode all.
+        errors: errors of the queries.
+        outcomes: outcomes of the same queries.
+        metrics: metrics of the same queries, in mode all.
     """
     accepted = np.zeros(len(outcomes), dtype=bool)
     if metrics.f1_max_index is not None:

@@ -79,7 +79,7 @@ def weighted_counts(
     """Counts TP, FP and FN at every distinct score, queries weighted.
 
     Args:
-        outcomes: of Q queries.
+        outcomes: outcomes of Q queries.
         weights: (B, Q) how often each query counts, in each of B samples.
 
     Returns:

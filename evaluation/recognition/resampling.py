@@ -49,7 +49,7 @@ def resampled_metrics(
     """Returns AUC (B,) and R@1 (B,) of samples of the queries.
 
     Args:
-        outcomes: of Q queries, all of which count.
+        outcomes: outcomes of Q queries, all of which count.
         weights: (B, Q) how often each does in each sample.
     """
     _, tp, fp, fn = weighted_counts(outcomes, weights)

@@ -81,7 +81,7 @@ def retrieve(
         database: the drive of the places.
         query: the drive of the queries, in the same world frame.
         method: describes and compares.
-        protocol: of the comparison.
+        protocol: protocol of the comparison.
         track: reports progress.
         across_maps: the two may be of maps of different names.
         overlaps: (Q, D) for matches by overlap; by default those of the scans.

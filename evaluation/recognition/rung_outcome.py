@@ -27,7 +27,7 @@ class RungOutcome:
     Attributes:
         method: its name.
         is_gated: whether the gate was used.
-        outcomes: of Q queries.
+        outcomes: outcomes of Q queries.
         query_frames: (Q,) of the query drive.
         stamps_ns: (Q,) int64.
         p_WQs: (Q, 3) where the sensor was [m].
@@ -36,7 +36,7 @@ class RungOutcome:
         match_frames: (Q,) frame of the best place there; -1 without.
         distances: (Q,) between query and best place [m]; NaN without, and
             where the best place is of another city.
-        pose_errors: of the best place.
+        pose_errors: errors of the best place.
         overlaps: (Q,) how much of the query's scan the best of its matches
             shows, see `overlap_truth`; NaN without a match.
     """
@@ -68,7 +68,7 @@ class RungOutcome:
         Args:
             method: that made the scores.
             is_gated: whether they were gated.
-            retrieval: of Q queries and D places.
+            retrieval: retrieval of Q queries and D places.
             query: the drive of the queries.
             drives: D names of the drives of the places; that of the query's
                 own city comes first.
@@ -109,7 +109,7 @@ class RungOutcome:
         """Returns the reason for each query's wrong best place.
 
         Args:
-            radius: of a match [m].
+            radius: radius of a match [m].
 
         Returns:
             Q of: "" if it is right; `no_place` if the query has no match;

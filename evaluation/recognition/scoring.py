@@ -42,7 +42,7 @@ def gate_weight(
     Args:
         distance: between query and place by the method's own pose [m]; any
             shape.
-        radius: of a match [m].
+        radius: radius of a match [m].
         softness: half the width of the ramp, as a part of the radius.
     """
     far = np.asarray(distance, dtype=np.float64) / radius
@@ -62,11 +62,11 @@ def gated(
     score, and a negative score falls likewise.
 
     Args:
-        method: of the scores.
+        method: method of the scores.
         query: its description of the query.
         database: its database of the D places.
         scores: (D,) of the method; NaN for a place that is no candidate.
-        radius: of a match [m].
+        radius: radius of a match [m].
 
     Raises:
         InputError: if the method returns something other than poses.

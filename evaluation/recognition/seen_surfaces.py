@@ -57,7 +57,7 @@ class SeenSurfaces:
         points: (N, 3) in the frame of the sensor [m], sorted by cell.
         angles_deg: (N, 2) elevation from -90 deg on, and azimuth from the
             back on.
-        starts: of each cell in the points, row by row; the last is N.
+        starts: starts of each cell in the points, row by row; the last is N.
     """
 
     points: np.ndarray

@@ -21,11 +21,7 @@ from evaluation.recognition.fault_kinds import (
     PairEvidence,
     fault_kinds,
 )
-from evaluation.recognition.metrics import (
-    MODES,
-    Mode,
-    PlaceRecognitionMetrics,
-)
+from evaluation.recognition.metrics import MODES, Mode, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import RADII, RecognitionResult
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.query_outcomes import QueryOutcomes

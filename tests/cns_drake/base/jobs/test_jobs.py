@@ -339,7 +339,7 @@ def test_jobs_leave_nothing_to_each_other(tmp_path):
 
 
 def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path):
-    """So do the jobs after it, which are forked from another one."""
+    """The jobs after it end as well."""
     paths = [tmp_path / name for name in "ab"]
     run_jobs(
         [job(path.name, job_functions.kill_parent, path) for path in paths],
