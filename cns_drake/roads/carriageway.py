@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import itertools
-from typing import TYPE_CHECKING
 
 import numpy as np
 from shapely import GEOSException, make_valid, set_precision, unary_union
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-if TYPE_CHECKING:
-    from cns_drake.roads.network import Arm, Junction
-    from cns_drake.roads.road import Road
+from cns_drake.roads.road import Arm, Junction, Road
 
 # Segments of a quarter circle in rounded outlines: a kerb of 13 m radius is
 # then true to 6 cm.

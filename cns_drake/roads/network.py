@@ -21,7 +21,9 @@ from cns_drake.roads.centreline import Centreline, blend
 from cns_drake.roads.road import (
     DIRECTIONS,
     ENDS,
+    Arm,
     End,
+    Junction,
     LaneRef,
     Road,
     RoadEntry,
@@ -37,36 +39,6 @@ _STRAIGHT_LIMIT_DEG = 35.0
 _U_TURN_LIMIT_DEG = 150.0
 # Roads may touch by this much before they count as crossing [m^2].
 _CROSSING_TOLERANCE = 1.0
-
-
-@dataclass(frozen=True)
-class Arm:
-    """One road end at a junction.
-
-    Attributes:
-        road: name of the road.
-        end: which end of the road it is.
-        heading: direction of the centreline away from the junction [rad].
-        half_width: half the width of the road's carriageway [m].
-        setback: distance from the junction's position to the road [m].
-    """
-
-    road: str
-    end: End
-    heading: float
-    half_width: float
-    setback: float
-
-
-@dataclass(frozen=True)
-class Junction:
-    """A junction of roads; `arms` are ordered counter-clockwise."""
-
-    name: str
-    position: tuple[float, float]
-    height: float
-    kerb_radius: float
-    arms: tuple[Arm, ...]
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
-"""One road: its centreline, its lanes, and its ends at junctions."""
+"""Roads with their centrelines and lanes, and the junctions that they join."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -307,3 +308,33 @@ class Road:
         offset = self.lane_offset(direction, lane)
         x, y, z, heading = self.evaluate([station], offset)[0]
         return x, y, z, heading if direction == "forward" else heading + np.pi
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One road end at a junction.
+
+    Attributes:
+        road: name of the road.
+        end: which end of the road it is.
+        heading: direction of the centreline away from the junction [rad].
+        half_width: half the width of the road's carriageway [m].
+        setback: distance from the junction's position to the road [m].
+    """
+
+    road: str
+    end: End
+    heading: float
+    half_width: float
+    setback: float
+
+
+@dataclass(frozen=True)
+class Junction:
+    """A junction of roads; `arms` are ordered counter-clockwise."""
+
+    name: str
+    position: tuple[float, float]
+    height: float
+    kerb_radius: float
+    arms: tuple[Arm, ...]

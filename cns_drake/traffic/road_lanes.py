@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from cns_drake.roads.centreline import blend
-from cns_drake.roads.network import Connection, Junction, RoadNetwork
-from cns_drake.roads.road import ENDS, End, LaneRef, Road
+from cns_drake.roads.network import Connection, RoadNetwork
+from cns_drake.roads.road import ENDS, End, Junction, LaneRef, Road
 from cns_drake.traffic.lane_graph import (
     Crossing,
     LaneGraph,

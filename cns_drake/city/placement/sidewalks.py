@@ -16,8 +16,8 @@ from cns_drake.city.placement.frontage import Station, lines_along, station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import CityPlan, StreetPlan
-from cns_drake.roads.network import Arm, Junction, RoadNetwork
-from cns_drake.roads.road import Direction, Road
+from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.road import Arm, Direction, Junction, Road
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7
