@@ -22,12 +22,12 @@ WATER: Rgb = (0.16, 0.34, 0.45)
 LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
-def lot(seed: int, purpose: str, name: str) -> float:
+def random_share(seed: int, purpose: str, name: str) -> float:
     """Returns a number from 0 to 1 that depends on the arguments only."""
     return _number(seed, purpose, name) / 2.0**64
 
 
-def lot_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
+def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
     """Returns a generator whose draws depend on the arguments only."""
     return np.random.default_rng(_number(seed, purpose, name))
 
@@ -68,7 +68,7 @@ class Imported:
     is_gone: bool = False
 
     @property
-    def lot_name(self) -> str:
+    def draw_name(self) -> str:
         """The name that seeds the random draws."""
         return self.original or self.structure.name
 

@@ -174,7 +174,7 @@ def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
     if growth is None:
         return {}
     return {
-        "first_stage_by_lot": {
+        "first_stage_at_random": {
             "grow": options.grow,
             "seed": options.seed,
             "missing": list(growth.missing),

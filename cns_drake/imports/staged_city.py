@@ -23,7 +23,7 @@ from cns_drake.imports.building_years import (
     stands_today,
 )
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import ForeignCity, Imported, lot
+from cns_drake.imports.foreign_city import ForeignCity, Imported, random_share
 from cns_drake.imports.options import ImportFaults, ImportOptions
 
 # A building that shares so much of the smaller outline stands in the place of
@@ -385,9 +385,12 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
     for one in chosen:
         name = one.structure.name
         z = one.triangles[:, :, 2]
-        if np.ptp(z) >= _LEAST_HEIGHT and lot(seed, "lower", name) < _LOWER:
+        if (
+            np.ptp(z) >= _LEAST_HEIGHT
+            and random_share(seed, "lower", name) < _LOWER
+        ):
             low, high = _HEIGHTS
-            share = low + (high - low) * lot(seed, "height", name)
+            share = low + (high - low) * random_share(seed, "height", name)
             lower[name] = round(share, 2)
             variants[one] = _lowered(one, lower[name], taken)
         else:
@@ -401,7 +404,7 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
         first = with_gone(city.gone, before)
         stood = [one for one in first if one in set(city.gone)]
         replaced = set(before) - set(first)
-        missing += [one.lot_name for one in replaced]
+        missing += [one.draw_name for one in replaced]
         extra = [one for one in extra if one not in replaced]
         lower = {n: h for n, h in lower.items() if n not in missing}
     grown = replace(
@@ -427,7 +430,7 @@ def _drawn(
 
     def lot_of_block(members: list[Imported]) -> float:
         name = min(one.structure.name for one in members)
-        return lot(seed, "block", name)
+        return random_share(seed, "block", name)
 
     chosen: list[Imported] = []
     for members in sorted(blocks.values(), key=lot_of_block):
@@ -437,7 +440,7 @@ def _drawn(
             chosen += members
     left = set(buildings) - set(chosen)
     singles = sorted(
-        left, key=lambda one: lot(seed, "single", one.structure.name)
+        left, key=lambda one: random_share(seed, "single", one.structure.name)
     )
     return chosen + singles[: number - len(chosen)]
 

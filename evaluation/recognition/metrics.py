@@ -72,6 +72,7 @@ class PlaceRecognitionMetrics:
 
     @property
     def recall_at_1(self) -> float:
+        """The part of the queries with a match whose best place is one."""
         return float(self.recall_at_n[0])
 
 

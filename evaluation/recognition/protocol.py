@@ -86,6 +86,7 @@ class RetrievalProtocol:
         return values
 
     def to_json(self) -> dict[str, float | int | None]:
+        """Returns all numbers of the protocol, by their names."""
         return asdict(self)
 
     def to_text(self) -> str:

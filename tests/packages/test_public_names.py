@@ -129,3 +129,34 @@ def test_private_names_are_noticed():
     code = """from cns_drake.sensors.lidar.lidar import Lidar
 import cns_drake.base.jobs"""
     assert len(private_imports(code)) == 2
+
+
+def undocumented(owner):
+    """Yields public functions and properties of a class without a text."""
+    for name, value in vars(owner).items():
+        if isinstance(value, property):
+            function = value.fget
+        else:
+            function = getattr(value, "__func__", value)
+            function = getattr(function, "func", function)
+        inherited = any(
+            inspect.getdoc(vars(base)[name])
+            for base in owner.__mro__[1:]
+            if name in vars(base)
+        )
+        if (
+            inspect.isfunction(function)
+            and not name.startswith("_")
+            and not inspect.getdoc(function)
+            and not inherited
+        ):
+            yield name
+
+
+@pytest.mark.parametrize(("package", "name"), NAMES)
+def test_what_is_public_has_a_docstring(package, name):
+    value = getattr(importlib.import_module(package), name)
+    if inspect.isclass(value) or inspect.isfunction(value):
+        assert inspect.getdoc(value)
+    if inspect.isclass(value):
+        assert list(undocumented(value)) == []

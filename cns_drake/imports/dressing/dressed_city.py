@@ -36,7 +36,7 @@ from cns_drake.imports.dressing.wall_panels import (
     turned_up,
 )
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import Imported, Street, lot_generator
+from cns_drake.imports.foreign_city import Imported, Street, random_generator
 from cns_drake.imports.ground import Ground
 
 # A building whose feet are farther from the ground was sunk into it [m].
@@ -64,7 +64,7 @@ def all_laid_bare(
     whole = [
         _laid_bare(one, ground, seed) for one in buildings if not one.original
     ]
-    styles = {some.one.lot_name: some.style for some in whole}
+    styles = {some.one.draw_name: some.style for some in whole}
     lower = [
         _laid_bare(one, ground, seed, styles.get(one.original))
         for one in buildings
@@ -93,7 +93,7 @@ def _laid_bare(
     top = walls if len(walls) else one.triangles
     height = max(1.0, float(top[:, :, 2].max()) - base)
     is_flat = bool(len(roof)) and is_flat_roof(roof)
-    rng = lot_generator(seed, "dressing", one.lot_name)
+    rng = random_generator(seed, "dressing", one.draw_name)
     area = 0.8 * float(width * depth)
     style = make_style(one.tags, one.year, area, height, is_flat, rng)
     if known is not None:
@@ -234,12 +234,12 @@ class DressedBuildings:
 
     Attributes:
         buildings: before -> after.
-        by_lot: kind of added detail -> its number.
+        at_random: kind of added detail -> its number.
         by_file: kind of look that the file gives -> number of buildings.
     """
 
     buildings: Mapping[Imported, Imported]
-    by_lot: Mapping[str, int]
+    at_random: Mapping[str, int]
     by_file: Mapping[str, int]
 
 
@@ -271,7 +271,7 @@ class PlannedBuildings:
         plans = self.plans
         if plans:
             plans = _with_steps(plans, UpperSides(turned_up(paving)))
-        by_lot: Counter[str] = Counter()
+        at_random: Counter[str] = Counter()
         by_file: Counter[str] = Counter()
         dressed = {}
         for number, some in enumerate(self.bare):
@@ -281,12 +281,14 @@ class PlannedBuildings:
                 strict=True,
             )
             model, counts = _dressed(some, list(walls), self.paths, self.seed)
-            by_lot += counts
+            at_random += counts
             by_file.update(some.style.by_tag)
             structure = replace(some.one.structure, model=model)
             dressed[some.one] = replace(some.one, structure=structure)
         return DressedBuildings(
-            dressed, dict(sorted(by_lot.items())), dict(sorted(by_file.items()))
+            dressed,
+            dict(sorted(at_random.items())),
+            dict(sorted(by_file.items())),
         )
 
 
@@ -349,7 +351,7 @@ def _dressed(
     faces.add("roof", some.roof)
     for plan, distance in plans:
         name = _wall_name(plan.panel)
-        rng = lot_generator(seed, name, some.one.lot_name)
+        rng = random_generator(seed, name, some.one.draw_name)
         add_facade(faces, plan, distance, rng)
     roof = _roof(some, paths)
     faces.counts["roof equipment and chimneys"] += len(roof.parts)

@@ -31,7 +31,7 @@ from cns_drake.imports.foreign_city import (
     Imported,
     Street,
     Thing,
-    lot_generator,
+    random_generator,
 )
 from cns_drake.imports.ground import Ground
 
@@ -160,7 +160,7 @@ class StreetThings:
         from_file: names of structures from the file.
         moved: name of a tree of the file -> the same beside the carriageway.
         sources: sources of the file's things that were placed.
-        by_file, by_lot: kind -> how many.
+        by_file, at_random: kind -> how many.
         no_room: how many of the file's things would stand in the way of a
             drive, in a wall or in each other.
     """
@@ -170,7 +170,7 @@ class StreetThings:
     moved: dict[str, Imported] = field(default_factory=dict)
     sources: set[str] = field(default_factory=set)
     by_file: Counter[str] = field(default_factory=Counter)
-    by_lot: Counter[str] = field(default_factory=Counter)
+    at_random: Counter[str] = field(default_factory=Counter)
     no_room: int = 0
 
 
@@ -367,7 +367,7 @@ def park_along(
             if is_taken and is_clear:
                 kind = f"car_{name}_{int(s)}_{'lr'[side > 0]}"
                 if placing.place(kind, form, xy, yaw, rng):
-                    placing.found.by_lot["Parked vehicles"] += 1
+                    placing.found.at_random["Parked vehicles"] += 1
             s += float(rng.uniform(*_CAR_EVERY))
 
 
@@ -392,7 +392,7 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
     heading += 0.0 if is_row else np.pi / 2.0
     area = shapely.union_all(shapely.polygons(one.triangles[:, :, :2]))
     name = one.structure.name
-    rng = lot_generator(seed, "car park", name)
+    rng = random_generator(seed, "car park", name)
     count = int((length - 0.5) / pitch)
     for row, offset in enumerate(offsets):
         for k in range(count):
@@ -404,7 +404,7 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
                 continue
             xy = (float(place[0]), float(place[1]))
             if placing.place(f"car_{name}_{row}_{k}", form, xy, yaw, rng):
-                placing.found.by_lot["Parked vehicles"] += 1
+                placing.found.at_random["Parked vehicles"] += 1
 
 
 # Things farther from all drives are left out [m].
@@ -463,7 +463,7 @@ def dress_streets(
     rows = list(_rows(near, drives))
     for name, line, half, may_park in rows:
         if placing.is_near(np.array(line.coords), ROWS_WITHIN):
-            rng = lot_generator(seed, "row", name)
+            rng = random_generator(seed, "row", name)
             park_along(placing, name, line, half, may_park, lines, rng)
             _light(placing, name, line, half, rng)
             if not things:
@@ -528,7 +528,7 @@ def _place_thing(
     if streets:
         xy, towards = beside_street(xy, streets, courses)
         yaw = towards if yaw is None else yaw
-    rng = lot_generator(seed, "thing", name)
+    rng = random_generator(seed, "thing", name)
     at = (float(xy[0]), float(xy[1]))
     if placing.place(name, thing.kind, at, yaw or 0.0, rng):
         placed_last = placing.found.structures[-1].structure.name
@@ -560,7 +560,7 @@ def _light(
             yaw += side * np.pi / 2.0
             lamp = f"lamp_post_{name}_{int(s)}"
             if placing.place(lamp, "lamp_post", xy, yaw, rng):
-                placing.found.by_lot["Lamp post"] += 1
+                placing.found.at_random["Lamp post"] += 1
                 break
         s, side = s + _LAMP_EVERY, -side
 
@@ -580,5 +580,5 @@ def _furnish(
         xy, yaw = place_along(line, s, side, half + FROM_EDGE)
         yaw += side * np.pi / 2.0
         if placing.place(f"{kind}_{name}_{int(s)}", kind, xy, yaw, rng):
-            placing.found.by_lot[title_of(kind)] += 1
+            placing.found.at_random[title_of(kind)] += 1
         s += float(rng.uniform(0.6, 1.4)) * _SMALL_EVERY

@@ -119,8 +119,8 @@ def dress_city(
     ]
     buildings = planned.dressed(joined(paving))
     changed = dict(buildings.buildings)
-    by_lot = Counter(buildings.by_lot)
-    by_lot += Counter(one.kind for one in added)
+    at_random = Counter(buildings.at_random)
+    at_random += Counter(one.kind for one in added)
     if is_paved and not any(map(_has_ground_kind, staged.kept)):
         changed |= {
             one: replace(one, structure=paved(one.structure))
@@ -148,7 +148,7 @@ def dress_city(
         "by_file": dict(
             sorted((Counter(buildings.by_file) + things.by_file).items())
         ),
-        "by_lot": dict(sorted((+by_lot + things.by_lot).items())),
+        "at_random": dict(sorted((+at_random + things.at_random).items())),
         "without_room": things.no_room,
     }
     moved = {

@@ -212,14 +212,17 @@ class Lidar(LeafSystem):
 
     @property
     def pattern(self) -> BeamPattern:
+        """The beams of a turn."""
         return self._pattern
 
     @property
     def parent_frame_id(self) -> FrameId:
+        """The frame P that carries the LiDAR."""
         return self._parent_frame_id
 
     @property
     def X_PS(self) -> RigidTransform:
+        """The pose of the LiDAR in the frame that carries it."""
         return self._X_PS
 
     def EvalScene(self, context: Context) -> RayCastingScene:

@@ -123,6 +123,7 @@ class BeamPattern(ABC):
 
     @property
     def num_beams(self) -> int:
+        """The number of beams of a turn."""
         return len(self.beams(0).column)
 
     @property
@@ -235,6 +236,7 @@ class SpinningPattern(BeamPattern):
 
     @property
     def num_rings(self) -> int:
+        """The number of rings, one for each laser."""
         return len(self.elevations_rad)
 
     def beams(self, frame: int) -> Beams:
@@ -242,6 +244,7 @@ class SpinningPattern(BeamPattern):
 
     @property
     def num_beams(self) -> int:
+        """The number of beams of a turn."""
         return self.num_rings * self.num_columns
 
     @property

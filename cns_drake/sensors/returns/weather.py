@@ -79,6 +79,7 @@ class Weather:
 
     @property
     def is_clear(self) -> bool:
+        """Whether nothing in the air sends light back or weakens it."""
         return self.visibility is None and self.rain == self.snowfall == 0.0
 
     @property

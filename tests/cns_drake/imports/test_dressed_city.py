@@ -284,7 +284,7 @@ def test_nothing_hangs_in_the_way_of_a_drive(tmp_path):
     x = np.linspace(low[0], low[0] + 240, 60)
     path = np.column_stack([x, np.full(60, low[1] - 2.0)])
     after, result = dressed(city, path)
-    assert result.by_lot["balconies"] > 0
+    assert result.at_random["balconies"] > 0
     way = LineString(path).buffer(1.5)
     for one in after.values():
         for triangles in surfaces(one).values():
@@ -403,12 +403,12 @@ def test_plain_is_what_an_import_gave_before_there_was_dressing(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_notes_count_details_of_the_file_and_by_lot(tmp_path):
+def test_the_notes_count_details_of_the_file_and_at_random(tmp_path):
     folder = run_import(tmp_path, "--grow", "0.5")
     facts = yaml.safe_load((folder / "import.yaml").read_text())["dressing"]
     assert facts["seed"] == 0
     assert facts["buildings"] >= 8
-    assert facts["by_lot"]["windows"] > 50
+    assert facts["at_random"]["windows"] > 50
     with (folder / "structures.csv").open() as stream:
         origins = {r["name"]: r["origin"] for r in csv.DictReader(stream)}
     for name, origin in origins.items():

@@ -43,7 +43,7 @@ def test_a_part_is_not_there_yet_or_lower(tmp_path, part, seed):
     folder = tmp_path / "town"
     report = import_city(source, folder, ImportOptions(grow=part, seed=seed))
     drawn = yaml.safe_load((folder / "import.yaml").read_text())
-    drawn = drawn["first_stage_by_lot"]
+    drawn = drawn["first_stage_at_random"]
     missing, lower = set(drawn["missing"]), drawn["part_of_height"]
     assert len(missing) + len(lower) == round(50 * part)
     assert not missing & set(lower)
@@ -76,7 +76,7 @@ def test_the_lot_is_that_of_the_seed(tmp_path):
     for name, seed in (("a", 3), ("b", 3), ("c", 4)):
         import_city(source, tmp_path / name, ImportOptions(grow=0.3, seed=seed))
         facts = yaml.safe_load((tmp_path / name / "import.yaml").read_text())
-        drawn.append(facts["first_stage_by_lot"])
+        drawn.append(facts["first_stage_at_random"])
     assert drawn[0] == drawn[1]
     assert drawn[0]["missing"] != drawn[2]["missing"]
 
@@ -232,8 +232,8 @@ def test_the_first_stage_by_lot_has_demolished_buildings(tmp_path):
     gone = [name["razed"], name["historic"], name["until"]]
     assert first == {name["old"], name["dated"], *gone}
     facts = yaml.safe_load((tmp_path / "town" / "import.yaml").read_text())
-    assert facts["first_stage_by_lot"]["missing"] == [name["new"]]
-    assert sorted(facts["first_stage_by_lot"]["gone_since"]) == sorted(gone)
+    assert facts["first_stage_at_random"]["missing"] == [name["new"]]
+    assert sorted(facts["first_stage_at_random"]["gone_since"]) == sorted(gone)
     plain = import_city(source, tmp_path / "plain", ImportOptions())
     counts = {kind: count for kind, count, _ in plain.faults}
     assert sum(n for kind, n in counts.items() if ":building" in kind) == 3

@@ -129,7 +129,7 @@ def test_nothing_stands_in_the_way_or_in_each_other(tmp_path):
     city = read(osm, tmp_path)
     found = dressed(city)
     path = LineString(drive_of(city).path)
-    assert found.by_lot["Parked vehicles"] > 5
+    assert found.at_random["Parked vehicles"] > 5
     for one in found.structures:
         xy = corners(one.structure)
         assert min(path.distance(Point(p)) for p in xy) > 1.5
@@ -149,7 +149,9 @@ def test_cars_park_where_they_may(tmp_path, tags, parks):
     write_street(osm, **tags)
     found = dressed(read(osm, tmp_path))
     classes = {one.structure.semantic_class for one in found.structures}
-    assert ("car" in classes) == parks == (found.by_lot["Parked vehicles"] > 0)
+    assert (
+        ("car" in classes) == parks == (found.at_random["Parked vehicles"] > 0)
+    )
 
 
 def test_a_car_park_has_cars_within_it(tmp_path):
@@ -215,7 +217,7 @@ def test_sidewalks_are_added_where_the_file_is_silent(tmp_path):
     assert ((gaps < 4.5) | (gaps > 6.33)).all()
 
 
-def test_a_city_counts_what_is_from_the_file_and_what_by_lot(
+def test_a_city_counts_what_is_from_the_file_and_what_at_random(
     tmp_path, monkeypatch
 ):
     osm = OsmWriter()
