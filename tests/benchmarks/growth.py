@@ -56,7 +56,7 @@ def beams(rings: int, columns: int) -> np.ndarray:
     """Returns beams over the elevations of the dataset's LiDAR."""
     elevations = np.deg2rad(np.linspace(22.5, -22.5, rings))
     pattern = SpinningPattern(tuple(elevations), columns, 0.8, REACH, 0.05)
-    return pattern.d_Sset[pattern.packet_order]
+    return pattern.d_Sset[pattern.beams(0).packet_order]
 
 
 def cast_all(scene: RayCastingScene, poses, d_S: np.ndarray) -> None:

@@ -101,7 +101,7 @@ def make_stage(drive: str, num_poses: int, folder: Path) -> Stage:
             triangles.append(geometry.surface.triangles + count)
             count += len(p_WVset)
     pattern = make_beam_pattern("cns", 0.05)
-    d_Sset = pattern.d_Sset[pattern.packet_order]
+    d_Sset = pattern.d_Sset[pattern.beams(0).packet_order]
     stage = Stage(
         np.concatenate(vertices).astype(np.float32),
         np.concatenate(triangles).astype(np.int32),

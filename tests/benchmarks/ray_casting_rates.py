@@ -65,7 +65,7 @@ def benchmark(drive: str, rounds: int, folder: Path) -> None:
     geometries = read_stage(drive)
     poses = sensor_poses(drive, POSES)
     pattern = make_beam_pattern("cns", 0.05)
-    d_S = pattern.d_Sset[pattern.packet_order]
+    d_S = pattern.d_Sset[pattern.beams(0).packet_order]
     reach = pattern.max_range
     stands = {geometry.frame_id for geometry in geometries}
     scene = RayCastingScene(geometries, stands, still)
@@ -138,7 +138,8 @@ def _all_in_one(geometries, stands):
 
 def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):
     tree = hierarchy._tree
-    intersect16 = embree.address_of(embree.load().rtcIntersect16)
+    function = embree.load().rtcIntersect16
+    intersect16 = ctypes.cast(function, ctypes.c_void_p)
     count = len(d_S)
     rows = np.ascontiguousarray(d_S.T, dtype=np.float32)
     ranges = np.empty(count, np.float32)
@@ -152,7 +153,7 @@ def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):
             R = X_WS.rotation().matrix().astype(np.float32).ravel()
             p = (X_WS.translation() - p_WO).astype(np.float32)
             limit(
-                ctypes.c_void_p(intersect16),
+                intersect16,
                 ctypes.c_void_p(tree.fixed),
                 ctypes.c_void_p(tree.arguments),
                 pointer(R),

@@ -13,9 +13,9 @@ _SCRIPT = """
 import numba
 import numpy as np
 before = numba.config.CACHE_DIR
-from evaluation.maps.voxel_maps import thin
+from evaluation.geometry.neighbours import nearest_neighbours
 assert numba.config.CACHE_DIR == before
-print(len(thin(np.zeros((3, 3)), 1.0)))
+print(len(nearest_neighbours(np.zeros((1, 3)), 1)))
 """
 
 

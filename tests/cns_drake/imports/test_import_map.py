@@ -274,7 +274,7 @@ def test_years_that_are_none_or_to_come_are_counted(tmp_path):
     ):
         report = import_city(
             source,
-            tmp_path / undated.value,
+            tmp_path / undated,
             ImportOptions((1900, 2000), undated=undated),
         )
         assert report.undated == 3
