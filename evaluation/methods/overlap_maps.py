@@ -148,12 +148,9 @@ def _extremes(
     Returns:
         (size,) each; infinite, and minus infinite, for a cell without values.
     """
-    order = np.argsort(cells)
-    first = np.flatnonzero(np.diff(cells[order], prepend=-1))
-    filled = cells[order[first]]
     least, greatest = np.full(size, np.inf), np.full(size, -np.inf)
-    least[filled] = np.minimum.reduceat(values[order], first)
-    greatest[filled] = np.maximum.reduceat(values[order], first)
+    np.minimum.at(least, cells, values)
+    np.maximum.at(greatest, cells, values)
     return least, greatest
 
 
