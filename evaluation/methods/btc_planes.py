@@ -170,16 +170,18 @@ def group_alike(
     excesses = np.empty(num_planes)
     # One more than needed, for a write that is not kept.
     alike = np.empty(num_planes + 1, dtype=np.int64)
-    x, y, z = np.ascontiguousarray(centers.T)
-    a, b, c = np.ascontiguousarray(normals.T)
+    p, n = np.ascontiguousarray(centers.T), np.ascontiguousarray(normals.T)
     for i in range(num_planes - 1, 0, -1):
+        x, y, z = p[0, i], p[1, i], p[2, i]
+        a, b, c = n[0, i], n[1, i], n[2, i]
         # Without a branch, so that several patches are compared at a time.
         for j in range(i):
-            cosine = abs(a[i] * a[j] + b[i] * b[j] + c[i] * c[j])
-            dx, dy, dz = x[j] - x[i], y[j] - y[i], z[j] - z[i]
-            from_i = abs(a[i] * dx + b[i] * dy + c[i] * dz)
-            from_j = abs(a[j] * dx + b[j] * dy + c[j] * dz)
+            u, v, w = n[0, j], n[1, j], n[2, j]
+            dx, dy, dz = p[0, j] - x, p[1, j] - y, p[2, j] - z
+            from_i = abs(a * dx + b * dy + c * dz)
+            from_j = abs(u * dx + v * dy + w * dz)
             apart = max(from_i, from_j) - distance_limit
+            cosine = abs(a * u + b * v + c * w)
             excesses[j] = max(apart, min_cosine - cosine)
         num_alike = 0
         for j in range(i):
