@@ -6,6 +6,7 @@ which is slow to import.
 
 from __future__ import annotations
 
+import abc
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -61,7 +62,7 @@ class Mount(Section):
     rpy_deg: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
 
 
-class SensorConfig(Mount):
+class SensorConfig(Mount, abc.ABC):
     """A sensor that publishes one message at a time on one topic.
 
     A kind of sensor derives from it. A field of a scenario that holds one is
@@ -77,13 +78,14 @@ class SensorConfig(Mount):
     xyz: Triple = (0.0, 0.0, 0.0)
     rate: int | None = field_off_by_default(None)
 
+    @abc.abstractmethod
     def topic(self, name: str) -> Topic:
         """Returns the topic of the sensor of a name.
 
         Its second part is that name: `/<name>/...`.
         """
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def add(
         self,
         builder: DiagramBuilder,
@@ -104,8 +106,8 @@ class SensorConfig(Mount):
             name: names the sensor.
             seed: seed of its noise.
         """
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def make_message(self, value: Any, frame_id: str, stamp_ns: int) -> Any:
         """Returns the ROS 2 message of a value of the port.
 
@@ -114,7 +116,6 @@ class SensorConfig(Mount):
             frame_id: name of its frame.
             stamp_ns: the time [ns].
         """
-        raise NotImplementedError
 
 
 def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -309,7 +310,7 @@ class Assembly:
         self.parts.append(Part(part, shape, (x, y, z), rpy, rgb or self.rgb))
 
 
-class Building(Assembly):
+class Building(Assembly, abc.ABC):
     """A building of an archetype: it draws its parameters, then builds itself.
 
     Functions that add something to a building take it as `p`: they find in it
@@ -346,10 +347,10 @@ class Building(Assembly):
         self.glass_rgb = self.colours.setdefault("glass", self.glass_rgb)
         self.paint(**{part: self.colours[part] for part in kind.materials})
 
+    @abc.abstractmethod
     def draw(self, d: Dice) -> None:
         """Draws the parameters but the colours."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def build(self) -> None:
         """Adds all parts."""
-        raise NotImplementedError

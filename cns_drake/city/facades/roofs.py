@@ -200,30 +200,6 @@ def hip(
     return merge_meshes(*_boxed_eaves(outer, z, fascia), slopes)
 
 
-def mansard(
-    outline: ArrayLike,
-    z: float,
-    knee: float,
-    top: float,
-    run: float,
-    eaves: float,
-) -> Mesh:
-    """Returns a roof with steep sides up to a knee and a hip above.
-
-    Args:
-        outline: outline of the walls, four corners.
-        z: underside of the eaves [m].
-        knee, top: heights where the steep sides end and of the ridge [m].
-        run: how far the steep sides lean inwards from the walls [m].
-        eaves: overhang [m].
-    """
-    outer, fascia = massing.inset(outline, -eaves), 0.3
-    bend = massing.inset(outline, run)
-    steep = massing.skirt(outer, bend, z + fascia, knee)
-    slopes = massing.skirt(bend, _ridge(bend), knee, top)
-    return merge_meshes(*_boxed_eaves(outer, z, fascia), steep, slopes)
-
-
 def _boxed_eaves(outer: np.ndarray, z: float, fascia: float) -> list[Mesh]:
     """Returns the underside of the eaves and their upright edge."""
     edge = massing.skirt(outer, outer, z, z + fascia)

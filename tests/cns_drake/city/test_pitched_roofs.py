@@ -102,16 +102,3 @@ def test_a_hip_on_a_turned_rectangle():
     rise = top - z - fascia
     wanted = 150.0 * fascia + 5.0 * 10.0 * rise / 2 + 100.0 * rise / 3
     assert volume(roof) == pytest.approx(wanted)
-
-
-def test_a_mansard_bends_at_its_knee():
-    roof = roofs.mansard(TURNED, 6.0, 8.5, 9.5, 0.6, 0.4)
-    assert out_of_plane(roof) < 1e-9
-    heights = np.unique(np.round(roof.vertices[:, 2], 6))
-    np.testing.assert_allclose(heights, [6.0, 6.3, 8.5, 9.5])
-    knee = roof.vertices[np.isclose(roof.vertices[:, 2], 8.5)]
-    expected = massing.inset(TURNED, 0.6)
-    distance = np.linalg.norm(knee[:, None, :2] - expected[None], axis=2).min(
-        axis=1
-    )
-    np.testing.assert_allclose(distance, 0.0, atol=1e-9)
