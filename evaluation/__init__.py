@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cns_drake.base.errors import InputError
     from evaluation.change.tcr import TemporalChange, covered, temporal_change
     from evaluation.drives import Drive, open_drive
+    from evaluation.drives.comparison import compare_drives
     from evaluation.maps.voxel_maps import VoxelMap, map_drive, voxelise
     from evaluation.methods import (
         Method,
@@ -39,6 +40,7 @@ __all__ = [
     "RetrievalProtocol",
     "TemporalChange",
     "VoxelMap",
+    "compare_drives",
     "covered",
     "evaluate",
     "judge",
@@ -69,6 +71,7 @@ _HOMES = {
     "evaluation.recognition.query_outcomes": ("QueryOutcomes", "judge"),
     "evaluation.recognition.retrieval": ("Retrieval", "retrieve"),
     "evaluation.drives": ("Drive", "open_drive"),
+    "evaluation.drives.comparison": ("compare_drives",),
 }
 
 # Python prefers a package to a folder without `__init__`. A user's folder of

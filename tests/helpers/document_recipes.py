@@ -250,6 +250,14 @@ RECIPES = {
         ),
         after=("scans",),
     ),
+    "help: drives": Recipe(
+        "cns-eval drives drives/riverside_01",
+        changes=(
+            ("drives/riverside_01 mine", "output/town_01 output/town_02"),
+        ),
+        after=("own city",),
+        prints=("another lane",),
+    ),
     "help: pr": Recipe(
         "cns-eval pr drives/metropolis_01",
         changes=(_FIRST, _LAST, ("drives/", "output/")),
