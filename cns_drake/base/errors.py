@@ -79,14 +79,16 @@ def describe_validation_error(
     error: ValidationError,
     model: type[BaseModel] | None = None,
 ) -> str:
-    """Returns one line for the first fault that pydantic found.
+    """Returns one line for the first of the faults that pydantic found.
+
+    An unknown field comes first, a missing one last: its name may be misspelt.
 
     Args:
         source: the file or object that was validated.
         error: a `pydantic.ValidationError`.
         model: the pydantic model, used to suggest the names of misspelt fields.
     """
-    fault = error.errors()[0]
+    fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
     # pydantic puts this before the message of one of our validators.
     message = fault["msg"].removeprefix("Value error, ")
@@ -94,6 +96,12 @@ def describe_validation_error(
     more = error.error_count() - 1
     tail = f" (and {more} more)" if more else ""
     return f"{source}: {field}: {message}{tail}"
+
+
+def _urgency(fault: Mapping[str, Any]) -> int:
+    if fault["type"] == "extra_forbidden":
+        return 0
+    return 2 if fault["type"] == "missing" or fault["input"] is None else 1
 
 
 def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:

@@ -62,6 +62,8 @@ def run_drive(
     weather: WeatherConfig | None = None,
     traffic: int | None = None,
     transient: Mapping[str, float | str] | None = None,
+    ride: str | None = None,
+    imu_rate: int | None = None,
     recording: Path | None = None,
     graphviz: Path | None = None,
     overwrite: bool = False,
@@ -78,6 +80,8 @@ def run_drive(
         traffic: how many vehicles, and how many walkers, in place of the
             scenario's.
         transient: switches of the section `transient`, and their values.
+        ride: class of the road, A to E, or `none`, in place of the scenario's.
+        imu_rate: samples per second of the IMU, in place of the scenario's.
         recording: where to save a web page of the drive.
         graphviz: where to save the Diagram as Graphviz text.
         overwrite: replace an existing recording.
@@ -106,6 +110,12 @@ def run_drive(
         scenario = scenario.with_traffic(traffic)
     if transient:
         scenario = scenario.with_transient(**transient)
+    if ride is not None:
+        change: dict = {"ride": {"roughness": ride}}
+        scenario = scenario.with_fields(change, "--ride")
+    if imu_rate is not None:
+        change = {"imu": {"rate": imu_rate}}
+        scenario = scenario.with_fields(change, "--imu-rate")
     if frames is not None:
         scenario = scenario.model_copy(update={"frames": frames})
     with show_progress() as progress:

@@ -137,6 +137,20 @@ def simulate(
             "snow, scaffolds, works, furniture, seed; may be repeated.",
         ),
     ] = None,
+    ride: Annotated[
+        Literal["A", "B", "C", "D", "E", "none"] | None,
+        typer.Option(
+            help="Put the car on springs, on a road of a class of ISO 8608 "
+            "from A (new) to E (very poor).",
+        ),
+    ] = None,
+    imu_rate: Annotated[
+        int | None,
+        typer.Option(
+            metavar="HZ",
+            help="Samples of the IMU a second, in place of the scenario's.",
+        ),
+    ] = None,
     recording: Recording = None,
     graphviz: Graphviz = None,
     overwrite: Overwrite = False,
@@ -158,6 +172,8 @@ def simulate(
         weather=weather,
         traffic=traffic,
         transient=_switches(transient or ()),
+        ride=ride,
+        imu_rate=imu_rate,
         recording=recording,
         graphviz=graphviz,
         overwrite=overwrite,

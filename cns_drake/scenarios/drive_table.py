@@ -94,7 +94,7 @@ def drive_rows(
             continue
         # A map whose drives follow waypoints has no roads.
         roads = [p for p in (its.roads,) if p.is_file()]
-        checksum = _checksum((path, *roads, world), meshes)
+        checksum = _checksum((*scenario.files, *roads, world), meshes)
         row = known.get(checksum)
         if row is None:
             progress(f"measuring {drive_name(path)}")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import operator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    BaseModel,
     Field,
     PrivateAttr,
     StringConstraints,
@@ -69,6 +71,13 @@ _ALTERNATIVES: dict[str, tuple[tuple[str, Any, str], ...]] = {
         ),
     ),
 }
+# Field -> fields that it takes the place of.
+_REPLACED: dict[str, tuple[str, ...]] = {
+    "world": ("map", "stage", "route", "aside"),
+    "map": ("world",),
+    "route": ("waypoints", "u_turns"),
+    "waypoints": ("route", "aside"),
+}
 
 
 class RideConfig(Section):
@@ -111,8 +120,8 @@ class TrafficConfig(Section):
     def _check_fcd(self) -> TrafficConfig:
         if self.fcd is not None and (self.vehicles or self.walkers):
             raise ValueError(
-                "fcd: the trace replaces other traffic; leave out vehicles "
-                "and walkers"
+                "fcd: the trace replaces other traffic; give no vehicles and "
+                "walkers"
             )
         return self
 
@@ -168,6 +177,8 @@ class Scenario(Section):
     Attributes:
         name: name of the drive and its files; letters, digits and
             underscores.
+        base: another drive, by its name or its file, which has all fields that
+            this one leaves out.
         map: a shipped map, or a folder laid out like one.
         stage: stage of the map.
         world: any SDF file, in place of `map` and `stage`.
@@ -200,6 +211,7 @@ class Scenario(Section):
     """
 
     name: Name
+    base: str | None = field_off_by_default(None)
     map: str | None = None
     stage: Name | None = _Optional
     world: str | None = _Optional
@@ -224,8 +236,14 @@ class Scenario(Section):
     frames: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
 
-    # The file of the scenario.
-    _file: Path | None = PrivateAttr(None)
+    # The file of the scenario, and those of its bases.
+    _files: tuple[Path, ...] = PrivateAttr(())
+
+    @field_validator("base")
+    @classmethod
+    def _check_base(cls, base: str | None) -> None:
+        if base is not None:
+            raise ValueError("only a scenario file has one")
 
     @field_validator(*_ALTERNATIVES)
     @classmethod
@@ -292,7 +310,12 @@ class Scenario(Section):
     @property
     def source(self) -> str:
         """The beginning of errors: the scenario's file, or else its name."""
-        return str(self._file or self.name)
+        return str(self._files[0] if self._files else self.name)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that it was read from: its own and those of its bases."""
+        return self._files
 
     @property
     def fastest_rate(self) -> int:
@@ -338,6 +361,34 @@ class Scenario(Section):
             update={"lidars": lidars, "weather": weather or self.weather}
         )
 
+    def with_fields(
+        self, changes: Mapping[str, Any], source: object
+    ) -> Scenario:
+        """Returns the scenario with other values of some fields.
+
+        The fields of a section, and LiDARs by their names, change one by one. A
+        list is replaced as a whole. None stands for the default.
+
+        Args:
+            changes: field -> its new value, or that of some fields in it. A
+                world replaces a map and its route, a route waypoints, and the
+                other way round.
+            source: the file or argument that errors name.
+
+        Raises:
+            InputError: a field is unknown, or its value is not usable.
+        """
+        replaced = [n for field in changes for n in _REPLACED.get(field, ())]
+        values = _merge(self, {**dict.fromkeys(replaced), **changes})
+        try:
+            scenario = Scenario.model_validate(values)
+        except ValidationError as error:
+            raise InputError(
+                describe_validation_error(source, error, Scenario)
+            ) from None
+        scenario._files = self._files
+        return scenario
+
     def with_traffic(self, number: int) -> Scenario:
         """Returns the scenario with other traffic, of the same seed.
 
@@ -355,16 +406,7 @@ class Scenario(Section):
         Raises:
             InputError: there is no such switch, or its value is not usable.
         """
-        values = self.transient.model_dump() | changes
-        try:
-            transient = TransientConfig.model_validate(values)
-        except ValidationError as error:
-            raise InputError(
-                describe_validation_error(
-                    f"{self.source}: transient", error, TransientConfig
-                )
-            ) from None
-        return self.model_copy(update={"transient": transient})
+        return self.with_fields({"transient": changes}, self.source)
 
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with the unit of every LiDAR replaced.
@@ -379,6 +421,24 @@ class Scenario(Section):
             for name, config in self.lidars.items()
         }
         return self.model_copy(update={"lidars": lidars})
+
+
+def _merge(
+    values: Mapping[str, Any] | BaseModel, changes: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Returns fields with changes; see `Scenario.with_fields`."""
+    merged = dict(values)
+    for field, change in changes.items():
+        if change is None:
+            merged.pop(field, None)
+        elif isinstance(change, Mapping):
+            old = merged.get(field)
+            if not isinstance(old, Mapping | BaseModel):
+                old = {}
+            merged[field] = _merge(old, change)
+        else:
+            merged[field] = change
+    return merged
 
 
 def _fastest(lidars: dict[str, LidarConfig]) -> int:

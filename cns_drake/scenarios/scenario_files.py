@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 import os
 from pathlib import Path
 import re
@@ -71,7 +72,30 @@ def read_scenario_file(path: Path) -> Scenario:
     """Reads a scenario whose map, world and waypoints may be missing.
 
     Raises:
-        InputError: the file is not a usable scenario.
+        InputError: the file, or one that it has as base, is not a usable
+            scenario.
+    """
+    files: dict[Path, dict] = {}
+    file: Path | None = path
+    while file is not None:
+        files[file] = values = _read_fields(file)
+        file = _find_base(values.pop("base", None), file, files)
+    scenario = None
+    for file, values in reversed(files.items()):
+        if scenario is None:
+            scenario = make_scenario(values, file)
+        else:
+            scenario = scenario.with_fields(values, file)
+        scenario._files = (file, *scenario.files)
+    assert scenario is not None  # There is at least one file.
+    return scenario
+
+
+def _read_fields(path: Path) -> dict:
+    """Returns the fields of a file, with absolute paths.
+
+    Raises:
+        InputError: the file cannot be read.
     """
     values = read_yaml(path)
     if not isinstance(values, dict):
@@ -86,9 +110,35 @@ def read_scenario_file(path: Path) -> Scenario:
             except ValueError as error:
                 raise InputError(f"{path}: {field}: {error}") from error
     find_files(values, path)
-    scenario = make_scenario(values, path)
-    scenario._file = path
-    return scenario
+    return values
+
+
+def _find_base(
+    base: object, path: Path, found: Collection[Path]
+) -> Path | None:
+    """Returns the file of a base; None without one.
+
+    Args:
+        base: the field `base`.
+        path: the file with this field.
+        found: this file, and all files that it is the base of.
+
+    Raises:
+        InputError: there is no such drive, or it has this file as its base.
+    """
+    if base is None:
+        return None
+    drives = shipped_drives()
+    # Only text is the name of a file.
+    file = drives.get(str(base), path.parent / str(base))
+    if not (isinstance(base, str) and os.path.isfile(file)):
+        raise InputError(
+            f"{path}: base: {base!r} is neither a file nor a shipped drive "
+            f"({', '.join(drives)})"
+        )
+    if any(file.samefile(one) for one in found):
+        raise InputError(f"{path}: base: '{base}' has this drive as its base")
+    return file
 
 
 def find_files(values: dict, path: Path) -> None:

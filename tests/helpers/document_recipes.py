@@ -335,6 +335,28 @@ RECIPES = {
         after=("scenario", "start a city"),
         prints=("recordings/drive: 2 frames",),
     ),
+    "scenario with a base": Recipe(
+        "base: riverside_01  # has all",
+        file="rough.yaml",
+        changes=(
+            ("riverside_01", "town/sequence_01.yaml"),
+            ("frames: 200", "frames: 2"),
+        ),
+    ),
+    "drive with a base": Recipe(
+        ".venv/bin/cns-drake simulate rough.yaml",
+        after=("scenario with a base", "start a city"),
+        prints=("recordings/rough: 2 frames",),
+    ),
+    "drive with options": Recipe(
+        ".venv/bin/cns-drake simulate riverside_01 --ride A",
+        changes=(
+            ("riverside_01", "town/sequence_01.yaml"),
+            ("--output", "--frames 2 --output"),
+        ),
+        after=("start a city",),
+        prints=("recordings/town_01: 2 frames",),
+    ),
     "first drive": Recipe(
         ".venv/bin/cns-drake simulate riverside_01 --frames 200",
         changes=(

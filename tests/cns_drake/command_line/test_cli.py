@@ -96,6 +96,18 @@ def test_simulate_and_overwrite(files, tmp_path, capfd):
     assert shorter.returncode == 0
 
 
+def test_ride_and_rate_of_the_imu(files, tmp_path, capfd):
+    drive = ("simulate", files / "drive.yaml", "--output", tmp_path)
+    varied = ("--ride", "B", "--imu-rate", 400, "--frames", 2)
+    assert run_here(capfd, *drive, *varied).returncode == 0
+    recorded = (tmp_path / "drive" / "scenario.yaml").read_text()
+    values = yaml.safe_load(recorded)
+    assert values["ride"] == {"roughness": "B", "seed": 1}
+    assert values["imu"]["rate"] == 400
+    refused = run_here(capfd, *drive, "--imu-rate", 333)
+    assert_one_line(refused, "--imu-rate: imu: rate: 333 a second")
+
+
 def test_scan(files, tmp_path, capfd):
     output = tmp_path / "scan.npy"
     result = run_here(

@@ -236,3 +236,141 @@ def test_a_ride_that_is_none_is_named(small_map, ride):
     (field,) = ride
     with pytest.raises(InputError, match=f"^test: ride.{field}: "):
         make_scenario(values, "test")
+
+
+def write_drives(folder, **drives):
+    """Writes a scenario file for each name; returns the first."""
+    paths = []
+    for name, values in drives.items():
+        paths.append(folder / f"{name}.yaml")
+        paths[-1].write_text(yaml.safe_dump(values, sort_keys=False))
+    return paths[0]
+
+
+def test_a_base_has_what_a_drive_leaves_out(tmp_path):
+    shipped = load_scenario("riverside_01")
+    path = write_drives(
+        tmp_path,
+        rough={
+            "base": "car.yaml",
+            "ride": {"roughness": "B"},
+            "transient": {"snow": 0.2},
+            "lidars": {"a": {"xyz": [1, 0, 2]}, "b": {}, "lidar": None},
+            "without": ["tower"],
+            "aside": None,
+        },
+        car={
+            "base": "riverside_01",
+            "name": "car",
+            "speeds": {"cruise": 9},
+            "ride": {"seed": 5},
+            "transient": {"seed": 7},
+            "lidars": {"a": {"preset": "vlp-16", "rpy_deg": [0, 10, 0]}},
+            "without": ["house", "tree"],
+        },
+    )
+    drive = load_scenario(path)
+    assert drive.name == "rough"
+    assert drive.source == str(path)
+    assert drive.route == shipped.route
+    assert drive.speeds == shipped.speeds.model_copy(update={"cruise": 9.0})
+    assert (drive.ride.roughness, drive.ride.seed) == ("B", 5)
+    assert (drive.transient.snow, drive.transient.seed) == (0.2, 7)
+    assert (shipped.aside, drive.aside) == (1.2, 0.0)
+    assert drive.without == ("tower",)
+    assert drive.lidars == {
+        "a": LidarConfig(preset="vlp-16", rpy_deg=(0, 10, 0), xyz=(1, 0, 2)),
+        "b": LidarConfig(),
+    }
+    # It is recorded whole, without its base.
+    values = drive.model_dump(mode="json", exclude_none=True)
+    assert "base" not in values
+    assert make_scenario(values, "test") == drive
+
+
+def test_paths_are_relative_to_the_file_that_has_them(small_map, tmp_path):
+    folder = tmp_path / "far"
+    folder.mkdir()
+    values = scenario_values(small_map) | {"imu": {"kalibr": "imu.yaml"}}
+    write_drives(folder, base=values)
+    near = write_drives(tmp_path, near={"base": "far/base.yaml"})
+    with pytest.raises(InputError, match=r"near.yaml: imu.kalibr: .*far/imu"):
+        load_scenario(near)
+
+
+def test_what_excludes_a_field_of_the_base_replaces_it(small_map, tmp_path):
+    (tmp_path / "tour.csv").write_text("x,y\n0,0\n50,0\n")
+    world = small_map / "stage_04.sdf"
+    path = write_drives(
+        tmp_path,
+        route={"base": "world.yaml", "map": str(small_map), "stage": "04"}
+        | {"route": scenario_values(small_map)["route"]},
+        world={"base": "tour.yaml", "world": str(world)},
+        tour={"base": "riverside_01", "waypoints": "tour.csv", "u_turns": True},
+    )
+    drive = load_scenario(tmp_path / "tour.yaml")
+    assert (drive.route, drive.aside, drive.map) == (None, 0.0, "riverside")
+    drive = load_scenario(tmp_path / "world.yaml")
+    assert (drive.map, drive.stage, drive.u_turns) == (None, None, True)
+    drive = load_scenario(path)
+    assert (drive.world, drive.waypoints, drive.u_turns) == (None, None, False)
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        (
+            {"base": "nowhere"},
+            r"a.yaml: base: 'nowhere' is neither a .*riversi",
+        ),
+        ({"base": "."}, r"a.yaml: base: '.' is neither"),
+        ({"base": "x\0"}, r"a.yaml: base: .* is neither"),
+        ({"base": ["b.yaml"]}, r"a.yaml: base: .* is neither"),
+        ({"base": "a.yaml"}, r"a.yaml: base: 'a.yaml' has this drive as its"),
+        ({"base": "ring.yaml"}, r"ring.yaml: base: '../.*a.yaml' has this"),
+        ({"base": "bad.yaml"}, r"bad.yaml: fames: .*did you mean frames"),
+        ({"base": "b.yaml", "rid": 1}, r"a.yaml: rid: .*did you mean ride"),
+        ({"base": "b.yaml", "imu": {"rte": 1}}, r"a.yaml: imu.rte: .*rate"),
+        ({"base": "b.yaml", "ride": "A"}, r"a.yaml: ride: .*dictionary"),
+        ({"base": "b.yaml", "speeds": 3}, r"a.yaml: speeds: .*dictionary"),
+        ({"base": "b.yaml", "speeds": None}, r"a.yaml: speeds: .*required"),
+        ({"base": "b.yaml", "lidars": [1]}, r"a.yaml: lidars: .*dictionary"),
+        ({"base": "b.yaml", "route": {"0": {}}}, r"a.yaml: route: .*list"),
+        ({"base": "b.yaml", 3: 4}, r"a.yaml: 3: "),
+        ({"base": None}, r"a.yaml: world: give either a map"),
+    ],
+)
+def test_faults_of_a_base_are_named(tmp_path, values, fault):
+    path = write_drives(
+        tmp_path,
+        a=values,
+        b={"base": "riverside_01"},
+        bad={"base": "b.yaml", "fames": 3},
+        ring={"base": f"../{tmp_path.name}/a.yaml"},
+    )
+    with pytest.raises(InputError, match=fault) as caught:
+        load_scenario(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_only_a_file_has_a_base():
+    with pytest.raises(InputError, match=r"^test: base: only a scenario file"):
+        make_scenario({"name": "a", "base": "riverside_01"}, "test")
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"stage": None, "stge": "04"}, "stge: .*did you mean stage"),
+        ({"route": None, "rout": []}, "rout: .*did you mean route"),
+        ({"speeds": None, "frames": "all"}, "frames: .*integer"),
+        ({"stage": None, "seed": -1}, "seed: .*greater"),
+    ],
+)
+def test_the_fault_that_causes_others_comes_first(small_map, change, fault):
+    values = scenario_values(small_map) | change
+    values = {
+        name: value for name, value in values.items() if value is not None
+    }
+    with pytest.raises(InputError, match=f"^test: {fault}.*and . more"):
+        make_scenario(values, "test")

@@ -155,7 +155,7 @@ def test_what_came_is_absent_in_another_stage(tmp_path):
 )
 def test_bad_values_are_one_line(scenario, changes, expected):
     with pytest.raises(
-        InputError, match=f"^tiny_01: transient: .*{expected}"
+        InputError, match=rf"^tiny_01: transient\..*{expected}"
     ) as e:
         scenario.with_transient(**changes)
     assert not re.search("\n", str(e.value))
