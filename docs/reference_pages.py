@@ -265,7 +265,8 @@ def _commands_page() -> str:
         _heading("Commands"),
         "Results go to stdout, progress and messages to stderr. The exit "
         "status is 0 on success; 2, with one line, for bad input; 1 if some "
-        "of many jobs could not be done.",
+        "of many jobs could not be done. `--traceback` with any command shows "
+        "where an error comes from.",
     ]
     for program, app in (
         ("cns-drake", cli.app),

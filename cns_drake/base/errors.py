@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import sys
 import typing
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
 
     from pydantic import BaseModel, ValidationError
 
+TRACEBACK_OPTION = "--traceback"
 _LONGEST = 2000
 _MISSING = re.compile(
     r"(lib[\w.+-]+?)\.so[\w.]*: cannot open shared object file"
@@ -169,6 +171,14 @@ def _inside(kind: Any, part: str | int) -> Iterator[object]:
     else:
         for inner in arguments:
             yield from _inside(inner, part)
+
+
+def shows_traceback() -> bool:
+    """Returns whether the command line asks for the tracebacks of errors.
+
+    The processes of jobs have the arguments of their parent.
+    """
+    return TRACEBACK_OPTION in sys.argv
 
 
 def missing_library(error: ImportError) -> str | None:

@@ -9,11 +9,17 @@ import math
 import os
 import sys
 import time
+import traceback
 from typing import Annotated, Any, NoReturn
 
 import typer
 
-from cns_drake.base.errors import InputError, missing_library
+from cns_drake.base.errors import (
+    TRACEBACK_OPTION,
+    InputError,
+    missing_library,
+    shows_traceback,
+)
 from cns_drake.base.interrupts import (
     INTERRUPTED,
     end_interrupted,
@@ -62,6 +68,13 @@ def make_program(name: str, summary: str, epilog: str) -> typer.Typer:
         version: Annotated[
             bool, typer.Option("--version", help="Show the version and exit.")
         ] = False,
+        _traceback: Annotated[
+            bool,
+            typer.Option(
+                TRACEBACK_OPTION,
+                help="With any command: show where an error comes from.",
+            ),
+        ] = False,
     ) -> None:
         if version:
             print(name, __version__)
@@ -79,7 +92,9 @@ def example(*lines: str) -> str:
 
 
 def run(app: typer.Typer, program: str) -> NoReturn:
-    """Runs a command line; bad usage and bad input never show a traceback.
+    """Runs a command line; bad usage and bad input are one line.
+
+    A traceback is shown only with `--traceback`.
 
     Exits with 0 on success; with 2 and one line on stderr for bad usage or
     input, for files that cannot be used, for lack of memory and of libraries
@@ -96,7 +111,14 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     try:
         interrupt_on_termination()
         _check_arguments()
-        status = app(prog_name=program, standalone_mode=False) or 0
+        # This option may stand anywhere.
+        words = [word for word in sys.argv[1:] if word != TRACEBACK_OPTION]
+        try:
+            status = app(words, prog_name=program, standalone_mode=False) or 0
+        except Exception:
+            if shows_traceback():
+                traceback.print_exc()
+            raise
         if status == INTERRUPTED:  # Typer has caught it already.
             message = "interrupted"
         sys.stdout.flush()

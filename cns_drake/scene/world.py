@@ -215,12 +215,12 @@ def anchored_frames(plant: MultibodyPlant) -> frozenset[FrameId]:
 
 
 def load_world(
-    sdf: Path,
+    sdf: Path | str,
     *,
-    vehicle: Path | None = None,
-    structures: Path | None = None,
+    vehicle: Path | str | None = None,
+    structures: Path | str | None = None,
     without: Collection[str] = (),
-    model_paths: Collection[Path] = (),
+    model_paths: Collection[Path | str] = (),
 ) -> World:
     """Parses a world and, in it, a vehicle.
 
@@ -241,20 +241,21 @@ def load_world(
             out does not exist, or the world has no visuals.
 
     Example:
-        from pathlib import Path
-
         from cns_drake import load_world
 
-        world = load_world(Path("my_world.sdf"))
+        world = load_world("my_world.sdf")
     """
-    parsed = parse_world(sdf, without=without, model_paths=model_paths)
+    sdf = Path(sdf)
+    parsed = parse_world(
+        sdf, without=without, model_paths=[Path(one) for one in model_paths]
+    )
     plant, notes = parsed.plant, parsed.notes
     vehicle_model = None
     if vehicle is not None:
-        vehicle_model = parse_models(parsed.parser, vehicle)[0]
+        vehicle_model = parse_models(parsed.parser, Path(vehicle))[0]
     plant.Finalize()
 
-    table = structures or MapFolder(sdf.parent).structures
+    table = Path(structures or MapFolder(sdf.parent).structures)
     found = set(map(structure_name, parsed.names))
     if structures is not None or table.is_file():
         entries = load_structure_table(table)

@@ -23,9 +23,24 @@ def body_and_pose(
     """Returns the body B of a place P, and X_BS.
 
     Args:
-        place: P, a body or a frame fixed on one.
+        place: P, a body or a frame fixed on one, of a finalized plant.
         X_PS: pose of a sensor in P.
+
+    Raises:
+        RuntimeError: the plant is not finalized.
+        TypeError: the place is of another type.
     """
+    if not isinstance(place, RigidBody | Frame):
+        cure = ""
+        if isinstance(place, str):
+            cure = f"; plant.GetBodyByName({place!r}) finds the body of a name"
+        raise TypeError(f"body: {place!r} is not a RigidBody or Frame{cure}")
+    # Bodies that are welded to it later would be unknown.
+    if not place.GetParentPlant().is_finalized():
+        raise RuntimeError(
+            "body: its plant is not finalized; call plant.Finalize() before "
+            "sensors are added"
+        )
     if isinstance(place, Frame):
         return place.body(), place.GetFixedPoseInBodyFrame() @ X_PS
     return place, X_PS

@@ -9,6 +9,7 @@ import functools
 import importlib
 import importlib.util
 import inspect
+import os
 from pathlib import Path
 import sys
 import traceback
@@ -362,10 +363,11 @@ def _faults(path: Path) -> Iterator[None]:
         raise
     # A SystemExit in the file would end the program without an error.
     except (Exception, SystemExit) as error:
+        # Python makes the name of a module's file absolute.
         lines = [
             frame.lineno
             for frame in traceback.extract_tb(error.__traceback__)
-            if frame.filename == str(path)
+            if os.path.abspath(frame.filename) == os.path.abspath(path)
         ]
         where = f"line {lines[-1]}: " if lines else ""
         raise InputError(

@@ -25,7 +25,12 @@ import time
 import traceback
 from types import ModuleType
 
-from cns_drake.base.errors import InputError, missing_library, one_line
+from cns_drake.base.errors import (
+    InputError,
+    missing_library,
+    one_line,
+    shows_traceback,
+)
 from cns_drake.base.files import exclusive
 from cns_drake.base.interrupts import (
     end_interrupted,
@@ -245,6 +250,8 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
         # At another time, or on another machine, there may be enough memory.
         return "died", "not enough memory"
     except InputError as error:
+        if shows_traceback():
+            reporter.note(traceback.format_exc())
         return "fault", str(error)
     except Exception as error:
         lacking = isinstance(error, ImportError) and missing_library(error)

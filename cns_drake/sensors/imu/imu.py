@@ -102,6 +102,8 @@ def add_imu(
             `<name>_gyroscope` and `<name>_noise`.
 
     Raises:
+        RuntimeError: the plant is not finalized.
+        TypeError: the body is of another type.
         ValueError: there is noise without a rate, or the rate is not positive.
 
     Example:

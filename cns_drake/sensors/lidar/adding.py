@@ -95,7 +95,8 @@ def add_lidar(
 
     Raises:
         KeyError: there is no preset of that name.
-        RuntimeError: the body is not registered with a SceneGraph.
+        RuntimeError: the plant is not finalized, or not registered with the
+            SceneGraph.
         TypeError: an argument is of the wrong type.
         ValueError: the diagram has a system of that name, the noise is out of
             range, motion distortion needs a body, or calibrated returns need a
@@ -110,17 +111,24 @@ def add_lidar(
         lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
-    _check_arguments(builder, scene_graph, name, body, X_PS, pattern)
-    _warn_of_nothing_to_see(scene_graph, options.get("role", Role.kPerception))
+    _check_arguments(builder, scene_graph, name, X_PS, pattern)
+    if not isinstance(body, FrameId):
+        body, X_PS = body_and_pose(body, X_PS)
     _choose_measuring(
         options, pattern, returns, name, range_noise, dropout, seed
     )
-    if not isinstance(body, FrameId):
-        body, X_PS = body_and_pose(body, X_PS)
     if isinstance(pattern, str):
         pattern = make_beam_pattern(pattern)
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
+        source = plant.get_source_id()
+        inspector = scene_graph.model_inspector()
+        if source is None or not inspector.SourceIsRegistered(source):
+            raise RuntimeError(
+                "body: its plant is not registered with this SceneGraph; make "
+                "both by AddMultibodyPlantSceneGraph, or call "
+                "plant.RegisterAsSourceForSceneGraph(scene_graph)"
+            )
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())
         if unseen is None:
             unseen = _welded_to(body)
@@ -142,6 +150,7 @@ def add_lidar(
     lidar = builder.AddNamedSystem(
         name, Lidar(frame_id, X_PS, pattern, **options)
     )
+    _warn_of_nothing_to_see(scene_graph, options.get("role", Role.kPerception))
     connect_lidar(builder, scene_graph, lidar)
     if motion_distortion and isinstance(body, RigidBody):
         port = "body_spatial_velocities"
@@ -331,28 +340,19 @@ def _check_arguments(
     builder: DiagramBuilder,
     scene_graph: object,
     name: str,
-    body: object,
     X_PS: object,
     pattern: object,
 ) -> None:
     """Checks the arguments of `add_lidar`.
 
     Raises:
-        TypeError: the SceneGraph, the body, the pose or the pattern has the
-            wrong type.
+        TypeError: the SceneGraph, the pose or the pattern has the wrong type.
         ValueError: the diagram has a system of that name.
     """
     if not isinstance(scene_graph, SceneGraph):
         raise TypeError(
             f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "
             "AddMultibodyPlantSceneGraph returns one beside the plant"
-        )
-    if not isinstance(body, RigidBody | Frame | FrameId):
-        cure = ""
-        if isinstance(body, str):
-            cure = f"; plant.GetBodyByName({body!r}) finds the body of a name"
-        raise TypeError(
-            f"body: {body!r} is not a RigidBody, Frame or FrameId{cure}"
         )
     if not isinstance(X_PS, RigidTransform):
         raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")

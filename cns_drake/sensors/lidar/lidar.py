@@ -137,8 +137,17 @@ class Lidar(LeafSystem):
                 static geometry is built anew.
             num_threads: number of threads that share its rays; the measurement
                 does not depend on it.
+
+        Raises:
+            TypeError: the role is no role of geometry.
         """
         super().__init__()
+        if not isinstance(role, Role) or role == Role.kUnassigned:
+            raise TypeError(
+                f"role: {role!r} is not a role of geometry; give "
+                "Role.kPerception, Role.kIllustration or Role.kProximity of "
+                "pydrake.geometry"
+            )
         self._parent_frame_id = parent_frame_id
         self._X_PS = X_PS
         self._pattern = pattern

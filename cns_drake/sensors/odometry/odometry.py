@@ -119,16 +119,19 @@ def add_odometry(
             itself.
         name: name of the system.
 
+    Raises:
+        RuntimeError: the plant is not finalized.
+        TypeError: the body is of another type.
+
     Example:
         from cns_drake import add_odometry
 
         odometry = add_odometry(builder, body)
     """
-    X_PB = None
-    if isinstance(body, Frame):
-        body, X_PB = body_and_pose(body, RigidTransform())
-    sensor = builder.AddNamedSystem(name, OdometrySensor(body, X_PB))
+    carrier, X_BP = body_and_pose(body, RigidTransform())
+    X_PB = X_BP if isinstance(body, Frame) else None
+    sensor = builder.AddNamedSystem(name, OdometrySensor(carrier, X_PB))
     ports = ("body_poses", "body_spatial_velocities")
     inputs = {port: sensor.GetInputPort(port) for port in ports}
-    connect_motion(builder, motion, body, inputs)
+    connect_motion(builder, motion, carrier, inputs)
     return sensor

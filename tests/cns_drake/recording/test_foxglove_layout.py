@@ -5,6 +5,7 @@ import json
 import pytest
 from rosbags.highlevel import AnyReader
 
+from cns_drake.recording.recorded_topics import BOXES_TOPIC
 from cns_drake.scenarios.shipped import worlds_folder
 
 
@@ -56,8 +57,9 @@ def test_clouds_are_coloured_by_their_fields(layout, messages):
         assert panel["followTf"] in frames
         shown = {key.removeprefix("frame:") for key in panel["transforms"]}
         assert shown <= frames
+        # Foxglove hides topics unless a layout shows them.
+        assert panel["topics"].pop(BOXES_TOPIC.name) == {"visible": True}
         for topic, settings in panel["topics"].items():
-            # Foxglove hides clouds unless a layout shows them.
             assert settings["visible"] is True
             assert settings["colorMode"] == "colormap"
             fields = {field.name for field in messages[topic].fields}

@@ -3,14 +3,19 @@
 import warnings
 
 import numpy as np
-from pydrake.geometry import Box, Role
+from pydrake.geometry import Box, Role, SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.plant import (
+    AddMultibodyPlantSceneGraph,
+    MultibodyPlant,
+)
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
+from cns_drake.sensors.imu.imu import add_imu
 from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.measurement import MeasurementModel
+from cns_drake.sensors.odometry.odometry import add_odometry
 
 X_PS = RigidTransform([0.0, 0.0, 1.0])
 
@@ -18,7 +23,7 @@ X_PS = RigidTransform([0.0, 0.0, 1.0])
 class Site:
     """A wall 8 m ahead of the world's origin, or nothing."""
 
-    def __init__(self, with_wall=True):
+    def __init__(self, with_wall=True, is_finalized=True):
         self.builder = DiagramBuilder()
         self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(
             self.builder, 0.0
@@ -32,7 +37,8 @@ class Site:
                 "wall",
                 np.full(4, 0.5),
             )
-        self.plant.Finalize()
+        if is_finalized:
+            self.plant.Finalize()
 
     def add(self, body=None, pose=X_PS, pattern="vlp-16", **options):
         return add_lidar(
@@ -83,6 +89,8 @@ class Site:
             "measurement: give either it or range_noise",
         ),
         ({"noise": 0.1}, TypeError, "noise"),
+        ({"role": "visual"}, TypeError, "^role: 'visual' is not a role .*"),
+        ({"role": Role.kUnassigned}, TypeError, "^role: .* is not a role .*"),
     ],
 )
 def test_a_slip_is_found_at_once(options, error, fault):
@@ -95,6 +103,49 @@ def test_a_plant_is_no_scene_graph():
     site.scene_graph = site.plant
     with pytest.raises(TypeError, match="MultibodyPlant is not a SceneGraph"):
         site.add()
+
+
+@pytest.mark.parametrize("place", ["world_body", "world_frame"])
+def test_sensors_need_a_finalized_plant(place):
+    """A body that is welded to theirs later would not be known."""
+    site = Site(is_finalized=False)
+    body = getattr(site.plant, place)()
+    for add in (
+        lambda: site.add(body),
+        lambda: add_imu(site.builder, body, X_PS),
+        lambda: add_odometry(site.builder, body),
+    ):
+        with pytest.raises(RuntimeError, match=r"^body: .*plant\.Finalize\(\)"):
+            add()
+    assert len(site.builder.GetSystems()) == 2
+    site.plant.Finalize()
+    site.add(body)
+    add_imu(site.builder, body, X_PS)
+    add_odometry(site.builder, body)
+    site.builder.Build()
+
+
+def test_a_carrier_of_imu_or_odometry_is_a_body():
+    site = Site()
+    for add in (
+        lambda: add_imu(site.builder, "robot", X_PS),
+        lambda: add_odometry(site.builder, "robot"),
+    ):
+        with pytest.raises(TypeError, match=r"plant.GetBodyByName\('robot'\)"):
+            add()
+
+
+def test_a_plant_without_this_scene_graph_is_named():
+    site = Site()
+    site.scene_graph = site.builder.AddSystem(SceneGraph())
+    lonely = MultibodyPlant(0.0)
+    lonely.Finalize()
+    # An error comes alone, without a warning that nothing can be seen.
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for one, body in ((site, None), (Site(), lonely.world_body())):
+            with pytest.raises(RuntimeError, match="plant is not registered"):
+                one.add(body)
 
 
 def test_each_lidar_has_a_name_of_its_own():

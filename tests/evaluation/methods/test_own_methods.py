@@ -1,6 +1,7 @@
 """A user's own methods, from a file."""
 
 import json
+from pathlib import Path
 
 from helpers import documents
 from helpers.eval_program import assert_refused, make_block_scene, run
@@ -137,3 +138,23 @@ def test_faults_of_a_method_are_one_line(
         words += ["--output", tmp_path / "scores.csv"]
     assert_refused(capsys, [*words, "--method", path], fault)
     assert not (tmp_path / "scores.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["own.py", "./own.py", "sub/../own.py"])
+def test_a_relative_path_has_line_and_traceback(
+    capsys, towns, tmp_path, monkeypatch, name
+):
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    text = _WHOLE.replace("{number}", "b").replace("len(points)", "1 / 0")
+    (tmp_path / "own.py").write_text(text)
+    words = ["pr", towns / "town_01", towns / "town_02", "--method", name]
+    line = f"{Path(name)}: line 10: ZeroDivisionError: division by zero"
+    assert_refused(capsys, words, line)
+    for place in (0, len(words)):
+        longer = [*words[:place], "--traceback", *words[place:]]
+        status, out, err = run(capsys, *longer)
+        assert (status, out) == (2, "")
+        assert 'own.py", line 10, in describe\n    return 1 / 0\n' in err
+        assert err.endswith(f"\ncns-eval: error: {line}\n")

@@ -90,6 +90,14 @@ def test_a_job_checks_again_before_its_output(tmp_path):
         assert output.read_text() == expected
 
 
+@pytest.mark.parametrize("words", [[], ["--traceback"]])
+def test_a_job_shows_its_traceback_on_request(monkeypatch, capsys, words):
+    monkeypatch.setattr("sys.argv", ["program", *words])
+    with pytest.raises(FailedJobsError, match="FILE: field: cannot be used"):
+        run_jobs([job("a", job_functions.refuse)], Cluster(num_workers=1))
+    assert ("in refuse\n" in capsys.readouterr().err) == bool(words)
+
+
 def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
     first, second, both, last = (tmp_path / name for name in "abcd")
     process, tries, survivor = (tmp_path / name for name in "ptu")
