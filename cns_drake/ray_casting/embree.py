@@ -17,7 +17,7 @@ from pathlib import Path
 from numba import types
 
 # Numba then takes functions as arguments of compiled ones.
-import numba.experimental.function_type  # noqa: F401
+from numba.extending import typeof_impl
 
 TRIANGLE, CONE, ROUND_SEGMENT, SPHERE, DISC, INSTANCE = (
     0, 15, 16, 50, 52, 121,
@@ -38,7 +38,9 @@ _NATIVE_PACKETS = ((8, 33), (16, 34))
 
 
 # Numba takes its own addresses as unsigned numbers.
-_PACKET_SIGNATURE = types.void(types.uintp, types.intp, types.uintp, types.intp)
+_PACKET_TYPE = types.FunctionType(
+    types.void(types.uintp, types.intp, types.uintp, types.intp)
+)
 
 
 class IntersectArguments(ctypes.Structure):
@@ -117,7 +119,13 @@ class PacketFunction(types.WrapperAddressProtocol):
         return self._address
 
     def signature(self) -> object:
-        return _PACKET_SIGNATURE
+        return _PACKET_TYPE.signature
+
+
+@typeof_impl.register(PacketFunction)  # type: ignore[untyped-decorator]  # numba has no hints.
+def _typeof_packet_function(*_: object) -> types.Type:
+    """Returns numba's type, which numba would make anew for each call."""
+    return _PACKET_TYPE
 
 
 def native_packet(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
@@ -48,6 +49,9 @@ class PlannedDrive(Drive):
         period: time between frames [s].
         X_BS: pose of the first LiDAR in base_link.
     """
+
+    # Each kind of drive sets it when its world is loaded.
+    _instances: Mapping[int, Mapping]
 
     def __init__(
         self, scenario: Scenario, trajectory: Trajectory, num_frames: int
@@ -100,6 +104,10 @@ class PlannedDrive(Drive):
     def scenario(self) -> Mapping:
         return describe_scenario(self._scenario)
 
+    @property
+    def instances(self) -> Mapping[int, Mapping]:
+        return self._instances
+
 
 class DriveInProgress(PlannedDrive):
     """The scans of the first LiDAR, at the time of their recording.
@@ -110,6 +118,9 @@ class DriveInProgress(PlannedDrive):
     def __init__(self, drive: LoadedDrive, simulator: Simulator):
         """Takes the station of a drive before its first frame."""
         super().__init__(drive.scenario, drive.trajectory, drive.num_frames)
+        self._instances = index_instances(
+            structure_list(drive.world), self.name
+        )
         self._simulator = simulator
         self._lidar = next(iter(drive.scenario.lidars))
         schedule = drive_schedule(drive.scenario)
@@ -188,13 +199,19 @@ class SimulatedDrive(PlannedDrive):
             scenario, world=world, trajectory=trajectory, traffic=traffic
         )
         self._context = self._diagram.CreateDefaultContext()
+        # The vehicle's motion, which the station computes with its wheels, is
+        # known beforehand.
+        self._base = world.plant.GetBodyByName("base_link", world.vehicle)
+        poses = self._diagram.GetSubsystemByName("frame_poses")
+        context = poses.GetMyMutableContextFromRoot(self._context)
+        port = poses.GetInputPort("body_poses")
+        self._X_WBodies = list(port.Eval(context))
+        self._fixed_poses = port.FixValue(
+            context, AbstractValue.Make(self._X_WBodies)
+        )
         self._lidar = self._diagram.GetSubsystemByName(
             next(iter(scenario.lidars))
         )
-
-    @property
-    def instances(self) -> Mapping[int, Mapping]:
-        return self._instances
 
     @property
     def pattern(self) -> BeamPattern:
@@ -217,4 +234,6 @@ class SimulatedDrive(PlannedDrive):
     def _at(self, index: int) -> Context:
         """Returns the LiDAR's Context at the time of a scan."""
         self._context.SetTime(index * self.period)
+        self._X_WBodies[self._base.index()] = self.X_WBs[index]
+        self._fixed_poses.GetMutableData().set_value(self._X_WBodies)
         return self._lidar.GetMyContextFromRoot(self._context)

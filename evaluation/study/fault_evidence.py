@@ -27,7 +27,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource, open_surveyed
+from evaluation.study.surveys import KeptDrive
 
 # Points at least this high above the ground count as standing [m].
 _STANDING = 0.5
@@ -39,8 +39,7 @@ _COINCIDENT = 1.0
 
 def explain_faults(
     reporter: Reporter,
-    drives: tuple[DriveSource, DriveSource],
-    surveyed: tuple[Part, Part],
+    surveyed: tuple[tuple[Part, Part], tuple[Part, Part]],
     methods: tuple[MethodChoice, ...],
     results: tuple[Part, ...],
     protocol: RetrievalProtocol,
@@ -49,8 +48,8 @@ def explain_faults(
 
     Args:
         reporter: takes the progress.
-        drives: database, and query.
-        surveyed: the `SurveyedDrive` of each.
+        surveyed: the `SurveyedDrive` and the `KeptScans` of the database, and
+            of the query.
         methods: the methods.
         results: their `RecognitionResult` on the two drives.
         protocol: the protocol of these results.
@@ -62,7 +61,9 @@ def explain_faults(
         found.append(part.read())
     if None in found or not found:
         return None
-    database, query = map(open_surveyed, drives, surveyed)
+    database, query = (
+        KeptDrive(drive.read(), scans.read()) for drive, scans in surveyed
+    )
     return find_evidence(database, query, found, protocol, reporter.track)
 
 

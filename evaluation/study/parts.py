@@ -209,7 +209,7 @@ class SurveyFiles:
 
     @property
     def scans(self) -> Part:
-        """The scans of places or queries."""
+        """The scans of places and queries: a `KeptScans`, or a list."""
         return Part(self.folder / "scans.data")
 
     def described(self, method: MethodChoice) -> Part:

@@ -167,6 +167,13 @@ def _plan_city(
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
 ) -> list[Job]:
+    compared = _compared_pairs(city, protocol)
+    explained = {
+        one.name
+        for name, pair in compared.items()
+        if name == _pair_name(city, pair)
+        for one in pair
+    }
     jobs = [
         Job(
             name=f"survey {recording.name}",
@@ -176,6 +183,7 @@ def _plan_city(
                 methods,
                 protocol,
                 files.survey(recording.name),
+                with_scans=recording.name in explained,
             ),
             needs=recording.needs,
             cost=_START_COST
@@ -206,7 +214,7 @@ def _plan_city(
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
     jobs += [
         _recognition_job(city, pair, name, methods, protocol, files)
-        for name, pair in _compared_pairs(city, protocol).items()
+        for name, pair in compared.items()
     ]
     return jobs
 
@@ -327,8 +335,7 @@ def _recognition_job(
             results.evidence,
             explain_faults,
             (
-                (database.source, query.source),
-                tuple(survey.drive for survey in surveys),
+                tuple((survey.drive, survey.scans) for survey in surveys),
                 methods,
                 tuple(map(results.result, methods)),
                 protocol,

@@ -8,18 +8,22 @@ drive, not the drive.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+import io
 import os
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+import zstandard
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base.points import xyz
 from cns_drake.base.progress import Track, silent
 from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import MovedDrive, RecentScans
+from evaluation.drives.sampling import within_range
 from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VoxelMap
@@ -32,6 +36,9 @@ from evaluation.recognition.description import (
 from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
+
+# Fields of the points of kept scans, where a drive has them.
+_KEPT_FIELDS = ("x", "y", "z", "instance")
 
 
 class DriveSource(Protocol):
@@ -132,6 +139,63 @@ class SurveyedDrive:
 
 
 @dataclass(frozen=True)
+class KeptScans:
+    """The scans of a drive's places and queries.
+
+    Attributes:
+        packed: frame -> coordinates and instances of the points within range,
+            as an .npy file, compressed by zstd.
+        instances: see `Drive.instances`.
+    """
+
+    packed: dict[int, bytes] = field(default_factory=dict)
+    instances: Mapping[int, Mapping] | None = None
+
+    def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
+        """Keeps a scan; see `Drive.scan` and `within_range`."""
+        names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
+        points = np.empty(len(scan), [(one, scan.dtype[one]) for one in names])
+        for name in names:
+            points[name] = scan[name]
+        stream = io.BytesIO()
+        np.save(stream, points[within_range(xyz(scan), max_range)])
+        self.packed[frame] = zstandard.compress(stream.getvalue(), 1)
+
+    def scan(self, frame: int) -> np.ndarray:
+        """Returns a scan; see `Drive.scan`."""
+        plain = zstandard.decompress(self.packed[frame])
+        return np.load(io.BytesIO(plain), allow_pickle=False)
+
+
+class KeptDrive(Drive):
+    """A surveyed drive with the scans that were kept, and no others."""
+
+    def __init__(self, surveyed: SurveyedDrive, kept: KeptScans):
+        """Joins both parts of a survey."""
+        self.name = surveyed.name
+        self.world_frame = surveyed.placed.world_frame
+        self._surveyed, self._kept = surveyed, kept
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._surveyed.stamps_ns
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._surveyed.X_WS
+
+    def scan(self, index: int) -> np.ndarray:
+        return self._kept.scan(index)
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        return self._kept.instances
+
+
+@dataclass(frozen=True)
 class RecordingSurvey:
     """A recording's maps, places and queries, which replace its scans.
 
@@ -140,11 +204,13 @@ class RecordingSurvey:
         fine: (K, 3) cloud for pictures, in W [m].
         described: method -> its descriptions of the drive; empty if the
             recording has no role.
+        scans: those of the places and queries; None unless they are kept.
     """
 
     drive: SurveyedDrive
     fine: np.ndarray
     described: dict[str, DescribedDrive]
+    scans: KeptScans | None = None
 
 
 def survey_recording(
@@ -153,6 +219,8 @@ def survey_recording(
     methods: Sequence[Method],
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
+    *,
+    with_scans: bool = False,
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
@@ -164,6 +232,7 @@ def survey_recording(
         methods: that describe it; may be none.
         protocol: sets the places and queries.
         track: reports progress.
+        with_scans: whether to keep the scans of places and queries, too.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
@@ -174,15 +243,22 @@ def survey_recording(
         kept=max(map(protocol.scans, methods), default=1),
     )
 
-    def keep_thumbnail(frame: int, cloud: np.ndarray) -> None:
+    scans = None
+    if with_scans:
+        instances = recording.instances
+        scans = KeptScans(instances=instances and dict(instances))
+
+    def keep(frame: int, cloud: np.ndarray) -> None:
         frames.append(frame)
+        if scans is not None:
+            scans.keep(frame, mapped.scan(frame), protocol.max_range)
         height = MethodConfig().sensor_height
         thumbnails.append(thumbnail(cloud, height, seed=frame))
 
     described = {}
     if roles:
         drives = describe_drive(
-            mapped, methods, roles, protocol, track, visit=keep_thumbnail
+            mapped, methods, roles, protocol, track, visit=keep
         )
         described = {
             method.name: drive
@@ -199,7 +275,7 @@ def survey_recording(
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )
-    return RecordingSurvey(drive, fine, described)
+    return RecordingSurvey(drive, fine, described, scans)
 
 
 @dataclass(frozen=True)
@@ -212,6 +288,7 @@ class Survey(Step):
         methods: the methods that describe its places and queries.
         protocol: sets the places and queries.
         files: the parts to write.
+        with_scans: whether to keep the scans of places and queries, too.
     """
 
     source: DriveSource
@@ -219,6 +296,7 @@ class Survey(Step):
     methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
     files: SurveyFiles
+    with_scans: bool = False
 
     @property
     def output(self) -> Path:
@@ -254,6 +332,7 @@ class Survey(Step):
             [method.make() for method in methods],
             self.protocol,
             reporter.track,
+            with_scans=self.with_scans,
         )
 
     def write(self, found: RecordingSurvey) -> None:
@@ -280,6 +359,7 @@ class Survey(Step):
                 value = found.drive.placed, found.described.pop(method.name)
                 part.write(missing[part], value)
         for part, one in (
+            (self.files.scans, found.scans),
             (self.files.fine, found.fine),
             (self.files.drive, found.drive),
         ):
@@ -299,9 +379,10 @@ class Survey(Step):
             self._file(method): {**inputs, "method": method.identity()}
             for method in self._describing()
         }
-        return _stale(
-            {**expected, self.files.fine: inputs, self.files.drive: inputs}
-        )
+        others = [self.files.fine, self.files.drive]
+        if self.with_scans:
+            others.append(self.files.scans)
+        return _stale({**expected, **dict.fromkeys(others, inputs)})
 
 
 @dataclass(frozen=True)

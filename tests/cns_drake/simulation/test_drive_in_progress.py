@@ -51,6 +51,7 @@ def test_scans_read_are_those_recorded(scenario, recorded, tmp_path, num_read):
         )
     assert drive.name == expected.name
     assert drive.world_frame == expected.world_frame
+    assert drive.instances == expected.instances
 
 
 def test_what_was_recorded_before_is_not_read(scenario, recorded, tmp_path):

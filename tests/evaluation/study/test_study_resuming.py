@@ -40,9 +40,9 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch):
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     studies.do(measuring_jobs(tmp_path / "in", whole))
     expected = parts(whole)
-    # Two maps for each drive and a description by each method; results, and
-    # reasons for wrong ones.
-    assert len(expected) == 2 * (2 + METHODS) + METHODS + 1
+    # Two maps and the scans of each drive, a description by each method;
+    # results, and reasons for wrong ones.
+    assert len(expected) == 2 * (3 + METHODS) + METHODS + 1
     replace = os.replace
 
     def replace_and_stop(source, target):
@@ -75,4 +75,4 @@ def test_a_new_recording_under_an_old_name(tmp_path):
     assert after.keys() == before.keys()
     kept = {path for path in after if after[path] == before[path]}
     assert {path.parent.name for path in kept} == {"metropolis_04"}
-    assert len(kept) == 2 + METHODS
+    assert len(kept) == 3 + METHODS

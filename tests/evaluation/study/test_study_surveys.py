@@ -8,14 +8,21 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.points import xyz
 from evaluation.change import drive_change
 from evaluation.drives import Drive, open_drive
+from evaluation.drives.sampling import within_range
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.measurements import recognise_places
 from evaluation.study.parts import MakePart, Part, SurveyFiles
-from evaluation.study.surveys import RecordedDrive, Survey, survey_recording
+from evaluation.study.surveys import (
+    KeptDrive,
+    RecordedDrive,
+    Survey,
+    survey_recording,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -46,6 +53,10 @@ class OnTheFly(Drive):
     def scenario(self):
         return self._recorded.scenario
 
+    @property
+    def instances(self):
+        return self._recorded.instances
+
     def scan(self, index):
         assert index == self._next
         self._next += 1
@@ -68,9 +79,11 @@ class Source:
         return {"seed": self.seed}
 
 
-def survey(source, methods, files, roles=BOTH):
+def survey(source, methods, files, roles=BOTH, **options):
     """Runs a survey unless all its parts exist."""
-    step = Survey(source, roles, tuple(methods), PAPER_PROTOCOL, files)
+    step = Survey(
+        source, roles, tuple(methods), PAPER_PROTOCOL, files, **options
+    )
     if not step.is_done():
         step.run(Reporter())
     assert step.is_done()
@@ -129,6 +142,24 @@ def test_stored_surveys_equal_computed_ones(recorded, source, files):
         assert placed == found.drive.placed
     assert len(source.opened) == 1
     assert source.opened[0]._next == len(recorded)
+
+
+def test_scans_of_places_and_queries_are_kept(recorded, source, files):
+    survey(source, (), files, with_scans=True)
+    survey(source, (), files, with_scans=True)
+    assert len(source.opened) == 1
+    kept = KeptDrive(files.drive.read(), files.scans.read())
+    assert kept.instances == recorded.instances
+    assert (kept.name, len(kept)) == (recorded.name, len(recorded))
+    assert_equal(kept.X_WS, recorded.X_WS)
+    frames = files.drive.read().frames
+    assert len(frames) > 1
+    for frame in frames.tolist():
+        scan, found = recorded.scan(frame), kept.scan(frame)
+        assert found.dtype.names == ("x", "y", "z", "instance")
+        scan = scan[within_range(xyz(scan), PAPER_PROTOCOL.max_range)]
+        for name in found.dtype.names:
+            np.testing.assert_array_equal(found[name], scan[name])
 
 
 @pytest.mark.parametrize("roles", [frozenset(), BOTH])
