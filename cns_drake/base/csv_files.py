@@ -10,7 +10,10 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 
 # Column of files of earlier versions -> what it is called now.
-_FORMER_COLUMNS = {"radius_told": "gate"}
+_FORMER_COLUMNS = {
+    "radius_told": "gate",
+    "recall_at_100_precision": "recall_at_full_precision",
+}
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:

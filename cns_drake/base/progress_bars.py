@@ -92,10 +92,7 @@ def show_progress(console: Console | None = None) -> Iterator[Progress]:
 
 
 def count_progress(
-    progress: Progress,
-    task: TaskID,
-    note: Callable[[int, int, float], str] = lambda done, new, elapsed: "",
-    unit: str = "frames",
+    progress: Progress, task: TaskID, unit: str = "frames"
 ) -> Callable[[int, int], None]:
     """Returns a callback that shows how many frames of how many are done.
 
@@ -104,14 +101,12 @@ def count_progress(
     Args:
         progress: where the task is shown.
         task: its id.
-        note: the frames done, how many of them are new since the first
-            call, and the time [s] they took -> what to add.
         unit: what is counted.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else LINE_INTERVAL
     shown = 0.0
-    # Neither loading nor what an earlier run had done shows the speed.
+    # The time left follows neither from loading nor from an earlier run.
     first: tuple[float, int] | None = None
 
     def on_frame(done: int, total: int) -> None:
@@ -119,17 +114,16 @@ def count_progress(
         now = time.monotonic()
         if first is None:
             first, shown = (now, done), now
-        if done < total and now - shown < interval:
+        is_early = done < total and now - shown < interval
+        if is_early or progress.tasks[task].finished:
             return
         shown = now
         elapsed, new = now - first[0], done - first[1]
-        text = note(done, new, elapsed)
-        progress.update(task, completed=done, total=total, note=text)
+        progress.update(task, completed=done, total=total, note="")
         if not console.is_terminal:
             name = progress.tasks[task].description
             left = elapsed * (total - done) / max(new, 1)
-            parts = [f"{name}: {done}/{total} {unit}", text]
-            parts.append(f"{left:.0f} s left")
-            print_note(progress, ", ".join(part for part in parts if part))
+            counted = f"{name}: {done}/{total} {unit}"
+            print_note(progress, f"{counted}, {left:.0f} s left")
 
     return on_frame

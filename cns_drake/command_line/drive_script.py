@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
-
-from rich.progress import Progress, TaskID
 
 from cns_drake.base import terminal
 from cns_drake.base.interrupts import uninterrupted
@@ -23,29 +21,6 @@ from cns_drake.command_line.options import (
     Overwrite,
     Recording,
 )
-from cns_drake.recording.schedule import FRAME_PERIOD
-
-
-def frame_progress(
-    progress: Progress, task: TaskID, period: float = FRAME_PERIOD
-) -> Callable[[int, int], None]:
-    """Returns a callback that shows the frames of a simulation.
-
-    It is `count_progress` with simulated time and real-time factor.
-
-    Args:
-        progress: where to show it.
-        task: as which task.
-        period: time between frames [s].
-    """
-
-    def note(done: int, new: int, elapsed: float) -> str:
-        factor = new * period / max(elapsed, 1e-9)
-        simulated = done * period
-        return f"{simulated:.1f} s simulated, {factor:.1f} x real time"
-
-    return count_progress(progress, task, note)
-
 
 if TYPE_CHECKING:
     from cns_drake.sensors.lidar.config import WeatherConfig
@@ -120,7 +95,7 @@ def run_drive(
         scenario = scenario.model_copy(update={"frames": frames})
     with show_progress() as progress:
         task = progress.add_task(scenario.name, total=None, note="loading")
-        on_frame = frame_progress(progress, task, scenario.frame_period)
+        on_frame = count_progress(progress, task)
         run = simulate(
             scenario,
             output,

@@ -274,8 +274,8 @@ def _shortcomings(
         numbers = list(report.stages.values())
         yield (
             f"{report.dated} of {report.dated + report.undated} buildings have"
-            f" a year; from stage to stage {_differences(numbers)} structures"
-            " more stand; --grow draws what changes at random"
+            f" a year; each stage has {_differences(numbers)} structures more"
+            " than the one before; --grow draws what changes at random"
         )
 
 

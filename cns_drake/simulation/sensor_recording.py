@@ -45,8 +45,8 @@ def add_mcap_recorder(
     odometry `/odometry`. Sensors on the body of the odometry have their pose on
     it in `/tf_static`; all others have their pose in `/tf`.
 
-    A sensor may have its own rate: sensors in `rates`, an IMU with a rate, and,
-    without a period, each LiDAR with one scan a turn.
+    `rates` gives sensors a rate of their own, and an IMU may have one already.
+    Without a period, each LiDAR is recorded once for each of its turns.
 
     Args:
         builder: holds the sensors.

@@ -573,17 +573,14 @@ def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
         )
     yield "F1max", f1
     number = terminal.number(metrics.curve.recall_at_full_precision)
-    yield "recall at 100 % precision", number
+    yield "recall at full precision", number
     outcomes = result.outcomes
     yield (
         "mean reciprocal rank",
         terminal.number(outcomes.mean_reciprocal_rank),
     )
     if not isnan(outcomes.match_auroc):
-        yield (
-            "AUROC of queries with a match",
-            terminal.number(outcomes.match_auroc),
-        )
+        yield "match AUROC", terminal.number(outcomes.match_auroc)
     yield (
         "AUC by radius",
         ", ".join(

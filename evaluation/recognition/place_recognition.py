@@ -103,7 +103,7 @@ class PlaceRecognition:
             "queries_with_match": metrics.num_with_match,
             "true_positives": metrics.num_right,
             "places": len(self.retrieval.database_frames),
-            "recall_at_100_precision": metrics.curve.recall_at_full_precision,
+            "recall_at_full_precision": metrics.curve.recall_at_full_precision,
             "mean_reciprocal_rank": _number(self.outcomes.mean_reciprocal_rank),
             "match_auroc": _number(self.outcomes.match_auroc),
             "auc_over_radius": {

@@ -1,8 +1,8 @@
 """The part of a method's performance that survives structural change.
 
-The control of a pair replaces one of its drives by the same route through the
-stage of the other drive. The loss of a method from the control to the pair is
-due to the change alone, and not to the routes.
+A control drive takes the place of one drive of a pair: it follows the same
+route, but in the stage of the other drive. What a method loses from the control
+to the pair is due to the change alone, and not to the routes.
 """
 
 from __future__ import annotations
@@ -96,8 +96,8 @@ class Survival:
         return self.changed.pair
 
     @property
-    def full_precision(self) -> float:
-        """Recall at full precision, with the change."""
+    def recall_at_full_precision(self) -> float:
+        """With the change."""
         curve = self.changed.metrics["all"].curve
         return curve.recall_at_full_precision
 

@@ -39,9 +39,9 @@ CHANGE_LEGEND: Legend = (
     (_UNCHANGED, "unchanged"),
 )
 SETS_LEGEND: Legend = (
-    (_IN_O, "O: in H and unchanged"),
-    (_ONLY_IN_H, "in H, changed"),
-    (_OUTSIDE_H, "outside H"),
+    (_IN_O, "unchanged (set O)"),
+    (_ONLY_IN_H, "changed (in set H, not in O)"),
+    (_OUTSIDE_H, "outside the other map's hull H: not counted"),
 )
 # The view from above is coloured like a plan: streets pale, walls dark.
 _GROUND = (226, 229, 232)

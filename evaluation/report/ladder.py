@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 import math
 from operator import attrgetter
@@ -315,41 +315,40 @@ def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:
 
 
 def ladder_text(rows: Sequence[LadderRow]) -> str:
-    """Returns a paragraph for each map.
+    """Returns the findings of each map: a heading and a list.
 
     Args:
         rows: rows for all maps.
     """
     maps = dict.fromkeys(row.rung.map_name for row in rows)
     return "\n\n".join(
-        _paragraph([row for row in rows if row.rung.map_name == name])
+        _findings([row for row in rows if row.rung.map_name == name])
         for name in maps
     )
 
 
-def _paragraph(rows: Sequence[LadderRow]) -> str:
+def _findings(rows: Sequence[LadderRow]) -> str:
     first = rows[0].rung
-    parts = [
+    heading = (
         f"{first.map_name.capitalize()}, {len(rows[0].outcomes)} queries of"
-        f" drive {first.query}: what each cause of change, at its strongest"
-        " level, leaves of the AUC without a change (95 % intervals)."
-    ]
+        f" drive {first.query}. What each cause of change, at its strongest"
+        " level, leaves of the AUC without a change (without the gate, 95 %"
+        " intervals):"
+    )
     ungated, gated = (
         _strongest([row for row in rows if row.is_gated == is_gated])
         for is_gated in (False, True)
     )
-    sentences = [
-        _sentence([row for row in ungated if row.method == method])
+    lines = [
+        _loss([row for row in ungated if row.method == method])
         for method in in_table_order(row.method for row in ungated)
     ]
-    if any(sentences):
-        parts.append(f"Without the gate: {'; '.join(filter(None, sentences))}.")
-        parts.append(_mildest(ungated))
-        parts.append(_difference(ungated, gated))
-    return " ".join(filter(None, parts))
+    if any(lines):
+        lines += [_mildest(ungated), *_differences(ungated, gated)]
+    return "\n- ".join((heading, *filter(None, lines)))
 
 
-def _sentence(rows: Sequence[LadderRow]) -> str:
+def _loss(rows: Sequence[LadderRow]) -> str:
     """Returns the losses of one method; "" if its AUC without a change is 0."""
     known = {
         row.rung.cause: row for row in rows if not math.isnan(row.kept.share)
@@ -360,14 +359,14 @@ def _sentence(rows: Sequence[LadderRow]) -> str:
     if known:
         worst = min(known.values(), key=lambda row: row.kept.share)
         parts.append(
-            f"keeps {_kept(worst)} whatever the cause"
+            f"keeps {_kept(worst)} even under its worst cause"
             if worst.kept.share >= _MUCH
             else f"loses most by {_cause(worst)} ({worst.rung.strength}), which"
             f" leaves {_kept(worst)}"
         )
     if together is not None:
         parts.append(f"keeps {_kept(together)} under all causes together")
-    return f"{title(rows[0].method)} {', and '.join(parts)}" if parts else ""
+    return f"{title(rows[0].method)} {', and '.join(parts)}." if parts else ""
 
 
 def _mildest(rows: Sequence[LadderRow]) -> str:
@@ -377,35 +376,37 @@ def _mildest(rows: Sequence[LadderRow]) -> str:
         is_single = row.rung.cause not in (_NONE, _ALL)
         if is_single and not math.isnan(row.kept.share):
             shares.setdefault(_cause(row), []).append(row.kept.share)
-    least = {cause: min(values) for cause, values in shares.items()}
-    mild = [cause for cause, share in least.items() if share >= _MUCH]
-    much = f"{100.0 * _MUCH:.0f} % or more"
     if not shares:
         return ""
+    mild = [name for name, kept in shares.items() if min(kept) >= _MUCH]
     if not mild:
-        return f"No cause leaves {much} to every method."
-    return f"To every method {much} are left by {', '.join(mild)}."
-
-
-def _difference(
-    ungated: Sequence[LadderRow], gated: Sequence[LadderRow]
-) -> str:
-    """Returns the sentence on causes whose cost depends on the gate."""
-    before = {(row.rung.cause, row.method): row for row in ungated}
-    changed = [
-        f"{title(row.method)} under {_cause(row)} keeps"
-        f" {_percent(row.kept.share)} instead of {_percent(other.kept.share)}"
-        for row in gated
-        if (other := before.get((row.rung.cause, row.method))) is not None
-        and abs(row.kept.share - other.kept.share) >= _DIFFERENT
-    ]
-    much = f"{100.0 * _DIFFERENT:.0f} points"
-    if not changed:
-        return f"The gate changes nothing by {much} or more."
+        return (
+            f"Under each cause some method keeps less than {_percent(_MUCH)}."
+        )
     return (
-        f"With the gate, {'; '.join(changed)}; all else changes by less than"
-        f" {much}."
+        f"Every method keeps {_percent(_MUCH)} or more under {', '.join(mild)}."
     )
+
+
+def _differences(
+    ungated: Sequence[LadderRow], gated: Sequence[LadderRow]
+) -> Iterator[str]:
+    """Yields what the gate changes."""
+    before = {(row.rung.cause, row.method): row for row in ungated}
+    much, other = f"{100.0 * _DIFFERENT:.0f} points", "nothing"
+    for row in gated:
+        one = before.get((row.rung.cause, row.method))
+        if (
+            one is not None
+            and abs(row.kept.share - one.kept.share) >= _DIFFERENT
+        ):
+            other = "nothing else"
+            yield (
+                f"With the gate, {title(row.method)} under {_cause(row)} keeps"
+                f" {_percent(row.kept.share)} instead of"
+                f" {_percent(one.kept.share)}."
+            )
+    yield f"The gate changes {other} by {much} or more."
 
 
 def _strongest(rows: Sequence[LadderRow]) -> list[LadderRow]:
@@ -419,7 +420,8 @@ def _strongest(rows: Sequence[LadderRow]) -> list[LadderRow]:
 
 
 def _cause(row: LadderRow) -> str:
-    return row.rung.cause.replace("_", " ")
+    cause = row.rung.cause
+    return "all causes" if cause == _ALL else cause.replace("_", " ")
 
 
 def _kept(row: LadderRow) -> str:

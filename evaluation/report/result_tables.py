@@ -47,22 +47,24 @@ _AUDIT_CAPTION = (
     " they are made of: R@1 = TP / N, F1max = 2 TP / (TP + T)."
 )
 _FAULT_CAPTION = (
-    "Why best places are wrong: of all queries with a wrong best place, how"
-    " many have none in the database (no place); got no candidate; were put"
+    "Why best places are wrong: how many of the queries with a wrong best"
+    " place have none in the database (no place); got no candidate; were put"
     " just too far away, within two radii; have a right place from which less"
     " than half of their scan is seen, since something hides it (hidden) or"
     " for another reason (no overlap); have a right place of whose standing"
     " points a quarter or more has come or gone (changed, and the class of"
     " most of it); were taken to a twin, which fits on them as well as the"
-    " right place does. Elsewhere is the method's own fault. Each counts"
-    " once, under the first of these."
+    " right place does. All others are the method's own fault (elsewhere). A"
+    " query with several of these faults counts only under the one that is"
+    " named first here."
 )
 _POSE_CAPTION = (
     "Poses that come with the places. Errors of the accepted matches: best"
     " places that are right, with a score from that of the greatest F1 on."
     " Success: queries with a match whose pose is wrong by at most 2 m and"
-    " 5 deg, whatever the score. Recall at full precision: the greatest at"
-    " which no accepted place is wrong. Scan Context++ and SOLiD estimate"
+    " 5 deg, whatever the score. Recall at full precision: the part of the"
+    " queries with a match that a method finds before its first wrong place."
+    " Scan Context++ and SOLiD estimate"
     " little more than the turn."
 )
 _COST_CAPTION = (
@@ -323,7 +325,7 @@ _POSE_ERRORS: Columns[RecognitionResult] = {
     "rotation_median_deg": lambda r: r.outcome.pose.rotation_median_deg,
     "rotation_90_deg": lambda r: r.outcome.pose.rotation_90_deg,
     "success": lambda r: r.outcome.pose.success,
-    "recall_at_100_precision": lambda r: (
+    "recall_at_full_precision": lambda r: (
         r.metrics["all"].curve.recall_at_full_precision
     ),
 }

@@ -25,13 +25,14 @@ from evaluation.report.tables import (
 NO_CONTROL = "no control"
 SURVIVAL_CAPTION = (
     "What is left of AUC and R@1 where the city has changed. All queries count"
-    " (mode all), also those without a match. Without change: the same routes"
-    " through one stage, with a control in place of one of the two drives: the"
-    " route of one through the stage of the other. Kept: the share, with its"
-    " 95 % interval (bootstrap over queries, the same ones with and without the"
-    " change). What is kept need not be trusted: recall at full precision, with"
-    " the change, is the part of the queries that are found before the first"
-    " false match."
+    " (mode all), also those without a match. Without change: a control drive"
+    " takes the place of one drive of the pair. It follows the same route, but"
+    " in the stage of the other drive. Kept: the value with the change, divided"
+    " by the value without, and its 95 % interval (bootstrap over queries, the"
+    " same ones with and without the change). Recall at full precision: the"
+    " part of the queries with a match that a method finds before its first"
+    " wrong place. Where it is small, a user cannot rely on single answers,"
+    " even of a method that keeps its AUC."
 )
 # The width of a phone's screen, on which letters stay legible [inches].
 _WIDTH = 3.9
@@ -88,7 +89,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> Table:
             "r1_kept": lambda s: s.recall_at_1.share,
             "r1_kept_low": lambda s: s.recall_at_1.interval.low,
             "r1_kept_high": lambda s: s.recall_at_1.interval.high,
-            "recall_at_full_precision": lambda s: s.full_precision,
+            "recall_at_full_precision": lambda s: s.recall_at_full_precision,
             "control": lambda s: s.control,
             **protocol_columns("protocol"),
         },
@@ -106,7 +107,7 @@ def survival_table(survivals: Sequence[Survival]) -> Table:
             **_shown("AUC", lambda s: s.auc),
             **_shown("R@1", lambda s: s.recall_at_1),
             ("recall at full precision", "with change"): lambda s: (
-                s.full_precision
+                s.recall_at_full_precision
             ),
         },
         SURVIVAL_CAPTION,
@@ -157,9 +158,8 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
     if without:
         which = f"For {without} of {len(pairs)} pairs" if known else "Here"
         parts.append(
-            f"{which} no control was driven (the route of one drive through"
-            " the stage of the other), so what the change alone costs is not"
-            " known."
+            f"{which} no control was driven (both routes in one stage), so the"
+            " cost of the change alone is not known."
         )
     return " ".join(parts)
 

@@ -26,7 +26,8 @@ from evaluation.report.tables import (
 from evaluation.study.trend_databases import TrendPoint
 
 # Width of the kernel that smooths over TCR_sym, as part of its range. The band
-# comes from drawing databases with replacement.
+# comes from drawing databases with replacement. Fewer points than the least are
+# joined by straight lines.
 _BANDWIDTH = 0.15
 _RESAMPLES = 1000
 _LEAST_POINTS = 5
@@ -73,7 +74,9 @@ def _rounded(value: object) -> object:
 
 
 def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
-    """Draws AUC over TCR_sym: points, a smooth line and its 95 % band.
+    """Draws AUC over TCR_sym: points, a line and its 95 % band.
+
+    The line is smooth, or straight from point to point where points are few.
 
     A second panel shows the kept share of AUC, if databases have controls.
 
@@ -125,7 +128,10 @@ def _draw_panel(
             continue
         x, y = np.array(known).T
         axes.plot(x, y, marker, color=colour, markersize=3.5, alpha=0.55, mew=0)
-        if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
+        if np.ptp(x) == 0.0:
+            continue
+        if len(x) < _LEAST_POINTS:
+            axes.plot(x, y, style, color=colour)
             continue
         grid = np.linspace(x[0], x[-1], _GRID)
         low, high = smooth_band(x, y, grid)

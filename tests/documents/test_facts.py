@@ -1,5 +1,6 @@
 """What the documents say of options, files, formats, packages is so."""
 
+import itertools
 import pydoc
 import re
 
@@ -8,7 +9,10 @@ from mcap.reader import make_reader
 import typer
 import yaml
 
+from cns_drake import load_scenario, load_world
 from cns_drake.command_line import cli
+from cns_drake.pictures.city_parts import compare_parts, read_parts
+from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.variation import Family
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from evaluation.command_line import cli as evaluation_cli
@@ -94,6 +98,47 @@ def test_examples_of_options_that_multiply_families():
     assert family.routes.count == 10
     assert len(family.missing) == 20
     assert set(family.lidars) <= LIDAR_PRESETS.keys()
+
+
+def test_only_uses_of_lots_end_from_stage_to_stage():
+    """As the glossary and the page on cities have it."""
+    ended = []
+    for folder in sorted(documents.ROOT.glob("worlds/*/")):
+        stages = [
+            {
+                name.partition("/")[0]
+                for name in re.findall(
+                    '<visual name="([^"]+)"', path.read_text()
+                )
+            }
+            for path in sorted(folder.glob("stage_*.sdf"))
+        ]
+        for earlier, later in itertools.pairwise(stages):
+            assert len(earlier) > 1000
+            ended += earlier - later
+    assert any("market_stall" in name for name in ended)
+    assert [name for name in ended if "_lot_" not in name] == []
+
+
+def test_the_tutorial_names_the_colours_that_its_page_shows():
+    folder = map_folder(load_scenario("riverside_01"))
+    here, last = (read_parts(load_world(folder.stage(n))) for n in ("01", "02"))
+    change = compare_parts(here, last)
+    # The page has an entry for each layer that is not empty.
+    assert change.lower
+    assert change.absent == change.additional == []
+    (said,) = re.findall(
+        r"Press \*What\s+changed\*: ([^.,]+)[.,]",
+        documents.read("docs/tutorial.md").text,
+    )
+    assert " ".join(said.split()) == "what is higher in stage 02 turns orange"
+
+
+def test_the_home_says_what_the_program_is_before_any_link():
+    home = documents.read("docs/index.md").text
+    picture = home.index("![")
+    assert picture < re.search(r"(?<!!)\[", home).start()
+    assert "LiDAR" in home[:picture]
 
 
 def test_topics(short_recording):

@@ -43,9 +43,9 @@ def make_content(folder, **changed):
     for name in ("pr", "change", "survival"):
         (folder / f"{name}.svg").write_text(svg)
     results = [
-        _result("scan-context++", [0, 9, None, 6, 3]),
-        _result("ring++", [1, 2, 4, 0, 3]),
-        _result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True),
+        make_result("scan-context++", [0, 9, None, 6, 3]),
+        make_result("ring++", [1, 2, 4, 0, 3]),
+        make_result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True),
     ]
     nothing = np.full(5, np.nan)
     # Scan Context++ takes a twin for the second query; no other query has a
@@ -57,7 +57,7 @@ def make_content(folder, **changed):
             nothing, nothing, nothing, [""] * 5, np.full(5, 0.5), fits
         )
     }
-    without_change = _result("scan-context++", [0, 1, 4, 6, 3])
+    without_change = make_result("scan-context++", [0, 1, 4, 6, 3])
     values = {
         "reference": Reference(judge=_judge),
         "evidence": evidence,
@@ -106,7 +106,7 @@ def _drive(name, xs, y, yaw):
     return make_drive(name, view, X_WS, range(len(xs)), scans)
 
 
-def _result(method, best, back=False):
+def make_result(method, best, back=False):
     """Scores 0.9 for the best place of each query, 0.2 for its neighbours.
 
     A query whose best place is None has no candidate.

@@ -74,7 +74,8 @@ function setFollowing(on) {
     followed = carPose();
     const fromCar = (x, y) => new MeshCat.THREE.Vector3(x, y, 0)
       .applyAxisAngle(UP, followed.heading).add(followed.position);
-    look(fromCar(-14, 7), fromCar(8, 3));
+    // The car stands above the bar, which covers the lower part of the screen.
+    look(fromCar(-18, 7), fromCar(2, 0));
   } else {
     followed = null;
     look(...overview);

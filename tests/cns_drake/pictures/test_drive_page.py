@@ -26,7 +26,7 @@ from cns_drake.simulation.loaded_drive import load_stage
 
 PERIOD = 0.5
 NUM_FRAMES = 21
-PHONE, DESKTOP = (390, 844), (1440, 900)
+SCREENS = {"desktop": (1440, 900), "laptop": (1200, 750), "phone": (390, 844)}
 VEHICLE = """<sdf version="1.9"><model name="vehicle"><link name="base_link">
 <visual name="body"><geometry><box><size>4 2 1</size></box></geometry></visual>
 </link></model></sdf>"""
@@ -169,9 +169,7 @@ def browser(tmp_path_factory):
         yield browser
 
 
-@pytest.fixture(
-    scope="module", params=[DESKTOP, PHONE], ids=["desktop", "phone"]
-)
+@pytest.fixture(scope="module", params=SCREENS.values(), ids=SCREENS)
 def opened(browser, page, request):
     """The page, standing still."""
     browser.open(page.as_uri(), *request.param)
@@ -297,6 +295,35 @@ class TestInChromium:
         np.testing.assert_allclose(p_WC(reader), before, atol=1e-6)
         go_to(reader, 0.0)
         np.testing.assert_allclose(p_WC(reader), before, atol=1e-6)
+
+    @pytest.mark.parametrize("time", [0.0, 6.0])
+    def test_panels_do_not_cover_the_car_that_is_followed(self, reader, time):
+        go_to(reader, time)
+        click(reader, "follow")
+        go_to(reader, time)
+        covered = reader.evaluate(
+            """(() => {
+              const places = [];
+              viewer.scene_tree.find(["vehicle", "base_link"]).object.traverse(
+                ({geometry, matrixWorld}) => {
+                  const {array = []} = geometry?.attributes.position ?? {};
+                  for (let k = 0; k < array.length; k += 3) {
+                    const {x, y} = new MeshCat.THREE.Vector3()
+                      .fromArray(array, k).applyMatrix4(matrixWorld)
+                      .project(viewer.camera);
+                    places.push([(1 + x) / 2 * innerWidth,
+                      (1 - y) / 2 * innerHeight]);
+                  }
+                });
+              if (!places.length) return "no car";
+              return places.filter((place) => {
+                const there = document.elementFromPoint(...place);
+                return !there || there.closest(".panel");
+              });
+            })()"""
+        )
+        click(reader, "follow")
+        assert covered == []
 
     def test_slider_goes_forth_and_back(self, reader):
         clock = 'document.getElementById("clock").value'

@@ -181,17 +181,27 @@ def test_what_is_wrong_with_each_answer():
 
 def test_the_words_name_the_worst_cause(climbed):
     text = ladder_text(ladder_rows(climbed))
+    heading, *lines = text.splitlines()
+    assert heading.startswith("Town, 60 queries of drive 02. What each cause")
+    assert heading.endswith("(without the gate, 95 % intervals):")
+    # Each finding is a sentence of its own.
+    assert [line[:2] for line in lines] == ["- "] * len(lines)
+    assert [line.count(". ") for line in lines] == [0] * len(lines)
     assert "SOLiD loses most by works (much works), which leaves 28 %" in text
-    assert "and keeps 0 % (0 to 0) under all causes together" in text
-    assert "No cause leaves 95 % or more to every method" in text
+    assert "and keeps 0 % (0 to 0) under all causes together." in lines[0]
     # With the gate 6 of 60 are right instead of none.
-    assert "With the gate, SOLiD under all keeps 10 % instead of 0 %;" in text
+    assert lines[-3:] == [
+        "- Under each cause some method keeps less than 95 %.",
+        "- With the gate, SOLiD under all causes keeps 10 % instead of 0 %.",
+        "- The gate changes nothing else by 10 points or more.",
+    ]
     text = ladder_text(ladder_rows([climbed[0], climbed[-1]]))
     assert "SOLiD keeps 0 % (0 to 0) under all causes together" in text
     mild = [climbed[0], measured("ride", 4, climbed[0].outcomes)]
     text = ladder_text(ladder_rows(mild))
-    assert "SOLiD keeps 100 % (100 to 100) whatever the cause" in text
-    assert "To every method 95 % or more are left by ride" in text
+    assert "SOLiD keeps 100 % (100 to 100) even under its worst cause" in text
+    assert "\n- Every method keeps 95 % or more under ride.\n" in text
+    assert text.endswith("\n- The gate changes nothing by 10 points or more.")
 
 
 def test_without_anything_to_keep(climbed):

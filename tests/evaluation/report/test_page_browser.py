@@ -1,12 +1,15 @@
 import base64
+from dataclasses import replace
 import io
 
 from helpers.browser import chromium, has_chromium
-from helpers.small_page import QUERIES, make_content
+from helpers.small_page import QUERIES, make_content, make_result
 import numpy as np
 from PIL import Image
 import pytest
 
+from evaluation.methods import known_methods
+from evaluation.paper.paper_reference import paper
 from evaluation.report.page import write_page
 
 pytestmark = [
@@ -130,6 +133,23 @@ def test_text_stands_out(browser, address, scheme):
     # WCAG 2.2, 1.4.3, level AA.
     assert len(ratios) > 40
     assert min(ratios) >= 4.5
+
+
+def test_table_ii_fits_its_box(browser, content, tmp_path):
+    path = tmp_path / "report.html"
+    results = [make_result(name, [0, 1, 4, 6, 3]) for name in known_methods()]
+    assert len(results) == 5
+    page = replace(
+        content, recognitions=results, evidence={}, reference=paper()
+    )
+    write_page(path, page)
+    browser.open(path.as_uri(), *DESKTOP)
+    widths = browser.evaluate(
+        """[...document.querySelectorAll("#recognition > .table")].map(
+          (one) => [one.scrollWidth, one.clientWidth])"""
+    )
+    assert len(widths) > 2
+    assert [width for width, box in widths if width > box] == []
 
 
 def test_fingers_hit(browser, address):

@@ -26,7 +26,7 @@ def make(method, database, before, after, interval=(0.25, 0.75)):
         unchanged=SimpleNamespace() if has_control else None,
         control=f"town_{database}_stage_03" if has_control else None,
         auc=kept,
-        full_precision=0.125,
+        recall_at_full_precision=0.125,
         recall_at_1=Kept(before, before, Interval(*interval)),
         protocol=RetrievalProtocol(radius=5.0, scans_per_place=10),
     )

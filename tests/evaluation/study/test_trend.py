@@ -1,6 +1,7 @@
 """AUC over TCR_sym: the numbers of `cns-eval pr` and `tcr`, and their line."""
 
 import csv
+from types import SimpleNamespace
 
 from helpers import studies
 from helpers.small_towns import drive
@@ -14,7 +15,7 @@ from evaluation.drives import open_drive
 from evaluation.methods import known_methods, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study import trend_databases
+from evaluation.study import trend, trend_databases
 from evaluation.study.trend import smooth, smooth_band, write_trend
 from evaluation.study.trend_databases import measure_trend
 
@@ -145,6 +146,31 @@ def test_a_drive_given_twice_is_named(folder, tmp_path):
     path = folder / "metropolis_04"
     with pytest.raises(InputError, match="metropolis_04 is there twice"):
         measure_trend(path, [path], tmp_path, Cluster())
+
+
+@pytest.mark.parametrize("number", [3, 4, 5])
+def test_few_versions_are_joined_by_lines(number, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(trend, "save", lambda figure, _: drawn.append(figure))
+    changes = np.linspace(0.0, 0.3, number)[::-1]
+    trend.draw_trend(
+        [
+            SimpleNamespace(tcr_sym=x, method=method, auc=1.0 - x, kept=1.0 - x)
+            for method in ("solid", "btc")
+            for x in changes
+        ],
+        tmp_path,
+    )
+    (figure,) = drawn
+    for axes in figure.axes:
+        lines = [one for one in axes.lines if one.get_linestyle() != "None"]
+        falling = [
+            one.get_xydata() for one in lines if len(one.get_xdata()) > 2
+        ]
+        assert len(falling) == 2
+        for line in falling:
+            assert (line[0, 0], line[-1, 0]) == (0.0, 0.3)
+            np.testing.assert_allclose(line.sum(axis=1), 1.0)
 
 
 def test_a_line_stays_a_line():
