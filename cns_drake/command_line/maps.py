@@ -274,8 +274,9 @@ def _shortcomings(
         numbers = list(report.stages.values())
         yield (
             f"{report.dated} of {report.dated + report.undated} buildings have"
-            f" a year; each stage has {_differences(numbers)} structures more"
-            " than the one before; --grow draws what changes at random"
+            " a year; from one stage to the next the number of structures"
+            f" changes by {_differences(numbers)}; --grow draws what changes"
+            " at random"
         )
 
 

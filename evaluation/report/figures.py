@@ -291,9 +291,9 @@ def _draw_sets(
     first, last = (stage.name for stage in stages)
     _draw_panels(
         [
-            f"{map_name} H({first}, {last}): TCR {sides[0].ratio:.4f}",
-            f"{map_name} H({last}, {first}): TCR {sides[1].ratio:.4f}",
-            f"{map_name} union: TCR_sym {change.symmetric:.4f}",
+            f"{map_name} {first} beside {last}: TCR {sides[0].ratio:.4f}",
+            f"{map_name} {last} beside {first}: TCR {sides[1].ratio:.4f}",
+            f"{map_name}, both together: TCR_sym {change.symmetric:.4f}",
         ],
         [
             _render_shaded(cloud, rgb, _SMALL_OBLIQUE)

@@ -63,8 +63,8 @@ _POSE_CAPTION = (
     " places that are right, with a score from that of the greatest F1 on."
     " Success: queries with a match whose pose is wrong by at most 2 m and"
     " 5 deg, whatever the score. Recall at full precision: the part of the"
-    " queries with a match that a method finds before its first wrong place."
-    " Scan Context++ and SOLiD estimate"
+    " queries with a match that a method finds, best scores first, before its"
+    " first wrong place. Scan Context++ and SOLiD estimate"
     " little more than the turn."
 )
 _COST_CAPTION = (

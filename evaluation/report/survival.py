@@ -30,9 +30,9 @@ SURVIVAL_CAPTION = (
     " in the stage of the other drive. Kept: the value with the change, divided"
     " by the value without, and its 95 % interval (bootstrap over queries, the"
     " same ones with and without the change). Recall at full precision: the"
-    " part of the queries with a match that a method finds before its first"
-    " wrong place. Where it is small, a user cannot rely on single answers,"
-    " even of a method that keeps its AUC."
+    " part of the queries with a match that a method finds, best scores first,"
+    " before its first wrong place. Where it is small, a user cannot rely on"
+    " single answers, even of a method that keeps its AUC."
 )
 # The width of a phone's screen, on which letters stay legible [inches].
 _WIDTH = 3.9

@@ -141,8 +141,8 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
         shown.append(
             Illustration(
                 folder / sets,
-                f"How TCR_sym counts {city.name} {first} and {last}: first"
-                " against last, last against first, both together",
+                f"What TCR_sym counts in {city.name}: {first} beside {last},"
+                f" {last} beside {first}, both together",
                 _PAGE_KIND,
                 section="change",
                 num_panels=3,

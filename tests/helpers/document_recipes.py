@@ -628,6 +628,8 @@ NOT_RUN = {
     ".venv/bin/pip install -e '.[docs]'": "installs from the network",
     ".venv/bin/pip install pre-commit": "installs from the network and changes"
     " the repository's hooks",
+    ".venv/bin/pip install nbconvert": "installs from the network and changes"
+    " the notebooks",
     ".venv/bin/python -m pytest tests/": "tests in a test; `.ci/run` runs all"
     " of them",
     '.venv/bin/python -m pytest -m "not slow"': "the quick tests in one of "

@@ -146,7 +146,7 @@ def test_poses(report):
         curve = [(count(rows, score(r)), score(r)) for r in rows if r["score"]]
         values = [2 * tp / (2 * tp + fp + fn) for (tp, fp, fn), _ in curve]
         pure = [tp / max(tp + fn, 1) for (tp, fp, fn), _ in curve if fp == 0]
-        recall = float(row["recall_at_100_precision"])
+        recall = float(row["recall_at_full_precision"])
         assert recall == pytest.approx(max(pure, default=0.0))
         # The greatest score counts among equal values.
         best = max(values, default=0.0)
