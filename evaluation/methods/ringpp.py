@@ -89,10 +89,10 @@ class Ring:
     spectrum: np.ndarray
 
     def bev(self, num_cells: int) -> np.ndarray:
-        """Returns the map from above, (n, n, 6) float32."""
-        image = np.zeros((num_cells * num_cells, _NUM_FEATURES), np.float32)
-        image[self.filled] = self.features
-        return image.reshape(num_cells, num_cells, _NUM_FEATURES)
+        """Returns the map from above, (6, n, n) float32."""
+        image = np.zeros((_NUM_FEATURES, num_cells * num_cells), np.float32)
+        image[:, self.filled] = self.features.T
+        return image.reshape(_NUM_FEATURES, num_cells, num_cells)
 
 
 @dataclass(frozen=True)
@@ -212,14 +212,14 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         num_cells = self.config.cells
         correlation = self._correlate(weighted, database.places[place].spectrum)
         shift = -_signed(int(correlation.argmax()), num_cells)
-        reference = _spectrum(database.places[place].bev(num_cells))
+        reference = _spectrum(database.places[place].bev(num_cells)).conj()
         # Rows lie 360 / (n - 1) deg apart, but since the last one repeats the
         # first, a shift stands on average for 360 / n. Spectra of opposite
         # rays are equal, which leaves two headings.
         yaw = 2.0 * math.pi * shift / num_cells
         headings = (yaw, yaw - math.pi)
         fits = [
-            _best_offset(turned(heading), reference, num_cells)
+            _best_offset(turned(heading) * reference, num_cells)
             for heading in headings
         ]
         best = 1 if fits[1][0] > fits[0][0] else 0
@@ -302,7 +302,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         correlations = scipy.fft.irfft(
             weighted * spectrum.conj(), n=self.config.cells, axis=1
         )
-        return np.abs(correlations).sum(axis=0)
+        return np.abs(correlations, out=correlations).sum(axis=0)
 
 
 def _without_duplicates(points: np.ndarray) -> np.ndarray:
@@ -335,45 +335,41 @@ def _normalise(magnitudes: np.ndarray, n: int) -> np.ndarray:
 
 
 def _rotate(image: np.ndarray, angle: float) -> np.ndarray:
-    """Returns an image (n, n, C), rotated from its rows' axis to its columns'.
+    """Returns an image (C, n, n), rotated from its rows' axis to its columns'.
 
     Each pixel takes the value of the nearest one, or 0 from outside.
     """
-    n = len(image)
+    n = image.shape[1]
     centred = np.arange(n) - 0.5 * (n - 1)
-    x, y = np.meshgrid(centred, centred, indexing="ij")
+    x, y = centred[:, None], centred
     c, s = math.cos(angle), math.sin(angle)
     row = np.rint(c * x + s * y + 0.5 * (n - 1)).astype(np.int64)
     column = np.rint(-s * x + c * y + 0.5 * (n - 1)).astype(np.int64)
     inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)
-    rotated = np.zeros_like(image)
-    rotated[inside] = image[row[inside], column[inside]]
-    return rotated
+    pixels = np.where(inside, row * n + column, 0)
+    return image.reshape(-1, n * n).take(pixels, axis=1) * inside
 
 
 def _spectrum(image: np.ndarray) -> np.ndarray:
-    """Returns the spectrum of an image (n, n, C), normalised."""
-    normal = (image - image.mean()) / image.std()
-    return scipy.fft.rfft2(normal, axes=(0, 1))
+    """Returns the spectrum (C, n, F) of an image (C, n, n), normalised."""
+    centred = image - image.mean()
+    return scipy.fft.rfft2(centred / np.linalg.norm(centred))
 
 
-def _best_offset(
-    image: np.ndarray, reference: np.ndarray, n: int
-) -> tuple[float, tuple[int, int]]:
+def _best_offset(product: np.ndarray, n: int) -> tuple[float, tuple[int, int]]:
     """Returns how far an image is shifted against a reference.
 
     Args:
-        image: spectrum (n, n // 2 + 1, C).
-        reference: likewise.
+        product: (C, n, F) spectrum of the image, times the conjugate of that of
+            the reference.
         n: length of their sides.
 
     Returns:
         The correlation, summed over the magnitudes of its channels, and the
         shift (rows, columns) at which it is greatest.
     """
-    correlation = np.abs(
-        scipy.fft.irfft2(image * reference.conj(), s=(n, n), axes=(0, 1))
-    ).sum(axis=2)
+    correlations = scipy.fft.irfft2(product, s=(n, n))
+    correlation = np.abs(correlations, out=correlations).sum(axis=0)
     row, column = np.unravel_index(correlation.argmax(), correlation.shape)
     return (
         float(correlation[row, column]),

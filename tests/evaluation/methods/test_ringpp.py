@@ -56,7 +56,8 @@ def post(x, y, *heights):
 
 
 def bev(scan, **parameters):
-    return ring(**parameters).describe(np.asarray(scan)).bev(120)
+    image = ring(**parameters).describe(np.asarray(scan)).bev(120)
+    return np.moveaxis(image, 0, 2)
 
 
 class TestBev:
@@ -142,7 +143,7 @@ class TestScore:
         scans = [make_scene(seed) for seed in (3, 4)]
         normalised = []
         for scan in scans:
-            image = method.describe(scan).bev(n).astype(np.float64)
+            image = np.moveaxis(method.describe(scan).bev(n), 0, 2)
             sinogram = radon(image, np.linspace(0.0, 2.0 * math.pi, n))
             magnitudes = np.abs(np.fft.fft(sinogram, axis=1, norm="ortho"))
             mean = magnitudes.mean(axis=(0, 1))
