@@ -37,8 +37,9 @@ _RING = 2.0
 _GROUND_STEP = 0.15
 _GROUND_SLOPE = 0.2
 
-# Bits of a word.
-_WORD = 64
+# Words of the fine maps of a place overlap: half of one's bits, so many, are
+# also those of the next.
+_HALF = 32
 # The unit of sines and cosines is 2 to minus this power.
 _UNIT_BITS = 14
 # Every second bit, pair of bits and nibble, and the first bit of every byte.
@@ -313,17 +314,19 @@ def climb(
         (3 + layers,) int64: the pose, and the query's cells that meet some
         of the place, in each layer.
     """
-    # The place's layers with the neighbours of all filled cells; a row and a
-    # word without bits on either side, and one word more.
-    num_words = GRID // _WORD + 3
+    # The place's layers with the neighbours of all filled cells; a row and half
+    # a word without bits on either side.
+    num_words = GRID // _HALF + 2
     wide = np.zeros((NUM_LAYERS, (GRID + 2) * num_words), np.uint64)
     place = np.zeros_like(wide)
     for layer in range(NUM_LAYERS):
         for i in range(place_starts[layer], place_starts[layer + 1]):
             row, column = int(place_cells[i]) >> 8, int(place_cells[i]) & 255
             for near in range(max(column - 1, 0), min(column + 2, GRID)):
-                word = (row + 1) * num_words + near // _WORD + 1
-                wide[layer, word] |= np.uint64(1) << np.uint64(near % _WORD)
+                word = (row + 1) * num_words + near // _HALF
+                bit = np.uint64(1) << np.uint64(near % _HALF)
+                wide[layer, word] |= bit << np.uint64(_HALF)
+                wide[layer, word + 1] |= bit
         for i in range(num_words, (GRID + 1) * num_words):
             place[layer, i] = (
                 wide[layer, i - num_words]
@@ -415,19 +418,14 @@ def _count_common(
             row = (c * u - s * v + right) >> (_UNIT_BITS + 1)
             column = (s * u + c * v + up) >> (_UNIT_BITS + 1)
             # Beside the map are no bits.
-            bit = _WORD - step + min(max(column, -1 - step), GRID + step)
-            first, shift = num_words + (bit >> 6), np.uint64(bit & 63)
-            # No word is shifted by all its bits at once, which is undefined.
-            back = np.uint64(63) - shift
+            bit = _HALF - step + min(max(column, -1 - step), GRID + step)
+            first, shift = num_words + bit // _HALF, np.uint64(bit % _HALF)
             at = np.uint64(first + min(max(row - step, -1), GRID) * num_words)
-            bits = words[at] >> shift | words[at + one] << one << back
-            before += (bits & wanted) * spread & counted
+            before += (words[at] >> shift & wanted) * spread & counted
             at = np.uint64(first + min(max(row, -1), GRID) * num_words)
-            bits = words[at] >> shift | words[at + one] << one << back
-            here += (bits & wanted) * spread & counted
+            here += (words[at] >> shift & wanted) * spread & counted
             at = np.uint64(first + min(max(row + step, -1), GRID) * num_words)
-            bits = words[at] >> shift | words[at + one] << one << back
-            after += (bits & wanted) * spread & counted
+            after += (words[at] >> shift & wanted) * spread & counted
         for dr, counts in enumerate((before, here, after)):
             for dc in range(3):
                 common[dr, dc, layer] = np.int64(
