@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def run_drive(
     name_or_file: str,
-    output: Path,
+    output: Path | str,
     *,
     frames: int | None = None,
     lidar: str | None = None,
@@ -39,8 +39,8 @@ def run_drive(
     transient: Mapping[str, float | str] | None = None,
     ride: str | None = None,
     imu_rate: int | None = None,
-    recording: Path | None = None,
-    graphviz: Path | None = None,
+    recording: Path | str | None = None,
+    graphviz: Path | str | None = None,
     overwrite: bool = False,
 ) -> Run:
     """Runs a drive on all cores with progress on stderr; see `simulate`.
@@ -65,11 +65,9 @@ def run_drive(
         InputError: an argument cannot be used.
 
     Example:
-        from pathlib import Path
-
         from cns_drake import run_drive
 
-        run_drive("downtown_01", Path("recordings"), frames=20)
+        run_drive("downtown_01", "recordings", frames=20)
     """
     with uninterrupted():  # Slow to import, not needed for `--help`.
         from cns_drake.base.process import num_cores

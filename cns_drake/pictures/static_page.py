@@ -95,7 +95,7 @@ def make_static_page(
 
 
 def save_meshcat_page(
-    meshcat: Meshcat, path: Path, title: str = "Meshcat"
+    meshcat: Meshcat, path: Path | str, title: str = "Meshcat"
 ) -> None:
     """Saves a Meshcat scene as one page that opens without a server.
 
@@ -110,9 +110,10 @@ def save_meshcat_page(
     Example:
         from cns_drake import save_meshcat_page
 
-        save_meshcat_page(meshcat, Path("scene.html"))
+        save_meshcat_page(meshcat, "scene.html")
     """
     page = make_static_page(meshcat, title)
+    path = Path(path)
     with user_errors(path):
         write_part(path, page)
     complete_part(path)

@@ -88,10 +88,10 @@ class Run:
 
 def simulate(
     scenario: Scenario,
-    output: Path,
+    output: Path | str,
     *,
-    page_file: Path | None = None,
-    graphviz_file: Path | None = None,
+    page_file: Path | str | None = None,
+    graphviz_file: Path | str | None = None,
     overwrite: bool = False,
     num_threads: int = 1,
     reader: Callable[[Drive], None] | None = None,
@@ -125,14 +125,15 @@ def simulate(
         InputError: the scenario cannot be run, or its output cannot be written.
 
     Example:
-        from pathlib import Path
-
         from cns_drake import load_scenario, simulate
 
-        run = simulate(load_scenario("downtown_01"), Path("recordings"))
+        run = simulate(load_scenario("downtown_01"), "recordings")
     """
     start = time.perf_counter()
-    folder = output / scenario.name
+    folder = Path(output) / scenario.name
+    page_file = None if page_file is None else Path(page_file)
+    if graphviz_file is not None:
+        graphviz_file = Path(graphviz_file)
     # Interrupts are raised only where `strike` is called.
     with interrupts_wait() as strike:
         # Quick checks come before all slow work.

@@ -73,6 +73,19 @@ def test_only_what_changed_is_measured_again(folder):
     assert measured(folder)[1] == ["boxes_01", "boxes_04"]
 
 
+def test_a_drive_is_measured_again_when_its_base_changes(folder):
+    path = folder / "sequence_04.yaml"
+    base = path.rename(folder / "base.yaml")
+    path.write_text("base: base.yaml")
+    write_table(folder)
+    before, again = measured(folder)
+    assert again == []
+    base.write_text(base.read_text() + "\nframes: 7\n")
+    after, again = measured(folder)
+    assert again == ["boxes_04"]
+    assert (before[1].frames > 7, after[1].frames) == (True, 7)
+
+
 @pytest.mark.parametrize("text", ["", "drive\nboxes_01\n", "\0,\x80"])
 def test_a_spoilt_table_is_measured_anew(folder, text):
     write_table(folder)

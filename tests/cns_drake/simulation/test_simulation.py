@@ -123,7 +123,7 @@ def test_a_world_that_changes_under_its_reader_is_refused(
 
 
 def test_graphviz_shows_the_station(scenario, tmp_path):
-    simulate(scenario, tmp_path, graphviz_file=tmp_path / "station.dot")
+    simulate(scenario, str(tmp_path), graphviz_file=f"{tmp_path}/station.dot")
     text = (tmp_path / "station.dot").read_text()
     for name in ("vehicle_motion", "lidar", "mcap_recorder"):
         assert name in text
