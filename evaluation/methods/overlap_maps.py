@@ -136,6 +136,7 @@ def _ground_below(
     return ground[ring, sector]
 
 
+@compiled
 def _extremes(
     values: np.ndarray, cells: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -150,8 +151,9 @@ def _extremes(
         (size,) each; infinite, and minus infinite, for a cell without values.
     """
     least, greatest = np.full(size, np.inf), np.full(size, -np.inf)
-    np.minimum.at(least, cells, values)
-    np.maximum.at(greatest, cells, values)
+    for i in range(len(values)):
+        least[cells[i]] = min(least[cells[i]], values[i])
+        greatest[cells[i]] = max(greatest[cells[i]], values[i])
     return least, greatest
 
 
