@@ -106,7 +106,10 @@ def make_station(
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
     motion = builder.AddNamedSystem(
-        "vehicle_motion", VehicleMotion(plant, world.vehicle, trajectory)
+        "vehicle_motion",
+        VehicleMotion(
+            plant, world.vehicle, trajectory, period=scenario.frame_period
+        ),
     )
     to_pose = builder.AddNamedSystem(
         "geometry_pose", MultibodyPositionToGeometryPose(plant)

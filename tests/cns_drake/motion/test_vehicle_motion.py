@@ -134,6 +134,25 @@ def test_no_wheel_slips():
             np.testing.assert_allclose(slip, np.zeros(3), atol=1e-9)
 
 
+def test_states_at_ticks_are_those_at_each_time(hilly):
+    plant, trajectory, alone = hilly
+    vehicle = plant.GetModelInstanceByName("vehicle")
+    period = 0.05
+    motion = VehicleMotion(plant, vehicle, trajectory, period=period)
+    ticks = [0, 1, 63, 64, 200, 63, 1]
+    times = [tick * period for tick in ticks]
+    for time in [*times, np.nextafter(3.2, 0.0), np.nextafter(3.2, 4.0), 0.123]:
+        for name in ("position", "body_spatial_velocities"):
+            at_tick, expected = (
+                evaluate(one, name, time) for one in (motion, alone)
+            )
+            if name != "position":
+                at_tick, expected = (
+                    [V.get_coeffs() for V in Vs] for Vs in (at_tick, expected)
+                )
+            np.testing.assert_array_equal(at_tick, expected)
+
+
 def test_rear_wheels_roll_by_their_own_distance():
     plant, vehicle = make_plant()
     points = helix_points(30.0, 0.0, 100)
