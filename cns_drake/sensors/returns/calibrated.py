@@ -177,17 +177,18 @@ class CalibratedReturns:
         )
         rest, side_met = meet_sides(sides, side_met, met)
         light, ways, ways_met = start_ways(
-            turn.beam, p_WSset, times, rest, met, sides, side_met, materials
+            key,
+            turn.beam,
+            p_WSset,
+            times,
+            rest,
+            met,
+            sides,
+            side_met,
+            materials,
         )
         followed = follow(
-            key,
-            ways,
-            ways_met,
-            materials,
-            receiver.budget,
-            divergence,
-            reach,
-            cast,
+            ways, ways_met, materials, receiver.budget, divergence, reach, cast
         )
         return report_echoes(
             join([light, *followed]),

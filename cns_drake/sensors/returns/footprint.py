@@ -208,17 +208,18 @@ def _find_edges(
         farthest: greatest angle between neighbours [rad].
     """
     edges, count = np.empty((len(order), 2), np.int64), 0
+    # As names of their own, fields are fast.
+    d_Wset, geometry = hits.d_Wset, hits.geometry
     for k in range(len(order) - 1):
         i, j = order[k], order[k + 1]
-        square = 0.0
-        for axis in range(3):
-            # Chord and angle are the same at this size.
-            square += (hits.d_Wset[i, axis] - hits.d_Wset[j, axis]) ** 2
-        if (
-            0.0 < square <= farthest**2
-            and (hits.geometry[i] >= 0 or hits.geometry[j] >= 0)
-            and not _touch(hits, i, hits, j)
-        ):
+        if geometry[i] < 0 and geometry[j] < 0:
+            continue
+        # Chord and angle are the same at this size.
+        x = d_Wset[i, 0] - d_Wset[j, 0]
+        y = d_Wset[i, 1] - d_Wset[j, 1]
+        z = d_Wset[i, 2] - d_Wset[j, 2]
+        square = x * x + y * y + z * z
+        if 0.0 < square <= farthest**2 and not _touch(hits, i, hits, j):
             edges[count, 0], edges[count, 1] = i, j
             count += 1
     return edges[:count]

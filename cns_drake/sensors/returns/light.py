@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.ray_casting_scene import RayHits
 from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
 
@@ -87,6 +88,7 @@ class Light(NamedTuple):
     geometry: np.ndarray
 
 
+@compiled
 def reflect(
     beam: np.ndarray,
     share: np.ndarray,
@@ -105,8 +107,20 @@ def reflect(
         cosine: (N,) cosine of the angle of incidence.
         materials: materials of all geometries.
     """
-    kind = materials.kind[geometry]
-    factor = np.where(kind == BEADS, 1.0, cosine)
-    factor = np.where(kind == RETRO, cosine > _RETRO_COSINE, factor)
-    energy = share * materials.reflectivity[geometry] * factor
+    energy = np.empty(len(beam))
+    for k in range(len(beam)):
+        energy[k] = reflected(share[k], geometry[k], cosine[k], materials)
     return Light(beam, distance, energy, geometry)
+
+
+@compiled
+def reflected(
+    share: float, geometry: int, cosine: float, materials: Materials
+) -> float:
+    """Returns the energy that one surface reflects; see `reflect`."""
+    energy = share * materials.reflectivity[geometry]
+    if materials.kind[geometry] == BEADS:
+        return energy
+    if materials.kind[geometry] == RETRO:
+        return energy if cosine > _RETRO_COSINE else 0.0
+    return energy * cosine

@@ -7,7 +7,8 @@ beams nor the order of work change it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+
+from cns_drake.base.compiled import compiled
 
 # Room for the draws of one beam.
 DRAWS_PER_BEAM = 256
@@ -25,7 +26,10 @@ def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
     return seeds.generate_state(1, np.uint64)[0]
 
 
-def uniform(key: np.uint64, beam: ArrayLike, draw: ArrayLike) -> np.ndarray:
+@compiled
+def uniform(
+    key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
+) -> np.ndarray:
     """Returns numbers that are uniform over [0, 1).
 
     They are the n-th ones of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
@@ -35,16 +39,18 @@ def uniform(key: np.uint64, beam: ArrayLike, draw: ArrayLike) -> np.ndarray:
         beam: numbers of beams, 0 or more.
         draw: numbers of draws, 0 <= draw < `DRAWS_PER_BEAM`.
     """
-    number = np.add(np.multiply(beam, DRAWS_PER_BEAM), np.add(draw, 1))
-    with np.errstate(over="ignore"):
-        z = key + np.asarray(number, np.uint64) * _GOLDEN
-        z = (z ^ (z >> np.uint64(30))) * _MIX_1
-        z = (z ^ (z >> np.uint64(27))) * _MIX_2
+    number = (beam * DRAWS_PER_BEAM + (draw + 1)).astype(np.uint64)
+    z = key + number * _GOLDEN
+    z = (z ^ (z >> np.uint64(30))) * _MIX_1
+    z = (z ^ (z >> np.uint64(27))) * _MIX_2
     z = z ^ (z >> np.uint64(31))
-    return (z >> np.uint64(11)).astype(float) * _UNIT
+    return (z >> np.uint64(11)).astype(np.float64) * _UNIT
 
 
-def normal(key: np.uint64, beam: ArrayLike, draw: ArrayLike) -> np.ndarray:
+@compiled
+def normal(
+    key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
+) -> np.ndarray:
     """Returns standard normal numbers: the quantiles of uniform ones.
 
     By algorithm AS 241 (Wichura, Applied Statistics 37, 1988), whose short
@@ -53,24 +59,28 @@ def normal(key: np.uint64, beam: ArrayLike, draw: ArrayLike) -> np.ndarray:
     Args:
         key, beam, draw: see `uniform`.
     """
-    u = uniform(key, beam, draw)
-    q = u - 0.5
-    r = 0.180625 - q * q
-    above = ((59.109374720 * r + 159.29113202) * r + 50.434271938) * r
-    below = ((67.187563600 * r + 78.757757664) * r + 17.895169469) * r
-    result = q * (above + 3.3871327179) / (below + 1.0)
-    is_tail = np.abs(q) > 0.425
-    # Never 0: a value below the smallest step counts as half a step.
-    rest = np.maximum(np.minimum(u, 1.0 - u)[is_tail], 0.5 * _UNIT)
-    root = np.sqrt(-np.log(rest))
-    r = root - 1.6
-    above = ((0.17023821103 * r + 1.3067284816) * r + 2.7568153900) * r
-    below = (0.12021132975 * r + 0.73700164250) * r
-    near = (above + 1.4234372777) / (below + 1.0)
-    r = root - 5.0
-    above = ((0.017337203997 * r + 0.42868294337) * r + 3.0812263860) * r
-    below = (0.012258202635 * r + 0.24197894225) * r
-    far = (above + 6.6579051150) / (below + 1.0)
-    size = np.where(root <= 5.0, near, far)
-    result[is_tail] = np.copysign(size, q[is_tail])
+    result = uniform(key, beam, draw)
+    for k, u in enumerate(result):
+        q = u - 0.5
+        if abs(q) <= 0.425:
+            r = 0.180625 - q * q
+            above = ((59.109374720 * r + 159.29113202) * r + 50.434271938) * r
+            below = ((67.187563600 * r + 78.757757664) * r + 17.895169469) * r
+            result[k] = q * (above + 3.3871327179) / (below + 1.0)
+            continue
+        # Never 0: a value below the smallest step counts as half a step.
+        r = np.sqrt(-np.log(max(min(u, 1.0 - u), 0.5 * _UNIT)))
+        if r <= 5.0:
+            r -= 1.6
+            above = ((0.17023821103 * r + 1.3067284816) * r + 2.7568153900) * r
+            below = (0.12021132975 * r + 0.73700164250) * r
+            size = (above + 1.4234372777) / (below + 1.0)
+        else:
+            r -= 5.0
+            above = (
+                (0.017337203997 * r + 0.42868294337) * r + 3.0812263860
+            ) * r
+            below = (0.012258202635 * r + 0.24197894225) * r
+            size = (above + 6.6579051150) / (below + 1.0)
+        result[k] = np.copysign(size, q)
     return result
