@@ -107,6 +107,7 @@ def find_sides(
     return Sides(row, neighbour, number, share, d_Wset, reach)
 
 
+@compiled
 def _share(
     num_beams: int, row: np.ndarray, number: np.ndarray, toward: np.ndarray
 ) -> np.ndarray:
@@ -120,18 +121,21 @@ def _share(
         row, number: see `Sides`.
         toward: (P, 3) directions to the neighbours.
     """
-    sides = np.arange(len(row))
     side_of = np.full((num_beams, 4), -1)
-    side_of[row, number] = sides
+    for side in range(len(row)):
+        side_of[row[side], number[side]] = side
     share = np.full(len(row), 0.5)
-    is_twin = np.zeros(len(row), bool)
-    for others in side_of[row].T:
-        side = np.flatnonzero((others >= 0) & (others != sides))
-        other = others[side]
-        along = dot(toward[side], toward[other])
-        share[side[np.abs(along) < 0.5]] = 0.25
-        is_twin[side[(along >= 0.5) & (other < side)]] = True
-    share[is_twin] = 0.0
+    for side in range(len(row)):
+        for other in side_of[row[side]]:
+            if other < 0 or other == side:
+                continue
+            along = 0.0
+            for axis in range(3):
+                along += toward[side, axis] * toward[other, axis]
+            if abs(along) < 0.5:
+                share[side] = min(share[side], 0.25)
+            elif along > 0.0 and other < side:
+                share[side] = 0.0
     return share
 
 
