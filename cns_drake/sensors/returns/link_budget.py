@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import erf
 
+from cns_drake.base.compiled import compiled
+
 # The SNR that a unit detects in half of all cases: Ouster's sheet of the OS1
 # (first generation) states 10 cm of range noise at an SNR of 12, its lowest.
 THRESHOLD_SNR = 9.0
@@ -89,6 +91,7 @@ def fit_link_budget(
     return LinkBudget(scale, extinction, range_noise, range_floor)
 
 
+@compiled
 def target_snr(
     budget: LinkBudget,
     extinction: float,
@@ -128,6 +131,7 @@ def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
     return np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
 
 
+@compiled
 def echo_energy(
     budget: LinkBudget, snr: np.ndarray, distance: np.ndarray
 ) -> np.ndarray:
