@@ -188,13 +188,16 @@ class EmbreeHierarchy:
         """
         lib = self._lib
         places = np.ascontiguousarray(placed.X_OLs, np.float32)
+        # Lists and one address: NumPy takes long for single values.
+        address, size = places.ctypes.data, places.strides[0]
+        in_sight, moves = placed.in_sight.tolist(), placed.moves.tolist()
         has_changed = False
         for k, row in enumerate(placed.rows.tolist()):
             handle = self._instances.get(row)
             if handle is None:
                 continue
             has_changed = True
-            if not placed.in_sight[k]:
+            if not in_sight[k]:
                 if row not in self._disabled:
                     lib.rtcDisableGeometry(handle)
                     self._disabled.add(row)
@@ -202,7 +205,7 @@ class EmbreeHierarchy:
             if row in self._disabled:
                 lib.rtcEnableGeometry(handle)
                 self._disabled.remove(row)
-            if placed.moves[k]:
+            if moves[k]:
                 self._in_motion.add(row)
                 steps = _decompose_motion(self._groups[row])
                 lib.rtcSetGeometryTimeStepCount(handle, len(steps))
@@ -215,10 +218,7 @@ class EmbreeHierarchy:
                     lib.rtcSetGeometryTimeStepCount(handle, 1)
                     self._in_motion.remove(row)
                 lib.rtcSetGeometryTransform(
-                    handle,
-                    0,
-                    embree.FLOAT3X4_ROW_MAJOR,
-                    places.ctypes.data + k * places.strides[0],
+                    handle, 0, embree.FLOAT3X4_ROW_MAJOR, address + k * size
                 )
             lib.rtcCommitGeometry(handle)
         if has_changed:
