@@ -156,9 +156,9 @@ def _drives(folder: Path) -> list[Scenario]:
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     """Returns the control drives of a map's drives.
 
-    A control drive is the route of an earlier stage through the last one:
-    compared with the last stage's own drive, all of its apparent change is
-    due to the routes and not to the city.
+    A control drive follows the route of an earlier stage in the last one. All
+    change between it and the last stage's own drive is due to the routes, and
+    not to the city.
     """
     last = max(drives, key=lambda drive: drive.stage or "")
     return [

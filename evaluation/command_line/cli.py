@@ -362,8 +362,8 @@ def trend(
     control: Annotated[
         list[Path] | None,
         typer.Option(
-            help="A drive on the route of databases through the stage of the "
-            "query, to plot the kept share of AUC as well; may be "
+            help="A drive on the route of the databases, but in the stage of "
+            "the query. It adds the kept share of AUC to the figure. May be "
             "repeated."
         ),
     ] = None,

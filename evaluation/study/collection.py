@@ -96,7 +96,7 @@ class City:
     def control(
         self, first: RecordingInfo, second: RecordingInfo
     ) -> RecordingInfo | None:
-        """Returns a drive on the route of one in the stage of the other."""
+        """Returns a drive on the route of one, in the stage of the other."""
         for other in self.others:
             for stage, way in ((second, first), (first, second)):
                 if other.stage == stage.stage and other.drives_like(way):

@@ -108,7 +108,7 @@ def measure_trend(
         own_methods: Python files with one method each, to run besides those
             of this package.
         protocol: that of place recognition.
-        controls: drives on the routes of databases through the stage of the
+        controls: drives on the routes of databases, but in the stage of the
             query; each serves the databases whose route it has.
         lidar: name of the LiDAR, for recordings with several.
         settings: `METHOD.NAME=VALUE` of parameters of methods.

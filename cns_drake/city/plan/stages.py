@@ -59,9 +59,9 @@ class Stage(_Model):
 class Stages(_Model):
     """The stages of a city, from `stages.yaml`.
 
-    Every stage has all structures of the stage before it, none of them
-    lower, because each one lists only what the next stage adds and raises;
-    the last stage is the whole city.
+    Each stage lists only what the next one adds and raises; the last stage is
+    the whole city. A stage therefore has all structures of the one before, none
+    of them lower, but for what filled the lots that are built on in between.
 
     Attributes:
         stages: stage, two digits in quotes, rising -> stage.
