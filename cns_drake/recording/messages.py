@@ -29,6 +29,9 @@ MAP_FRAME = "map"
 BASE_FRAME = "base_link"
 IMU_FRAME = "imu"
 _NS_PER_S = 1_000_000_000
+# The variance of a value without noise, in the square of its unit: its error is
+# below a millionth. ROS takes a covariance of zeros for an unknown one.
+_EXACT = 1e-12
 # Stands for numbers that change, in a message that is made once. It can be the
 # nanoseconds of a stamp, and no part of a text.
 _MARK = 0x3A17C0DE
@@ -134,8 +137,8 @@ def make_imu(
             angular velocity [rad^2/s^2].
 
     Returns:
-        The message. The orientation is exact, and its covariance zero. The
-        covariance of a value that is None begins with -1, as in ROS.
+        The message. A value without noise has a standard deviation of 1e-6.
+        The covariance of a value that is None begins with -1 (REP 145).
     """
     zero = np.zeros(3)
     x, y, z, w = (0.0, 0.0, 0.0, 1.0) if quat_xyzw is None else quat_xyzw
@@ -161,10 +164,16 @@ def make_imu(
 def _covariance(value: object, variance: float) -> np.ndarray:
     """Returns the covariance, row by row, of a value, which may be None."""
     covariance = np.zeros(9)
-    covariance[::4] = variance
     if value is None:
         covariance[0] = -1.0
+    else:
+        covariance[::4] = max(variance, _EXACT)
     return covariance
+
+
+def exact_covariance() -> np.ndarray:
+    """Returns the covariance of an exact pose or twist, row by row: (36,)."""
+    return _EXACT * np.eye(6).ravel()
 
 
 def make_odometry(
@@ -178,7 +187,7 @@ def make_odometry(
         stamp_ns: the time of both [ns].
 
     Returns:
-        The message; its covariances are zero, since the values are exact.
+        The message; the values are exact, with standard deviations of 1e-6.
     """
     pose = make_pose(X_WB)
     twist = message_class("geometry_msgs/msg/Twist")(
@@ -189,10 +198,10 @@ def make_odometry(
         header=make_header(MAP_FRAME, stamp_ns),
         child_frame_id=BASE_FRAME,
         pose=message_class("geometry_msgs/msg/PoseWithCovariance")(
-            pose=pose, covariance=np.zeros(36)
+            pose=pose, covariance=exact_covariance()
         ),
         twist=message_class("geometry_msgs/msg/TwistWithCovariance")(
-            twist=twist, covariance=np.zeros(36)
+            twist=twist, covariance=exact_covariance()
         ),
     )
 

@@ -13,7 +13,11 @@ from cns_drake.base.drives.ros_types import (
     message_class,
     serialize,
 )
-from cns_drake.recording.messages import MAP_FRAME, make_vector
+from cns_drake.recording.messages import (
+    MAP_FRAME,
+    exact_covariance,
+    make_vector,
+)
 
 # Placeholders of numbers in a message: this and the following integers, which
 # are exact in double precision and larger than any measurement.
@@ -258,7 +262,7 @@ def _detection(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
         class_id=semantic_class, score=1.0
     )
     certain = message_class("geometry_msgs/msg/PoseWithCovariance")(
-        pose=pose, covariance=np.zeros(36)
+        pose=pose, covariance=exact_covariance()
     )
     result = message_class("vision_msgs/msg/ObjectHypothesisWithPose")(
         hypothesis=hypothesis, pose=certain

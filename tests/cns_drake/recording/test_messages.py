@@ -9,6 +9,8 @@ from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 
+# The variance of a value without noise.
+EXACT = 1e-12
 STAMP_NS = 1_700_000_000_150_000_001
 
 
@@ -132,7 +134,31 @@ def test_imu_puts_each_vector_in_its_place():
         imu.angular_velocity_covariance,
         imu.linear_acceleration_covariance,
     ):
-        assert (np.asarray(covariance) == 0.0).all()
+        np.testing.assert_array_equal(covariance, EXACT * np.eye(3).ravel())
+
+
+def test_imu_says_what_it_does_not_measure():
+    imu = decode(messages.make_imu(None, None, np.zeros(3), STAMP_NS))
+    for covariance in (
+        imu.orientation_covariance,
+        imu.angular_velocity_covariance,
+    ):
+        np.testing.assert_array_equal(covariance, [-1.0] + 8 * [0.0])
+    measured = imu.linear_acceleration_covariance
+    np.testing.assert_array_equal(measured, EXACT * np.eye(3).ravel())
+
+
+@pytest.mark.parametrize("variance", [0.0, 1e-13, 2e-12, 0.04])
+def test_noise_has_its_variance_and_no_value_none(variance):
+    vector, variances = np.zeros(3), (variance, 3 * variance)
+    imu = decode(messages.make_imu(None, vector, vector, STAMP_NS, variances))
+    for covariance, expected in zip(
+        (imu.linear_acceleration_covariance, imu.angular_velocity_covariance),
+        variances,
+        strict=True,
+    ):
+        expected = max(expected, EXACT) * np.eye(3).ravel()
+        np.testing.assert_array_equal(covariance, expected)
 
 
 def test_odometry_is_exact():
@@ -150,6 +176,10 @@ def test_odometry_is_exact():
     assert (linear.x, linear.y, linear.z) == (7.0, 8.0, 9.0)
     angular = odometry.twist.twist.angular
     assert (angular.x, angular.y, angular.z) == (0.1, 0.2, 0.3)
+    # Zeros would stand for an unknown covariance.
+    for part in (odometry.pose, odometry.twist):
+        covariance = part.covariance.reshape(6, 6)
+        np.testing.assert_array_equal(covariance, EXACT * np.eye(6))
 
 
 def test_tf_lists_every_child_in_order():

@@ -50,7 +50,8 @@ def read_pose(pose):
 def read_detection(one):
     assert one.results[0].hypothesis.score == 1.0
     assert read_pose(one.results[0].pose.pose) == read_pose(one.bbox.center)
-    assert not one.results[0].pose.covariance.any()
+    covariance = one.results[0].pose.covariance.reshape(6, 6)
+    np.testing.assert_array_equal(covariance, 1e-12 * np.eye(6))
     name = one.results[0].hypothesis.class_id
     return one.id, name, one.bbox.center, one.bbox.size, one.header
 

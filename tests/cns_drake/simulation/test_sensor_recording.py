@@ -149,7 +149,7 @@ def test_imu_of_a_frame_on_a_body(ride):
         np.testing.assert_allclose(
             [w.x, w.y, w.z], R_PI.T @ [0, 0, RATE], atol=1e-12
         )
-        assert message.orientation_covariance[0] == 0.0
+        assert message.orientation_covariance[0] == 1e-12
 
 
 def test_points_are_those_of_the_lidars(ride):
@@ -220,7 +220,7 @@ def test_an_imu_without_odometry_has_no_orientation(tmp_path):
     made.simulate(2, bag)
     (first, _) = read(tmp_path / "imu")["/imu/data"]
     assert first.orientation_covariance[0] == -1.0
-    assert first.angular_velocity_covariance[0] == 0.0
+    assert first.angular_velocity_covariance[0] == 1e-12
 
 
 def test_images_of_drakes_camera(tmp_path):
