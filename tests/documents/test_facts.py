@@ -45,7 +45,7 @@ def commands():
 
 
 def test_options_exist():
-    known = {"--help", "--version"}.union(*commands().values())
+    known = {"--help", "--version", "--traceback"}.union(*commands().values())
     named = {code.split()[0] for code in CODES if code.startswith("--")}
     assert len(named) > 8
     assert named - known - FOREIGN_OPTIONS == set()

@@ -109,7 +109,7 @@ def test_there_is_no_stage_03(tmp_path):
         ("all of it", "all\n    absent: {x: [car_001]}", "the last stage"),
         ('"01"', '"05"', "rising order"),
         ('"01"', '"one"', "stages.one"),
-        ("story: a tower", "tale: a tower", "stages.02.story"),
+        ("story: a tower", "tale: a tower", "stages.02.tale"),
         ("stages:", "lot: {}\nstages:", "lot: Extra inputs"),
         ("stages:", "lots: {pool: []}\nstages:", "lots.pool"),
         ("stages:", "stages: [", "not readable as YAML"),
