@@ -9,7 +9,7 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from evaluation.alignment.registration import Surface, make_surface
-from evaluation.drives.sampling import sample_frames
+from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.maps.voxel_maps import VoxelAccumulator
 
 # Between keyframes, along the path [m]; on very long drives more, on very
@@ -48,8 +48,7 @@ class Submaps:
         self.drive = drive
         self.X_WS = drive.X_WS
         p_WS = self.X_WS[:, :3, 3]
-        steps = np.linalg.norm(np.diff(p_WS, axis=0), axis=1)
-        self.travelled = np.concatenate([[0.0], np.cumsum(steps)])
+        self.travelled = travelled(p_WS)
         length = self.travelled[-1]
         spacing = max(
             min(_SPACING, length / _FEWEST_KEYFRAMES), length / _MOST_KEYFRAMES

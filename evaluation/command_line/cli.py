@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -429,6 +429,57 @@ def ranking(
     terminal.print_rows(
         [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
     )
+
+
+@app.command(
+    epilog=example(
+        "cns-eval trajectory drives/metropolis_04 \\",
+        "    results/latest/metropolis_04_poses_tum.txt",
+    )
+)
+def trajectory(
+    drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
+    estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE.tum")],
+    frame: Annotated[
+        Literal["lidar", "base_link"],
+        typer.Option(
+            help="Frame whose poses are estimated: the LiDAR's or the "
+            "vehicle's."
+        ),
+    ] = "lidar",
+    time_offset: Annotated[
+        float,
+        typer.Option(
+            metavar="S", help="Time to add to that of the estimate [s]."
+        ),
+    ] = 0.0,
+    lidar: LidarName = None,
+    json: Json = False,
+) -> None:
+    """Errors of an estimated trajectory, as evo and KITTI define them.
+
+    The estimate is a TUM file: seconds, x y z, and a quaternion x y z w. Prints
+    ATE, the root mean square of its distances from DRIVE after rigid alignment,
+    and drift, the error of its motion over 100 m of path.
+    """
+    from evaluation.alignment.trajectory_errors import trajectory_errors
+    from evaluation.drives import open_drive
+    from evaluation.drives.text_tables import read_tum
+
+    truth = open_drive(drive, lidar)
+    for note in truth.notes:
+        terminal.note(note)
+    errors = trajectory_errors(truth, read_tum(estimate), frame, time_offset)
+    if errors.num_outside:
+        terminal.note(
+            f"{estimate}: {errors.num_outside} poses before or after the drive,"
+            " left out"
+        )
+    if json:
+        named = {"drive": truth.name, "frame": frame}
+        terminal.print_json(named | errors.to_json())
+    else:
+        terminal.print_rows(errors.to_rows())
 
 
 def main() -> None:

@@ -16,6 +16,12 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 
 
+def travelled(positions: np.ndarray) -> np.ndarray:
+    """Returns the length (N,) of the path up to each position (N, 3) [m]."""
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
 def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
     """Returns frames at equal distances along a trajectory.
 
@@ -26,9 +32,7 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
     Returns:
         (K,) increasing frame numbers; the first is 0.
     """
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    passed = np.floor(travelled / spacing).astype(np.int64)
+    passed = np.floor(travelled(positions) / spacing).astype(np.int64)
     return np.flatnonzero(np.diff(passed, prepend=-1) > 0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 import io
@@ -23,19 +24,21 @@ _ROTATION_TOLERANCE = 1e-3
 
 
 def read_stamped_rows(
-    path: Path, width: int, separator: str | None
+    path: Path,
+    width: int,
+    separator: str | None,
+    parse: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reads a table whose rows are a time and `width` numbers.
-
-    A first line that does not begin with a number is a header.
 
     Args:
         path: the file.
         width: number of values after the time.
         separator: between columns; None is white space.
+        parse: reads times; `parse_stamps_ns` by default.
 
     Returns:
-        (N,) int64 times [ns], see `parse_stamps_ns`; (N, width) float64.
+        (N,) int64 times [ns]; (N, width) float64.
 
     Raises:
         InputError: if there is no such table, it is empty, a row has another
@@ -45,7 +48,7 @@ def read_stamped_rows(
         path, [("stamp", "U40"), ("values", "f8", width)], separator
     )
     try:
-        stamps_ns = parse_stamps_ns(rows["stamp"])
+        stamps_ns = (parse or parse_stamps_ns)(rows["stamp"])
     except ValueError as error:
         raise InputError(f"{path}: time: {error}") from error
     check_finite(path, rows["values"])
@@ -56,6 +59,9 @@ def read_numbers(
     path: Path, columns: list | type, separator: str | None = None
 ) -> np.ndarray:
     """Reads a table of text.
+
+    Lines that begin with `#` are remarks. A first line that does not begin
+    with a number is a header.
 
     Args:
         path: the file.
@@ -74,7 +80,11 @@ def read_numbers(
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
     # Only the line ends of files end a line; str.splitlines splits at more.
-    lines = [line for line in io.StringIO(text, newline=None) if line.strip()]
+    lines = [
+        line
+        for line in io.StringIO(text, newline=None)
+        if line.strip() and not line.startswith("#")
+    ]
     if lines and not _begins_with_number(lines[0]):
         lines = lines[1:]
     if not lines:
@@ -280,13 +290,31 @@ def read_matrices(path: Path, separator: str | None) -> Trajectory:
     return _in_order(path, stamps_ns, pose_matrices(path, values))
 
 
-def read_quaternions(path: Path, separator: str | None) -> Trajectory:
-    """Reads rows of a time, a position and a quat_xyzw.
+def read_tum(path: Path) -> Trajectory:
+    """Reads a trajectory in the TUM format; its times are seconds.
 
     Raises:
         InputError: like `read_matrices`.
     """
-    stamps_ns, values = read_stamped_rows(path, 7, separator)
+    return read_quaternions(path, None, parse_seconds)
+
+
+def read_quaternions(
+    path: Path,
+    separator: str | None,
+    parse: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> Trajectory:
+    """Reads rows of a time, a position and a quat_xyzw.
+
+    Args:
+        path: the file.
+        separator: see `read_stamped_rows`.
+        parse: likewise.
+
+    Raises:
+        InputError: like `read_matrices`.
+    """
+    stamps_ns, values = read_stamped_rows(path, 7, separator, parse)
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(values[:, 3:], axis=1)
     bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)

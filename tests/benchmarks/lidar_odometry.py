@@ -43,9 +43,10 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
 from cns_drake.simulation.simulation import simulate
+from evaluation.alignment.trajectory_errors import segment_errors
+from evaluation.drives.sampling import travelled
 
 _TURNS = 10
-_SPAN = 100.0
 _ADIS16448 = {
     "accelerometer_noise_density": 0.01,
     "accelerometer_random_walk": 0.0002,
@@ -174,20 +175,12 @@ def sensor_pose(recording: Path) -> np.ndarray:
 def drift(exact: np.ndarray, found: np.ndarray) -> dict:
     """Returns errors [m] of (N, 4, 4) found poses against the exact ones."""
     exact, found = (poses.inverse(X[0]) @ X for X in (exact, found))
-    steps = np.linalg.norm(np.diff(exact[:, :3, 3], axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
-    starts = np.arange(0, np.searchsorted(along, along[-1] - _SPAN), 10)
-    ends = np.searchsorted(along, along[starts] + _SPAN)
-
-    def motion(X: np.ndarray) -> np.ndarray:
-        return poses.inverse(X[starts]) @ X[ends]
-
-    over = poses.inverse(motion(exact)) @ motion(found)
+    starts, ends, over = segment_errors(exact, found)
     errors = np.linalg.norm(over[:, :3, 3], axis=1)
     off = found[:, :3, 3] - exact[:, :3, 3]
     up = off[:, 2]
     return {
-        "length": round(along[-1]),
+        "length": round(travelled(exact[:, :3, 3])[-1]),
         "median": round(float(np.median(errors)), 2),
         "p90": round(float(np.percentile(errors, 90)), 2),
         "up_100": round(float(np.median(up[ends] - up[starts])), 2),

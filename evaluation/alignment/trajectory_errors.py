@@ -1,0 +1,232 @@
+"""Errors of an estimated trajectory, such as that of a LiDAR odometry.
+
+Two figures are usual. X_i are true poses, Y_i the estimated ones of the same
+times, p_i and q_i their positions:
+
+- ATE, the absolute trajectory error: the root mean square of |p_i - R q_i - t|
+  over all i, where the rigid motion R, t is the one that makes it least. The
+  scale is kept. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
+  systems, IROS 2012; S. Umeyama, Least-squares estimation of transformation
+  parameters between two point patterns, PAMI 13(4), 1991. `evo_ape --align`
+  prints it as `rmse`.
+- Drift over 100 m: the length and the angle of
+  (Y_i^-1 Y_j)^-1 (X_i^-1 X_j), where i is every tenth pose and j the first one
+  more than 100 m of true path behind it. A. Geiger et al., Are we ready for
+  autonomous driving?, CVPR 2012, and the development kit of KITTI odometry,
+  which divides by the 100 m and calls the mean the translation error [%].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+import warnings
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.mcap_messages import checked_poses
+from cns_drake.base.errors import InputError
+from evaluation.drives.sampling import travelled
+from evaluation.drives.text_tables import Trajectory
+
+Frame = Literal["lidar", "base_link"]
+# Length of the parts over which an odometry drifts [m].
+SPAN = 100.0
+_STEP = 10
+# An alignment of fewer poses has hardly an error.
+_LEAST_POSES = 3
+_LONGEST_GAP_NS = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class TrajectoryErrors:
+    """Errors of N estimated poses.
+
+    Attributes:
+        offsets: (N,) distances to the true positions after the alignment [m].
+        drift: (K,) errors of position over 100 m [m]; empty if the path is
+            shorter.
+        drift_deg: (K,) errors of orientation over 100 m [deg].
+        length: of the true path along the poses [m].
+        drive_length: of the path of the whole drive [m].
+        num_outside: number of estimated poses that are left out, before or
+            after the drive.
+    """
+
+    offsets: np.ndarray
+    drift: np.ndarray
+    drift_deg: np.ndarray
+    length: float
+    drive_length: float
+    num_outside: int
+
+    @property
+    def ate(self) -> float:
+        """The absolute trajectory error [m]."""
+        return float(np.sqrt(np.mean(self.offsets**2)))
+
+    def to_json(self) -> dict:
+        """Returns the errors as a JSON object; without drift it is null."""
+        drift: dict[str, float | None] = dict.fromkeys(
+            (
+                "drift_100m",
+                "drift_100m_median",
+                "drift_100m_90",
+                "drift_100m_rotation_deg",
+            )
+        )
+        if len(self.drift):
+            values = (
+                self.drift.mean(),
+                *np.quantile(self.drift, (0.5, 0.9)),
+                self.drift_deg.mean(),
+            )
+            drift = dict(zip(drift, map(float, values), strict=True))
+        return {
+            "poses": len(self.offsets),
+            "poses_outside": self.num_outside,
+            "length": self.length,
+            "drive_length": self.drive_length,
+            "ate": self.ate,
+            "ate_median": float(np.median(self.offsets)),
+            "ate_max": float(self.offsets.max()),
+            "drift_segments": len(self.drift),
+            **drift,
+        }
+
+    def to_rows(self) -> Iterator[tuple[str, str]]:
+        """Yields names and values, to be printed."""
+        values = self.to_json()
+        yield (
+            "compared",
+            f"{values['poses']} poses, {self.length:.0f} m of the drive's"
+            f" {self.drive_length:.0f} m",
+        )
+        yield (
+            "ATE",
+            f"{self.ate:.3f} m  (median {values['ate_median']:.3f} m,"
+            f" greatest {values['ate_max']:.3f} m)",
+        )
+        drift = "undefined  (the path is shorter)"
+        if len(self.drift):
+            drift = (
+                f"{values['drift_100m']:.3f} m"
+                f" and {values['drift_100m_rotation_deg']:.3f} deg"
+                f"  (median {values['drift_100m_median']:.3f} m,"
+                f" 90 % {values['drift_100m_90']:.3f} m,"
+                f" {values['drift_segments']} parts)"
+            )
+        yield "drift over 100 m", drift
+
+
+def trajectory_errors(
+    drive: Drive,
+    estimate: Trajectory,
+    frame: Frame = "lidar",
+    time_offset: float = 0.0,
+) -> TrajectoryErrors:
+    """Compares an estimated trajectory with a drive.
+
+    The drive's poses are interpolated at the estimate's times. Its world does
+    not matter.
+
+    Args:
+        drive: has the true poses.
+        estimate: poses of the frame in any world.
+        frame: the frame whose poses are estimated: that of the LiDAR, or the
+            vehicle's.
+        time_offset: time to add to the estimate's [s].
+
+    Raises:
+        InputError: if the drive has no such poses or the two have fewer than
+            three times in common.
+    """
+    truth = _true_poses(drive, frame)
+    if not abs(time_offset) <= 1e9:
+        raise InputError(f"--time-offset: {time_offset} s is no usual time")
+    stamps_ns = estimate.stamps_ns + round(time_offset * 1e9)
+    own = truth.stamps_ns
+    inside = (stamps_ns >= own[0]) & (stamps_ns <= own[-1])
+    if inside.sum() < _LEAST_POSES:
+        raise InputError(
+            f"{estimate.path}: time: {inside.sum()} poses within that of the"
+            f" drive, of {_LEAST_POSES} at least: the estimate spans"
+            f" {_seconds(stamps_ns)}, {drive.name} {_seconds(own)}"
+        )
+    X_WB, _ = truth.interpolate(stamps_ns[inside], _LONGEST_GAP_NS)
+    Y_WB = estimate.X_WB[inside]
+    _, _, E = segment_errors(X_WB, Y_WB)
+    return TrajectoryErrors(
+        aligned_offsets(X_WB[:, :3, 3], Y_WB[:, :3, 3]),
+        np.linalg.norm(E[:, :3, 3], axis=1),
+        np.degrees(Rotation.from_matrix(E[:, :3, :3]).magnitude()),
+        float(travelled(X_WB[:, :3, 3])[-1]),
+        float(travelled(truth.X_WB[:, :3, 3])[-1]),
+        int((~inside).sum()),
+    )
+
+
+def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Returns distances (N,) of points p from points q, aligned with them.
+
+    Args:
+        p: (N, 3) true positions [m].
+        q: (N, 3) estimated ones, in any frame [m].
+    """
+    p, q = p - p.mean(axis=0), q - q.mean(axis=0)
+    with warnings.catch_warnings():
+        # Along a straight line the best rotation is not the only one, but its
+        # error is.
+        warnings.filterwarnings("ignore", "Optimal rotation is not uniquely")
+        R, *_ = Rotation.align_vectors(p, q)
+    return np.asarray(np.linalg.norm(p - R.apply(q), axis=1))
+
+
+def segment_errors(
+    X: np.ndarray, Y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns the errors of the motion over the next 100 m.
+
+    Args:
+        X: (N, 4, 4) true poses.
+        Y: (N, 4, 4) estimated ones, in any world.
+
+    Returns:
+        (K,) first and (K,) last poses of the parts; (K, 4, 4) poses of the
+        true end seen from the estimated one.
+    """
+    along = travelled(X[:, :3, 3])
+    starts = np.arange(0, len(X), _STEP)
+    ends = np.searchsorted(along, along[starts] + SPAN, "right")
+    starts, ends = starts[ends < len(X)], ends[ends < len(X)]
+
+    def motion(Z: np.ndarray) -> np.ndarray:
+        return poses.inverse(Z[starts]) @ Z[ends]
+
+    return starts, ends, poses.inverse(motion(Y)) @ motion(X)
+
+
+def _true_poses(drive: Drive, frame: Frame) -> Trajectory:
+    source = Path(drive.name)
+    if frame == "lidar":
+        return Trajectory(source, drive.stamps_ns, drive.X_WS)
+    rows = drive.odometry
+    if rows is None:
+        raise InputError(
+            f"--frame: {drive.name} has poses of the LiDAR alone, none of"
+            " base_link"
+        )
+    stamps_ns, order = np.unique(rows["stamp_ns"], return_index=True)
+    rows = rows[order]
+    X_WB = checked_poses(rows["position"], rows["quat_xyzw"], drive.name)
+    return Trajectory(source, stamps_ns, X_WB)
+
+
+def _seconds(stamps_ns: np.ndarray) -> str:
+    first, last = stamps_ns[[0, -1]].tolist()
+    return f"{first * 1e-9:.3f} to {last * 1e-9:.3f} s"
