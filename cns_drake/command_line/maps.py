@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+import shlex
 import shutil
 import sys
 from typing import TYPE_CHECKING, Annotated
@@ -18,6 +18,7 @@ from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
 from cns_drake.command_line.options import Jobs
 from cns_drake.imports.options import (
+    REPORT_NAME,
     DriveOn,
     ImportOptions,
     ImportReport,
@@ -50,6 +51,8 @@ _GIVE_WAY = (
 _GAP = "  "
 # Share of the buildings that the first stage of a city without years lacks.
 _GROW = 0.3
+# Kinds of structures and of faults that a report names.
+_SHOWN = 5
 
 
 def list_drives(
@@ -237,9 +240,9 @@ def import_city(
     )
     with uncollected():
         report = _imported(path, output, options)
-    print_rows(_report_rows(report, options.years))
     for line in _shortcomings(report, output, options):
         note(f"{output}: {line}")
+    print_rows(_report_rows(report, output, options.years))
 
 
 def _imported(path: Path, output: Path, options: ImportOptions) -> ImportReport:
@@ -270,25 +273,24 @@ def _shortcomings(
         yield f"no second route shares a part of the first; {waypoints}"
     if len(report.stages) == 1:
         yield "there is only one stage; give --years or --grow to study change"
-    elif options.years and report.undated > report.dated:
-        numbers = list(report.stages.values())
+    elif options.years and (
+        report.undated > report.dated or len(set(report.stages.values())) == 1
+    ):
+        numbers = ", ".join(map(str, report.stages.values()))
         yield (
             f"{report.dated} of {report.dated + report.undated} buildings have"
-            " a year; from one stage to the next the number of structures"
-            f" changes by {_differences(numbers)}; --grow draws what changes"
-            " at random"
+            f" a year, and the stages {numbers} structures; in place of"
+            " --years, --grow draws a change at random"
         )
 
 
-def _differences(numbers: list[int]) -> str:
-    return ", ".join(str(b - a) for a, b in pairwise(numbers))
-
-
 def _report_rows(
-    report: ImportReport, years: tuple[int, ...]
+    report: ImportReport, output: Path, years: tuple[int, ...]
 ) -> Iterator[tuple[str, str]]:
-    for kind, number in report.kinds.items():
-        yield kind, str(number)
+    """Yields the most important numbers, and the command that comes next."""
+    kinds = sorted(report.kinds.items(), key=lambda item: -item[1])
+    parts = [f"{number} {kind}" for kind, number in kinds]
+    yield "structures", _shortened(parts)
     yield "triangles", str(report.triangles)
     for k, (stage, number) in enumerate(report.stages.items()):
         when = f" ({years[k]})" if years else ""
@@ -297,8 +299,24 @@ def _report_rows(
         yield "without a year", str(report.undated)
     for letter, length in zip("ab", report.drives, strict=False):
         yield f"drive {letter}", f"{length:.0f} m"
-    for kind, number, example in report.faults:
-        yield kind, f"{number}, such as {example}"
+    if report.faults:
+        parts = [f"{kind} ({number})" for kind, number, _ in report.faults]
+        yield "left out or repaired", _shortened(parts)
+    yield "written", f"{output}, with all counts in {REPORT_NAME}"
+    if not report.drives:
+        return
+    if len(report.stages) > 1:
+        words = ["reproduce", str(output), "--output", "study"]
+    else:
+        drive = str(output / f"sequence_{min(report.stages)}.yaml")
+        words = ["simulate", drive, "--output", "recordings"]
+    yield "next", shlex.join(["cns-drake", *words])
+
+
+def _shortened(kinds: Sequence[str]) -> str:
+    more = len(kinds) - _SHOWN
+    rest = [f"{more} kinds more"] if more > 0 else []
+    return "; ".join([*kinds[:_SHOWN], *rest])
 
 
 def city(

@@ -34,6 +34,7 @@ from cns_drake.imports.map_files import (
     map_draft,
     write_drives,
     write_facts,
+    write_report,
     write_world,
 )
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
@@ -137,13 +138,15 @@ def _import_city(
             city, options, list(staged.standing), growth, dressing
         )
         write_facts(draft, source, facts, city.faults)
+        report = _report(staged, drives, city.faults)
+        write_report(draft, report)
         write_drives(
             draft,
             _titles(staged, options),
             [drive.waypoints for drive in drives],
         )
         finish(draft, sizes)
-    return _report(staged, drives, city.faults)
+    return report
 
 
 def _check(source: Path, output: Path, options: ImportOptions) -> None:
@@ -191,6 +194,7 @@ def _import_roads(
     town = build_town(source, options.seed, progress, options.dressed)
     with map_draft(output) as draft:
         report, sizes = write_town(draft, source, town, progress)
+        write_report(draft, report)
         finish(draft, sizes)
     return report
 

@@ -9,8 +9,12 @@ from pathlib import Path
 import shutil
 from typing import Any
 
+from matplotlib.artist import Artist
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 import numpy as np
 import yaml
 
@@ -22,7 +26,12 @@ from cns_drake.imports.dressing.whole_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.options import ImportFaults, ImportOptions
+from cns_drake.imports.options import (
+    REPORT_NAME,
+    ImportFaults,
+    ImportOptions,
+    ImportReport,
+)
 from cns_drake.imports.staged_city import Growth, StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
@@ -32,6 +41,8 @@ _ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
 _DPI = 130
 _INCHES = 9.0
 _ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
+_ROUTE_WIDTHS = (5.0, 2.0)  # [pt]
+_ROOM_COLOUR, _ROOM_ALPHA = "#ffd92f", 0.6
 
 
 @contextmanager
@@ -169,6 +180,16 @@ def write_facts(
     (draft / "import.yaml").write_text(comment + text, "utf-8")
 
 
+def write_report(draft: Path, report: ImportReport) -> None:
+    """Writes all counts of an import, of which the command prints a few."""
+    lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
+    lines += [
+        f"{kind}: {number}, such as {example}"
+        for kind, number, example in report.faults
+    ]
+    (draft / REPORT_NAME).write_text("\n".join([*lines, ""]), "utf-8")
+
+
 def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
     """Returns the counts of drawn parts, if there are any."""
     if growth is None:
@@ -234,7 +255,10 @@ def draw_overview(
     space: FreeSpace | None,
     drives: Sequence[WaypointDrive],
 ) -> None:
-    """Draws structures, the room for a car, and the drives [m].
+    """Draws structures, the room for a car, and the drives [m], with a legend.
+
+    The second drive is a thinner line on the first one, so that both are seen
+    where they share a street.
 
     Args:
         path: the picture to write.
@@ -250,15 +274,19 @@ def draw_overview(
         low = space.low
         high = low + CELL * np.array(space.clearance.shape[::-1])
     size = _INCHES * (high - low) / (high - low).max()
-    figure = Figure(
-        figsize=(size[0] + 0.8, size[1] + 0.6), layout="constrained"
-    )
+    figure = Figure(layout="constrained")
     axes = figure.subplots()
+    legend: dict[str, Artist] = {}
+    classes: dict[str, Artist] = {}
     for is_ground in (True, False):
         alike: dict[tuple[float, float, float], list[np.ndarray]] = {}
         for one in structures:
             if one.is_ground == is_ground and one.kind != "TINRelief":
-                alike.setdefault(_colour(one), []).append(one.triangles)
+                colour = _colour(one)
+                alike.setdefault(colour, []).append(one.triangles)
+                classes.setdefault(
+                    one.structure.semantic_class, Patch(facecolor=colour)
+                )
         for colour, triangles in alike.items():
             # An array, which the library takes faster than a list, is none of
             # what its hints allow.
@@ -275,21 +303,48 @@ def draw_overview(
     extent = (low[0], high[0], low[1], high[1])
     if space is not None:
         room = np.where(space.clearance >= space.least, 1.0, np.nan)
+        # Above the structures, below the lines.
         axes.imshow(
             room,
             origin="lower",
             extent=extent,
-            cmap="summer",
-            alpha=0.35,
-            vmax=1.2,
+            cmap=ListedColormap([_ROOM_COLOUR]),
+            alpha=_ROOM_ALPHA,
+            zorder=1.5,
         )
-    for drive, line in zip(drives, _ROUTE_COLOURS, strict=False):
-        axes.plot(*drive.path.T, color=line, linewidth=2.0)
-        axes.plot(*drive.path[0], "o", color=line)
-        axes.plot(*drive.path[-1], "s", color=line)
+        classes["room for a car"] = Patch(
+            facecolor=_ROOM_COLOUR, alpha=_ROOM_ALPHA
+        )
+    for letter, drive, colour, width in zip(
+        "ab", drives, _ROUTE_COLOURS, _ROUTE_WIDTHS, strict=False
+    ):
+        (line,) = axes.plot(*drive.path.T, color=colour, linewidth=width)
+        legend[f"drive {letter}, {drive.length:.0f} m"] = line
+        for end, marker, name in ((0, "o", "start"), (-1, "s", "end")):
+            axes.plot(
+                *drive.path[end],
+                marker,
+                color=colour,
+                markersize=2 * width + 3,
+                markeredgecolor="white",
+            )
+            legend[name] = Line2D(
+                [], [], linestyle="", marker=marker, color="black"
+            )
     axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
+    legend |= classes
+    width = max(size[0] + 0.8, 4.0)
+    columns = int(width / 2)
+    rows = -(-len(legend) // columns)
+    figure.set_size_inches(width, size[1] + 0.8 + 0.2 * rows)
+    figure.legend(
+        legend.values(),
+        legend.keys(),
+        loc="outside lower center",
+        ncols=columns,
+    )
     figure.savefig(path, dpi=_DPI, metadata={"Software": None})
 
 

@@ -11,6 +11,8 @@ from typing import Literal
 Undated = Literal["first", "last", "never"]
 # The side of a street on which cars drive.
 DriveOn = Literal["right", "left"]
+# Lists all counts of an import, in the folder of the map.
+REPORT_NAME = "import.txt"
 _LONGEST = 100
 
 

@@ -5,8 +5,10 @@ import os
 from pathlib import Path
 import re
 import resource
+import shlex
 
 from helpers.small_cityjson import CityWriter, write_blocks
+from matplotlib.image import imread
 import numpy as np
 import pytest
 from shapely.geometry import LineString, box
@@ -16,7 +18,10 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import construction_year
+from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.import_map import import_city
+from cns_drake.imports.map_files import draw_overview
 from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -178,6 +183,87 @@ def test_the_command_from_end_to_end(tmp_path):
         )  # fmt: skip
         assert result.exit_code == 0, result.output
     assert run("import", source, "--output", output).exit_code != 0
+
+
+def test_a_summary_of_ten_lines(tmp_path):
+    city = CityWriter()
+    years = (1900, 1960, None)
+    for k, year in enumerate(years):
+        for side in (0.0, 30.0):
+            city.box(
+                f"house_{k}_{side:g}", 40.0 * k, side, (36.0, 20.0, 6.0),
+                attributes={"yearOfConstruction": year},
+            )  # fmt: skip
+    for k in range(12):
+        geometry = {"type": f"Shape{k}", "lod": "1", "boundaries": []}
+        city.add(f"thing_{k}", "GenericCityObject", geometry)
+    source = city.write(tmp_path / "city.json")
+    output = tmp_path / "a town" / "town"
+    output.parent.mkdir()
+    result = run(
+        "import", source, "--years", "1930", "1990", "--output", output
+    )
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert len(lines) <= 10
+    assert "kinds more" in result.stdout
+    counts = (output / "import.txt").read_text().splitlines()
+    assert "Building: 6" in counts
+    for k in range(12):
+        kind = f"geometry of type Shape{k}, left out"
+        assert f"{kind}: 1, such as thing_{k}" in counts
+    assert re.fullmatch(
+        f"written +{re.escape(str(output))}, with all counts in import.txt",
+        lines[-2],
+    )
+    words = shlex.split(lines[-1])
+    assert words[:3] == ["next", "cns-drake", "reproduce"]
+    assert Path(words[3]) == output
+
+
+@pytest.mark.parametrize("dates", [(None, None), (1900, 1910)])
+def test_years_that_change_nothing(tmp_path, dates):
+    city = CityWriter()
+    for k, year in enumerate(dates):
+        city.box(
+            f"house_{k}", 40.0 * k, 0.0, (20.0, 20.0, 6.0),
+            attributes={"yearOfConstruction": year},
+        )  # fmt: skip
+    source = city.write(tmp_path / "city.json")
+    result = run(
+        "import", source, "--years", "1950", "2000",
+        "--output", tmp_path / "town",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    warnings = [line for line in result.stderr.splitlines() if "--grow" in line]
+    dated = sum(year is not None for year in dates)
+    assert len(warnings) == 1
+    assert f"{dated} of 2 buildings have a year" in warnings[0]
+
+
+def test_the_picture_shows_both_drives_where_they_share_a_street(tmp_path):
+    triangle = np.array([[[0.0, 0, 0], [40.0, 0, 0], [0, 40.0, 0]]])
+    house = make_imported(
+        "house", "building", "Building", {"all": triangle}, {}
+    )
+    way = np.column_stack([np.linspace(-10.0, 50.0, 31), np.full(31, 30.0)])
+    drives = [WaypointDrive(way[k : k + 20], way[k : k + 20]) for k in (0, 11)]
+    path = tmp_path / "from_above.png"
+    draw_overview(path, [house], None, drives)
+    pixels = np.round(255 * imread(path)[:, :, :3]).astype(int)
+    red, blue = (
+        (np.abs(pixels - rgb).max(axis=2) < 8)
+        for rgb in ((0xD7, 0x19, 0x1C), (0x2C, 0x7B, 0xB6))
+    )
+    # Columns in which the one drive lies in the other; more than the markers
+    # of its ends take.
+    height = len(pixels)
+    upper = slice(0, int(0.7 * height))
+    both = red[upper].any(axis=0) & blue[upper].any(axis=0)
+    assert both.sum() > 60
+    # The legend has both colours, below the map.
+    assert red[int(0.85 * height) :].any()
+    assert blue[int(0.85 * height) :].any()
 
 
 def test_no_street_and_no_drive(tmp_path):
