@@ -190,6 +190,43 @@ RECIPES = {
         after=("own city",),
         prints=("TCR_sym of the routes alone", "AUC"),
     ),
+    "odometry": Recipe(
+        "base: metropolis_04\nimu:",
+        file="odometry.yaml",
+        changes=(
+            ("metropolis_04", "town/sequence_02.yaml"),
+            ("vehicles: 20}", "vehicles: 4}\nframes: 20"),
+        ),
+    ),
+    "odometry drive": Recipe(
+        ".venv/bin/cns-drake simulate odometry.yaml",
+        after=("odometry", "start a city"),
+        prints=("output/odometry: 20 frames",),
+    ),
+    "KISS-ICP settings": Recipe("mapping: {voxel_size", file="kiss.yaml"),
+    "KISS-ICP": Recipe(
+        "kiss_icp_pipeline output/odometry",
+        after=("KISS-ICP settings", "odometry drive"),
+        prints=("compared          19 poses", "ATE"),
+    ),
+    "RKO-LIO settings": Recipe("voxel_size: 2.0\n", file="rko.yaml"),
+    "RKO-LIO": Recipe(
+        "rko_lio output/odometry",
+        after=("RKO-LIO settings", "odometry drive"),
+        prints=("poses", "ATE"),
+    ),
+    "help: trajectory": Recipe(
+        "cns-eval trajectory drives/metropolis_04",
+        changes=(
+            ("drives/metropolis_04", "output/town_02"),
+            (
+                "results/latest/metropolis_04_poses_tum.txt",
+                "tum/town_02/lidar.tum",
+            ),
+        ),
+        after=("exports",),
+        prints=("ATE               0.000 m",),
+    ),
     "help: list": Recipe("cns-drake list", prints=("metropolis_04",)),
     "help: simulate": Recipe(
         "cns-drake simulate metropolis_01 --output drives",
@@ -636,8 +673,6 @@ NOT_RUN = {
     "them; `.ci/run` runs all",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
-    "rko_lio output": "a program that is no part of this project; test_rko_lio "
-    "runs it on a short drive",
     "cns-drake ladder --levels": "hours of work; the recipe ladder climbs some "
     "of it",
     "cns-drake simulate metropolis_03 --returns calibrated": "records two "
