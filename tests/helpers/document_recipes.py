@@ -195,7 +195,7 @@ RECIPES = {
         file="odometry.yaml",
         changes=(
             ("metropolis_04", "town/sequence_02.yaml"),
-            ("vehicles: 20}", "vehicles: 4}\nframes: 20"),
+            ("vehicles: 20}", "vehicles: 4}}\nframes: 20"),
         ),
     ),
     "odometry drive": Recipe(
