@@ -315,16 +315,16 @@ def draw_overview(
         classes["room for a car"] = Patch(
             facecolor=_ROOM_COLOUR, alpha=_ROOM_ALPHA
         )
-    for letter, drive, colour, width in zip(
+    for letter, drive, rgb, width in zip(
         "ab", drives, _ROUTE_COLOURS, _ROUTE_WIDTHS, strict=False
     ):
-        (line,) = axes.plot(*drive.path.T, color=colour, linewidth=width)
+        (line,) = axes.plot(*drive.path.T, color=rgb, linewidth=width)
         legend[f"drive {letter}, {drive.length:.0f} m"] = line
         for end, marker, name in ((0, "o", "start"), (-1, "s", "end")):
             axes.plot(
                 *drive.path[end],
                 marker,
-                color=colour,
+                color=rgb,
                 markersize=2 * width + 3,
                 markeredgecolor="white",
             )
@@ -335,10 +335,10 @@ def draw_overview(
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
     legend |= classes
-    width = max(size[0] + 0.8, 4.0)
-    columns = int(width / 2)
+    wide = max(size[0] + 0.8, 4.0)
+    columns = int(wide / 2)
     rows = -(-len(legend) // columns)
-    figure.set_size_inches(width, size[1] + 0.8 + 0.2 * rows)
+    figure.set_size_inches(wide, size[1] + 0.8 + 0.2 * rows)
     figure.legend(
         legend.values(),
         legend.keys(),
