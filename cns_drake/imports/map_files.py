@@ -25,7 +25,7 @@ from cns_drake.city.geometry.structures import BoxShape, MeshShape, Structure
 from cns_drake.imports.dressing.whole_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import ForeignCity, Imported
+from cns_drake.imports.foreign_city import WATER, ForeignCity, Imported
 from cns_drake.imports.options import (
     REPORT_NAME,
     ImportFaults,
@@ -284,9 +284,12 @@ def draw_overview(
             if one.is_ground == is_ground and one.kind != "TINRelief":
                 colour = _colour(one)
                 alike.setdefault(colour, []).append(one.triangles)
-                classes.setdefault(
-                    one.structure.semantic_class, Patch(facecolor=colour)
-                )
+                name = one.structure.semantic_class
+                if name == "building":
+                    name = "building, any colour"
+                elif colour == WATER:
+                    name = "water"
+                classes.setdefault(name, Patch(facecolor=colour))
         for colour, triangles in alike.items():
             # An array, which the library takes faster than a list, is none of
             # what its hints allow.
