@@ -24,6 +24,7 @@ CODES = [piece.text for page in PAGES for piece in documents.inline(page)]
 FOREIGN_OPTIONS = {
     *("--nthreads", "--nworkers", "--config"),
     *("--tls-ca-file", "--tls-cert", "--tls-key"),
+    "--topic",
 }
 
 
