@@ -221,6 +221,7 @@ def plan_scenario_traffic(
             walkways,
             seed=wanted.seed,
             duration=(num_frames - 1) * scenario.frame_period,
+            end=trajectory.duration,
             ego=ego,
             ego_box=EGO_BOX,
         )

@@ -185,6 +185,7 @@ def play_trace(
     *,
     seed: int,
     duration: float,
+    end: float,
     ego: EgoPath,
     ego_box: EgoBox,
 ) -> TrafficPlan:
@@ -199,7 +200,8 @@ def play_trace(
         graph: lanes of the map, which give heights.
         walkways: strips of the map; likewise.
         seed: seed of the kinds of cars.
-        duration: length of the drive [s].
+        duration: time to the last frame [s].
+        end: time at which the ego car arrives [s].
         ego: place of the ego car.
         ego_box: its size.
 
@@ -233,9 +235,12 @@ def play_trace(
         [_person_rows(one, heights, trace.dt) for one in trace.persons],
     )
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
-    kept = ~_meet_ego(vehicles, half, ego, ego_box)
+    # Steps are short enough to notice all that cross the car's way.
+    step = min(trace.dt, 0.1)
+    times = np.arange(0.0, min(trace.duration, end) + step, step)
+    kept = ~_meet_ego(vehicles, half, times, ego, ego_box)
     half = [(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * len(trace.persons)
-    kept_walkers = ~_meet_ego(walkers, half, ego, ego_box)
+    kept_walkers = ~_meet_ego(walkers, half, times, ego, ego_box)
     return TrafficPlan(
         tuple(kind for kind, one in zip(kinds, kept, strict=True) if one),
         vehicles.select(kept),
@@ -327,9 +332,16 @@ def _make_tracks(
     present = np.zeros((trace.num_steps, len(traced)), bool)
     times = np.arange(trace.num_steps)
     for k, (one, own) in enumerate(zip(traced, rows, strict=True)):
-        # While absent, it keeps its last or next place.
-        last = np.searchsorted(one.steps, times, side="right") - 1
-        values[:, k] = own[np.maximum(last, 0)]
+        # It comes and goes in motion, for a LiDAR that is turning then.
+        steps = np.concatenate(
+            [one.steps[:1] - 1, one.steps, one.steps[-1:] + 1]
+        )
+        own = np.concatenate([own[:1], own, own[-1:]])
+        if len(one.steps) > 1:
+            own[[0, -1]] += own[[1, -2]] - own[[2, -3]]
+        values[:, k] = np.transpose(
+            [np.interp(times, steps, column) for column in own.T]
+        )
         present[one.steps, k] = True
     return Tracks(trace.dt, values, present)
 
@@ -337,13 +349,12 @@ def _make_tracks(
 def _meet_ego(
     tracks: Tracks,
     half: Sequence[tuple[float, float]],
+    times: np.ndarray,
     ego: EgoPath,
     box: EgoBox,
 ) -> np.ndarray:
-    """Returns (N,) whether each ever overlaps the ego car."""
+    """Returns (N,) whether each overlaps the ego car at any of the times."""
     num = len(half)
-    # Steps are short enough to notice all that cross the car's way.
-    times = np.arange(0.0, tracks.duration, min(tracks.dt, 0.1))
     poses = np.full((len(times), 1 + num, 3), np.nan)
     poses[:, 0] = box.middles(*ego(times))
     for k, time in enumerate(times):

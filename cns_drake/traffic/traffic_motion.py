@@ -263,11 +263,11 @@ class TrafficMotion(LeafSystem):
         output.set_value(poses)
 
     def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
-        t = context.get_time()
-        X_0, X_1 = (
-            self._limbs.poses(bodies_at(self._plan, time))
-            for time in (t, t + self._turn)
-        )
+        now: BodyStates = self._states.Eval(context)
+        later = bodies_at(self._plan, context.get_time() + self._turn)
+        # A body that comes or goes does so between two turns.
+        later = later._replace(present=now.present)
+        X_0, X_1 = map(self._limbs.poses, (now, later))
         R_0, R_1 = X_0[:, :3, :3].copy(), X_1[:, :3, :3].copy()
         turned = Rotation.from_matrix(R_1 @ R_0.transpose(0, 2, 1))
         w = turned.as_rotvec() / self._turn

@@ -29,6 +29,8 @@ from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
 STEP = 0.1
 # A walker's box, with limbs that swing [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
+# Steps for which traffic has moved when the drive begins.
+_FIRST = 200
 # Share of vehicles and walkers that are planned in excess, since some are left
 # out; and number of trials.
 _SPARE, _TRIES = 0.06, 4
@@ -46,8 +48,9 @@ class Tracks:
     """N bodies with D coordinates each, known at evenly spaced times.
 
     Between two of these times every coordinate is a cubic polynomial, whose
-    rate is continuous (Catmull and Rom's spline); before the first and after
-    the last time it keeps its value.
+    rate is continuous (Catmull and Rom's spline). Where a body's time begins or
+    ends, it is a parabola, and beyond the first and the last time of all a
+    straight line.
 
     Attributes:
         dt: distance of the times [s].
@@ -60,11 +63,6 @@ class Tracks:
     values: np.ndarray
     present: np.ndarray | None = None
 
-    @property
-    def duration(self) -> float:
-        """The last of the times [s]."""
-        return self.dt * (len(self.values) - 1)
-
     def at(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns coordinates and their rates.
 
@@ -74,43 +72,55 @@ class Tracks:
         Returns:
             (N, D) each; of several times (T, N, D).
         """
-        last = len(self.values) - 1
-        k, u = self._interval(t)
-        u = u[..., None, None]
-        first = (k == 0)[..., None, None]
-        final = (k + 2 > last)[..., None, None]
+        k, u, beyond = self._interval(t)
         p0, p1 = self.values[k], self.values[k + 1]
-        before = self.values[np.maximum(k - 1, 0)]
-        after = self.values[np.minimum(k + 2, last)]
-        # At both ends of the track a body is at rest.
-        m0 = np.where(first, 0.0, (p1 - before) / 2)
-        m1 = np.where(final, 0.0, (after - p0) / 2)
-        if self.present is not None:
-            # A place at which a body is absent does not count.
-            alone = ~self.present[np.maximum(k - 1, 0)][..., None]
-            m0 = np.where(alone, p1 - p0, m0)
-            alone = ~self.present[np.minimum(k + 2, last)][..., None]
-            m1 = np.where(alone, p1 - p0, m1)
-        a = 2 * p0 + m0 - 2 * p1 + m1
-        b = -3 * p0 - 2 * m0 + 3 * p1 - m1
+        before, is_before = self._there(k - 1)
+        after, is_after = self._there(k + 2)
+        step = p1 - p0
+        m1 = np.where(is_after, (after - p0) / 2, step)
+        m0 = np.where(is_before, (p1 - before) / 2, 2 * step - m1)
+        m1 = np.where(is_after, m1, 2 * step - m0)
+        a, b = m0 + m1 - 2 * step, 3 * step - 2 * m0 - m1
         value = ((a * u + b) * u + m0) * u + p0
-        rate = ((3 * a * u + 2 * b) * u + m0) / self.dt
-        rests = (np.asarray(t) < 0.0) | (np.asarray(t) > self.duration)
-        return value, np.where(rests[..., None, None], 0.0, rate)
+        rate = (3 * a * u + 2 * b) * u + m0
+        return value + beyond * rate, rate / self.dt
+
+    def _there(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns coordinates at rows of times, and whether bodies are there.
+
+        Args:
+            k: (...) rows; there is no body before the first and after the last.
+
+        Returns:
+            (..., N, D), and bool that fit it.
+        """
+        row = np.clip(k, 0, len(self.values) - 1)
+        there = (k == row)[..., None]
+        if self.present is not None:
+            there = there & self.present[row]
+        return self.values[row], there[..., None]
 
     def is_present(self, t: float | np.ndarray) -> np.ndarray:
         """Returns whether each body is there at a time, (N,) or (T, N)."""
-        k, _ = self._interval(t)
+        k, *_ = self._interval(t)
         if self.present is None:
             return np.ones((*k.shape, self.values.shape[1]), bool)
         return self.present[k] & self.present[k + 1]
 
-    def _interval(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the interval of each time, and its place in there."""
+    def _interval(self, t: float | np.ndarray) -> tuple[np.ndarray, ...]:
+        """Returns each time's interval, place in there, and steps beyond all.
+
+        The place and the steps have two more axes than the times.
+        """
         last = len(self.values) - 1
-        inside = np.clip(np.asarray(t, float) / self.dt, 0.0, float(last))
+        steps = np.asarray(t, float) / self.dt
+        inside = np.clip(steps, 0.0, float(last))
         k = np.minimum(inside.astype(int), last - 1)
-        return k, inside - k
+        return (
+            k,
+            (inside - k)[..., None, None],
+            (steps - inside)[..., None, None],
+        )
 
     def select(self, chosen: np.ndarray) -> Tracks:
         """Returns the tracks of some bodies."""
@@ -142,7 +152,8 @@ class _Task(NamedTuple):
     Attributes:
         graph: lanes of the vehicles.
         walkways: strips for the walkers.
-        streets: the graph, and the ego car at K steps.
+        streets: the graph, and the ego car at K steps, which begin before the
+            drive.
         ego_track: (2 K - 1, 3) x, y [m], heading [rad] of the middle of the
             ego car's box at half steps.
         ego_box: its size.
@@ -183,12 +194,16 @@ def plan_traffic(
     Returns:
         The plan, without any collisions. It may have fewer bodies than wanted.
     """
-    num_steps = int(np.ceil(duration / STEP)) + 2
+    # Traffic goes on after the drive, for a LiDAR that is turning then.
+    num_steps = _FIRST + int(np.ceil(duration / STEP)) + 4
+    # The ego car waits until its drive begins.
+    half_steps = np.arange(2 * num_steps - 1) - 2 * _FIRST
+    times = STEP / 2 * np.maximum(half_steps, 0)
     task = _Task(
         graph,
         walkways,
-        make_streets(graph, ego_box, *ego(STEP * np.arange(num_steps)), STEP),
-        ego_box.middles(*ego(STEP / 2 * np.arange(2 * num_steps - 1))),
+        make_streets(graph, ego_box, *ego(times[::2]), STEP),
+        ego_box.middles(*ego(times)),
         ego_box,
         vehicles,
         walkers,
@@ -263,11 +278,9 @@ class Trial:
             past_walkers.append(crowd.walkers.copy())
             find_occupants(occupants, streets, cars, k)
             grant_ways(streets, cars, occupants, permits, k, STEP, self._seed)
-            wanted, gaps = accelerations(streets, cars, occupants)
+            wanted = accelerations(streets, cars, occupants)
             change_lanes(streets, cars, occupants, k)
-            advance(
-                streets, cars, permits.users, wanted, gaps, STEP, self._seed
-            )
+            advance(streets, cars, permits.users, wanted, STEP, self._seed)
             crowd.step(k * STEP, STEP, self._seed + 1)
         rows = slice(steps.start, steps.stop)
         self._vehicles[rows] = vehicle_poses(streets, np.array(past_cars))
@@ -312,10 +325,25 @@ class Trial:
         vehicles, walkers = self._kept()
         return TrafficPlan(
             tuple(self._kinds[k] for k in vehicles),
-            Tracks(STEP, self._vehicles[:, np.array(vehicles, int)]),
-            Tracks(STEP, self._walkers[:, np.array(walkers, int)]),
+            Tracks(STEP, _smooth(self._vehicles[:, np.array(vehicles, int)])),
+            Tracks(STEP, _smooth(self._walkers[:, np.array(walkers, int)])),
             self.left_out(),
         )
+
+
+def _smooth(values: np.ndarray) -> np.ndarray:
+    """Returns a uniform cubic B-spline's values (K - F, N, D) at its knots.
+
+    A spline through them has accelerations that do not exceed those of the F
+    steps before the drive and of the drive's.
+
+    Args:
+        values: (K, N, D) the points that control it, at all steps.
+    """
+    before, here, after = (
+        values[_FIRST + k : len(values) - 1 + k] for k in (-1, 0, 1)
+    )
+    return (before + 4.0 * here + after) / 6.0
 
 
 def _with_spare(number: int) -> int:

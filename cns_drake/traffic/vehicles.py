@@ -28,15 +28,15 @@ EGO = -1
 # Greatest number of pieces under a vehicle.
 _MOST_ENTRIES = 8
 
-# Greatest braking [m/s^2].
-HARDEST_BRAKING = 8.0
+# Greatest braking, and that in an emergency [m/s^2].
+HARDEST_BRAKING, EMERGENCY_BRAKING = 3.2, 5.5
 # Smaller gaps count as this one [m].
 _NO_GAP = 0.05
 # Distance kept from the stop line [m].
 _BEFORE_LINE = 0.5
 # Greatest distance that drivers look ahead [m].
 _SIGHT = 120.0
-# The least gap that a step leaves, independent of the model [m].
+# The gap for which drivers brake as in an emergency [m].
 _LEAST_GAP = 0.5
 
 # A driver considers a change of lane only at every such step.
@@ -361,46 +361,49 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 @compiled
 def accelerations(
     streets: Streets, cars: np.ndarray, occupants: Occupants
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the (N,) accelerations [m/s^2], and gaps ahead [m]."""
-    result, gaps = np.zeros(len(cars)), np.zeros(len(cars))
+) -> np.ndarray:
+    """Returns the (N,) accelerations [m/s^2]."""
+    result = np.zeros(len(cars))
     pieces = streets.pieces
     for i in range(len(cars)):
         car = cars[i]
         lane, s, v = car.path[CURRENT], car.s, car.v
-        left = pieces[lane].length - s
         v0 = min(car.top, car.factor * speed_on(streets, lane, s))
         wanted = free_acceleration(car, v0)
-        goes_on = pieces[lane].is_way or car.granted
-        if not goes_on:
-            # The driver brakes as for a vehicle behind the stop line.
-            wanted -= interaction(car, left + STANDSTILL_GAP - _BEFORE_LINE, v)
         gap, speed = find_ahead(occupants, lane, s, i)
         if car.left_lane >= 0:
             scale = pieces[car.left_lane].length / pieces[lane].length
             gap_2, speed_2 = find_ahead(occupants, car.left_lane, s * scale, i)
             if gap_2 < gap:
                 gap, speed = gap_2, speed_2
-        column, begin = CURRENT + 1, left
-        while goes_on and gap == np.inf and begin < _SIGHT:
-            piece = car.path[column]
-            if piece < 0:
+        column, begin, line = CURRENT, pieces[lane].length - s, np.inf
+        while begin < _SIGHT:
+            is_way = pieces[car.path[column]].is_way
+            if not is_way and (column > CURRENT or not car.granted):
+                line = begin
                 break
+            column += 1
+            piece = car.path[column]
             v1 = min(car.top, car.factor * speed_on(streets, piece, 0.0))
             if v1 < v:
                 braking = (v**2 - v1**2) / (2.0 * max(begin, 0.5))
                 if braking > 0.6 * car.b:
                     wanted = min(wanted, -braking)
-            gap, speed = find_ahead(occupants, piece, -begin, i)
+            if gap == np.inf:
+                gap, speed = find_ahead(occupants, piece, -begin, i)
             begin += pieces[piece].length
-            column += 1
-            if column == NUM_PIECES:
-                break
-        gaps[i] = gap
+        # The driver brakes as for a vehicle behind the stop line.
+        loss = interaction(car, line + STANDSTILL_GAP - _BEFORE_LINE, v)
+        needed = v**2 / (2.0 * max(line, _NO_GAP))
         if gap < _SIGHT:
-            wanted -= interaction(car, gap, v - speed)
-        result[i] = max(wanted, -HARDEST_BRAKING)
-    return result, gaps
+            loss = max(loss, interaction(car, gap, v - speed))
+            # The vehicle ahead may brake hard.
+            stop = gap - _LEAST_GAP
+            stop += max(speed, 0.0) ** 2 / (2.0 * EMERGENCY_BRAKING)
+            needed = max(needed, v**2 / (2.0 * max(stop, _NO_GAP)))
+        hardest = max(HARDEST_BRAKING, min(needed, EMERGENCY_BRAKING))
+        result[i] = max(wanted - loss, -hardest)
+    return result
 
 
 @compiled
@@ -429,7 +432,11 @@ def change_lanes(
             if target >= 0 and _is_better(
                 streets, cars, occupants, k, i, target
             ):
-                car.s *= pieces[target].length / pieces[lane].length
+                # The vehicle goes on as fast; only its lane is shorter or
+                # longer.
+                scale = pieces[target].length / pieces[lane].length
+                car.s *= scale
+                car.v *= scale
                 car.path[CURRENT] = target
                 car.path[CURRENT + 1] = car.path[CURRENT + 2] = -1
                 car.since = np.inf
@@ -500,7 +507,6 @@ def advance(
     cars: np.ndarray,
     users: np.ndarray,
     accelerations: np.ndarray,
-    gaps: np.ndarray,
     dt: float,
     seed: int,
 ) -> None:
@@ -511,7 +517,6 @@ def advance(
         cars: (N,) records `VEHICLE`.
         users: (P + C, 2) small and large users of ways, see `Permits`.
         accelerations: (N,) [m/s^2].
-        gaps: (N,) distance to the next ahead [m].
         dt: the step [s].
         seed: seed of the drawn ways.
     """
@@ -519,11 +524,7 @@ def advance(
     for i in range(len(cars)):
         car = cars[i]
         v = max(0.0, car.v + accelerations[i] * dt)
-        step = 0.5 * (car.v + v) * dt
-        room = max(0.0, gaps[i] - _LEAST_GAP)
-        if step > room:
-            step, v = room, min(v, room / dt)
-        s = car.s + step
+        s = car.s + 0.5 * (car.v + v) * dt
         while True:
             piece = pieces[car.path[CURRENT]]
             left = piece.length - s

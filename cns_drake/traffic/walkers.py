@@ -42,8 +42,8 @@ _AHEAD = int(2.0 / SPACING)
 _TURN_RATE, _GOING = 2.5, 0.2
 # Distance of a waiting walker from the crossing [m].
 _AT_NODE = 1.0
-# Greatest speed of the return to a walkway [m/s].
-_BACK = 0.6
+# Greatest acceleration, in any direction [m/s^2].
+_STRONGEST = 2.5
 # A walker turns back after being blocked for this time [s].
 _PATIENCE = 4.0
 # Walkers that cross, for each one that goes straight on, if both are possible.
@@ -409,7 +409,9 @@ def _move(
 ) -> None:
     """Moves each walker as far as its way is free.
 
-    All begin apart, and no step makes two overlap.
+    A walker takes a step if it can stop thereafter on its path, and beside the
+    places where all others can stop. Otherwise it brakes: the place where it
+    stops is free since the step before.
 
     Args:
         paths: where they go.
@@ -419,43 +421,62 @@ def _move(
     """
     for i in range(len(walkers)):
         one = walkers[i]
-        vx = one.velocity[0] + force[i, 0] * dt
-        vy = one.velocity[1] + force[i, 1] * dt
-        speed, fastest = np.sqrt(vx * vx + vy * vy), _HURRY * one.speed
-        if speed > fastest:
-            vx *= fastest / speed
-            vy *= fastest / speed
-        x, y, yaw = one.xy[0], one.xy[1], one.yaw
-        if np.sqrt(vx * vx + vy * vy) > _GOING:
-            turn = (np.arctan2(vy, vx) - yaw + np.pi) % (2 * np.pi) - np.pi
-            yaw += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
-        new_x, new_y = _kept_on_path(
-            paths, one, x + vx * dt, y + vy * dt, _BACK * dt
-        )
-        if _is_free(walkers, i, new_x, new_y, yaw):
-            one.yaw = yaw
-        elif not _is_free(walkers, i, new_x, new_y, one.yaw):
-            # Try the lateral part of the step only, or stay.
-            c, s = np.cos(one.yaw), np.sin(one.yaw)
-            aside = (new_y - y) * c - (new_x - x) * s
-            new_x, new_y = x - aside * s, y + aside * c
-            if not _is_free(walkers, i, new_x, new_y, one.yaw):
-                new_x, new_y = x, y
+        x, y, vx, vy = one.xy[0], one.xy[1], one.velocity[0], one.velocity[1]
+        stop_x, stop_y = _stop(x, y, vx, vy)
+        off = _distance_off(paths, one, stop_x, stop_y)
+        change_x, change_y = force[i, 0] * dt, force[i, 1] * dt
+        for attempt in range(3):
+            if attempt == 1:
+                # Try the lateral part of the step only.
+                c, s = np.cos(one.yaw), np.sin(one.yaw)
+                aside, ahead = change_y * c - change_x * s, vx * c + vy * s
+                change_x = -aside * s - ahead * c
+                change_y = aside * c - ahead * s
+            elif attempt == 2:
+                change_x, change_y = -vx, -vy
+            part = np.sqrt(change_x * change_x + change_y * change_y)
+            part = min(1.0, _STRONGEST * dt / max(part, 1e-9))
+            new_vx, new_vy = vx + part * change_x, vy + part * change_y
+            speed = np.sqrt(new_vx * new_vx + new_vy * new_vy)
+            part = min(1.0, _HURRY * one.speed / max(speed, 1e-9))
+            new_vx, new_vy = part * new_vx, part * new_vy
+            new_x = x + 0.5 * (vx + new_vx) * dt
+            new_y = y + 0.5 * (vy + new_vy) * dt
+            stop_x, stop_y = _stop(new_x, new_y, new_vx, new_vy)
+            yaw = one.yaw
+            if speed > _GOING:
+                turn = np.arctan2(new_vy, new_vx) - yaw
+                turn = (turn + np.pi) % (2 * np.pi) - np.pi
+                yaw += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
+            if attempt < 2 and (
+                _distance_off(paths, one, stop_x, stop_y) > off + 1e-9
+            ):
+                continue
+            if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
+                one.yaw = yaw
+                break
+            yaw = one.yaw
+            if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
+                break
         one.xy[0], one.xy[1] = new_x, new_y
-        one.velocity[0], one.velocity[1] = (new_x - x) / dt, (new_y - y) / dt
+        one.velocity[0], one.velocity[1] = new_vx, new_vy
 
 
 @compiled
-def _kept_on_path(
-    paths: Paths, walker: Any, x: float, y: float, most: float
-) -> tuple[float, float]:
-    """Returns a walker's place moved back to its path, by at most some metres.
+def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
+    """Returns where a walker of some place and velocity stops if it brakes."""
+    time = np.sqrt(vx * vx + vy * vy) / (2.0 * _STRONGEST)
+    return x + vx * time, y + vy * time
+
+
+@compiled
+def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
+    """Returns the distance of a place from a walker's path [m].
 
     Args:
         paths: all of them.
         walker: its record.
         x, y: the place [m].
-        most: the greatest move [m].
     """
     path, points = paths.paths[walker.path], paths.points
     best, nearest = np.inf, 0
@@ -466,37 +487,46 @@ def _kept_on_path(
             best, nearest = distance, at
     row, half = path.first + nearest, path.half_width
     tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
-    dx, dy = points[row, 0] - x, points[row, 1] - y
-    along = -(dx * tx + dy * ty)
-    across = -(dx * ty + dy * -tx)
+    dx, dy = x - points[row, 0], y - points[row, 1]
+    along, across = dx * tx + dy * ty, dx * ty - dy * tx
+    beyond = max(abs(across) - half, 0.0)
     if nearest == path.num_points - 1:
-        along = min(along, half)
+        return np.hypot(beyond, max(along - half, 0.0))
     if nearest == 0:
-        along = max(along, -_AT_NODE - half)
-    across = min(max(across, -half), half)
-    dx = points[row, 0] + along * tx + across * ty - x
-    dy = points[row, 1] + along * ty + across * -tx - y
-    distance = np.sqrt(dx * dx + dy * dy)
-    if distance > most:
-        dx *= most / distance
-        dy *= most / distance
-    return x + dx, y + dy
+        return np.hypot(beyond, max(-_AT_NODE - half - along, 0.0))
+    return beyond
 
 
 @compiled
 def _is_free(
-    walkers: np.ndarray, i: int, x: float, y: float, yaw: float
+    walkers: np.ndarray,
+    i: int,
+    place: tuple[float, float],
+    stop: tuple[float, float],
+    yaw: float,
 ) -> bool:
-    """Returns whether the i-th walker's box would be free at a place."""
+    """Returns whether the i-th walker's box would be free, now and later.
+
+    Args:
+        walkers: all of them.
+        i: number of the walker.
+        place: where it would be [m].
+        stop: where it would be if it braked then [m].
+        yaw: its heading [rad].
+    """
     half = np.array([WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2])
-    reach = 4.0 * (half[0] ** 2 + half[1] ** 2)
-    a, b = np.array([x, y, yaw]), np.zeros(3)
+    a, b = np.array([0.0, 0.0, yaw]), np.zeros(3)
     for j in range(len(walkers)):
         other = walkers[j]
-        dx, dy = other.xy[0] - x, other.xy[1] - y
-        if j == i or dx * dx + dy * dy > reach:
+        x, y = other.xy[0], other.xy[1]
+        if j == i or (x - place[0]) ** 2 + (y - place[1]) ** 2 > _NEAR**2:
             continue
-        b[0], b[1], b[2] = other.xy[0], other.xy[1], other.yaw
+        b[2] = other.yaw
+        a[0], a[1], b[0], b[1] = place[0], place[1], x, y
+        if boxes_overlap(a, b, half, half):
+            return False
+        a[0], a[1] = stop
+        b[0], b[1] = _stop(x, y, other.velocity[0], other.velocity[1])
         if boxes_overlap(a, b, half, half):
             return False
     return True

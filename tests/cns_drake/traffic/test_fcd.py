@@ -3,12 +3,14 @@
 import re
 
 import numpy as np
+from pydrake.geometry import SceneGraph
 import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.streets import EgoBox
+from cns_drake.traffic.traffic_adding import make_traffic
 from cns_drake.traffic.walkers import gait_rate
 
 DT, RADIUS, RATE = 0.1, 30.0, 0.2
@@ -73,10 +75,10 @@ def write_trace(path, count=80, change=lambda text: text):
     return path
 
 
-def play(path, duration=7.0, ego=far_away, seed=1):
+def play(path, duration=7.0, ego=far_away, seed=1, end=7.0):
     return play_trace(
         read_fcd(path), path, GRAPH, [], seed=seed, duration=duration,
-        ego=ego, ego_box=EGO_BOX,
+        end=end, ego=ego, ego_box=EGO_BOX,
     )  # fmt: skip
 
 
@@ -90,7 +92,7 @@ def test_places_and_velocities(trace):
     assert plan.kinds[0].name == "bus"
     assert plan.kinds[1].semantic_class == "car"
     assert plan.left_out == 0
-    for t in (0.1, 0.1 + 1e-9, 1.234, 3.05, 5.5, 6.999):
+    for t in (0.0, 0.1 - 1e-9, 0.1, 1.234, 3.05, 5.5, 6.999, 7.9):
         (values, rates) = plan.vehicles.at(t)
         angle = RATE * t
         expected = RADIUS * np.array([np.cos(angle), np.sin(angle)])
@@ -152,6 +154,48 @@ def test_objects_that_would_meet_the_ego_car_are_left_out(trace):
     assert [kind.name for kind in plan.kinds] == ["bus"]
     assert plan.left_out == 1
     assert plan.walkers.values.shape[1] == 1
+
+
+def test_what_meets_the_ego_car_after_its_drive_stays(trace):
+    def ego(times):
+        return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
+
+    # The traced car is there from 2 s on, and at the ego car after 3 s.
+    assert play(trace, ego=ego, duration=2.5, end=2.5).left_out == 0
+    assert play(trace, ego=ego, duration=2.5, end=3.5).left_out == 1
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_a_constant_speed_is_constant_from_first_to_last(tmp_path, dt):
+    """A car at 10 m/s on a straight lane."""
+    rows = [
+        f'<timestep time="{k * dt:.2f}"><vehicle id="c" '
+        f'x="{10 * k * dt - 20:g}" y="30" angle="90"/></timestep>'
+        for k in range(5)
+    ]
+    path = tmp_path / "straight.xml"
+    path.write_text(f"<fcd-export>{''.join(rows)}</fcd-export>")
+    plan = play(path, duration=4 * dt, end=0.0)
+    half = plan.kinds[0].size[0] / 2
+    for t in np.append(np.linspace(0.0, 4 * dt, 37), 4 * dt + 0.05):
+        (place,), (rate,) = plan.vehicles.at(t)
+        x = 10 * t - 20 - half
+        np.testing.assert_allclose(place[:2], [x, 30], atol=1e-9)
+        np.testing.assert_allclose(rate[:2], [10.0, 0.0], atol=1e-9)
+
+
+def test_a_lidar_that_turns_sees_bodies_come_and_go_in_motion(trace):
+    """The traced car is there from 2 s to 4 s, at 7 m/s."""
+    plan = play(trace)
+    traffic = make_traffic(SceneGraph(), plan, turn=0.05)
+    context = traffic.CreateDefaultContext()
+    port = traffic.GetOutputPort("body_spatial_velocities")
+    for t in (2.001, 3.0, 3.97, 3.999):
+        context.SetTime(t)
+        velocity = port.Eval(context)[1].translational()
+        np.testing.assert_allclose(velocity[:2], [0, 7], atol=1e-6)
+        # Heights are means of the lane's points.
+        assert abs(velocity[2]) < 0.5
 
 
 def fault(path, **options):

@@ -33,11 +33,29 @@ def test_goes_through_its_values_smoothly(tracks):
         )
 
 
-def test_rests_before_and_after(tracks):
-    for t, row in ((-1.0, 0), (99.0, -1)):
+def test_goes_straight_on_before_and_after(tracks):
+    for t, end in ((-1.3, 0.0), (3.2, 1.9)):
+        (value, rate), (expected, speed) = tracks.at(t), tracks.at(end)
+        np.testing.assert_allclose(rate, speed)
+        np.testing.assert_allclose(value, expected + (t - end) * speed)
+
+
+@pytest.mark.parametrize("absent", [0, 3])
+def test_constant_acceleration_is_exact_from_first_to_last(absent):
+    """Also where a body comes later and goes earlier than others."""
+
+    def place(t):
+        return 7.0 + 10.0 * t - 1.5 * t**2
+
+    values = place(np.arange(12.0))[:, None, None]
+    present = np.ones((12, 1), bool)
+    present[:absent] = present[12 - absent :] = False
+    values[~present] = 1e6
+    tracks = Tracks(1.0, values, present)
+    for t in np.linspace(absent, 10.99 - absent, 45):
         value, rate = tracks.at(t)
-        np.testing.assert_allclose(value, tracks.values[row])
-        assert not rate.any()
+        assert value == pytest.approx(place(t))
+        assert rate == pytest.approx(10.0 - 3.0 * t)
 
 
 def test_objects_that_come_and_go():
