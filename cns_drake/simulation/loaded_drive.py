@@ -30,7 +30,7 @@ from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
-from cns_drake.traffic.lane_graph import LaneGraph, Walkway
+from cns_drake.traffic.lane_graph import LaneGraph, Walkway, kept_clear
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_adding import traffic_structures
@@ -38,6 +38,10 @@ from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.transient.changing import change_world
+from cns_drake.transient.world_structures import (
+    GROUND_CLASSES,
+    read_structures,
+)
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
@@ -125,7 +129,7 @@ def load_stage_and_traffic(
     world = load_stage(scenario, trajectory=trajectory)
     if scenario.traffic.is_off:
         return world, None
-    traffic = plan_scenario_traffic(scenario, trajectory)
+    traffic = plan_scenario_traffic(scenario, trajectory, world)
     return with_traffic(world, traffic), traffic
 
 
@@ -184,13 +188,14 @@ def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
 
 
 def plan_scenario_traffic(
-    scenario: Scenario, trajectory: Trajectory
+    scenario: Scenario, trajectory: Trajectory, world: World | None = None
 ) -> TrafficPlan:
     """Plans the traffic of a scenario.
 
     Args:
         scenario: with traffic.
         trajectory: motion of its vehicle.
+        world: its stage, if already loaded; not yet a part of a diagram.
 
     Raises:
         InputError: the map has no roads or sidewalks, or no room for that many;
@@ -226,6 +231,11 @@ def plan_scenario_traffic(
             ego_box=EGO_BOX,
         )
     _check_room(wanted, where, graph, walkways)
+    if wanted.walkers:
+        world = world or load_stage(
+            scenario, with_vehicle=False, trajectory=trajectory
+        )
+        walkways = kept_clear(walkways, _things(world))
     plan = plan_traffic(
         graph,
         walkways,
@@ -240,6 +250,19 @@ def plan_scenario_traffic(
     if wanted.vehicles and not plan.kinds:
         raise InputError(f"{where}: the car leaves no room for vehicles")
     return plan
+
+
+def _things(world: World) -> list[BaseGeometry]:
+    """Returns what stands on sidewalks, seen from above [m].
+
+    Walkways lead along buildings, which need no regard.
+    """
+    passed = GROUND_CLASSES | {"building"}
+    return [
+        thing.footprint
+        for thing in read_structures(world).values()
+        if thing.semantic_class not in passed
+    ]
 
 
 def load_ways(folder: MapFolder) -> LaneFile:

@@ -98,7 +98,7 @@ def make_station(
     trajectory = trajectory or plan_drive(scenario)
     world = world or load_stage(scenario, trajectory=trajectory)
     if traffic is None and not scenario.traffic.is_off:
-        traffic = plan_scenario_traffic(scenario, trajectory)
+        traffic = plan_scenario_traffic(scenario, trajectory, world)
         world = with_traffic(world, traffic)
     plant = world.plant
     base = plant.GetBodyByName("base_link", world.vehicle)

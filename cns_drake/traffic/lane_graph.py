@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+import shapely
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 # Distance of the points of a piece at most [m].
 SPACING = 0.5
+# Walkers' middles keep this distance from things beside them [m].
+_BESIDE = 0.36
+# Number of places across a walkway, and least number of points along it.
+_ACROSS, _ALONG = 21, 4
+# Walkers step aside by this number of places from point to point.
+_ASIDE = 2
 
 
 @dataclass(frozen=True)
@@ -75,6 +84,8 @@ class Walkway:
         half_width: greatest distance of a walker from the middle [m].
         start, end: numbers of the places at its ends.
         crossing: number of the crossing that it leads over, -1 for none.
+        free: (N, 2) least and greatest offset to the right that things leave
+            free at each point [m]; None if that is the half width either way.
     """
 
     points: np.ndarray
@@ -82,6 +93,89 @@ class Walkway:
     start: int
     end: int
     crossing: int = -1
+    free: np.ndarray | None = None
+
+    @property
+    def limits(self) -> np.ndarray:
+        """The (N, 2) least and greatest offset to the right [m]."""
+        if self.free is not None:
+            return self.free
+        return np.tile(
+            self.half_width * np.array([-1, 1]), (len(self.points), 1)
+        )
+
+
+def kept_clear(
+    walkways: Sequence[Walkway], things: Sequence[BaseGeometry]
+) -> list[Walkway]:
+    """Returns walkways that pass things, and end where these bar the way.
+
+    Args:
+        walkways: without regard to things.
+        things: what stands there, seen from above [m].
+
+    Returns:
+        The rest of them; no crossing without a walkway at both ends.
+    """
+    tree, found = shapely.STRtree(things), []
+    num_nodes = 1 + max(
+        (max(way.start, way.end) for way in walkways), default=0
+    )
+    for way in walkways:
+        points = way.points[:, :2]
+        right = np.gradient(points, axis=0) @ [(0.0, -1.0), (1.0, 0.0)]
+        right /= np.linalg.norm(right, axis=1)[:, None]
+        across = np.linspace(-way.half_width, way.half_width, _ACROSS)
+        places = points[:, None] + across[:, None] * right[:, None]
+        near = tree.query(shapely.points(places).ravel(), "dwithin", _BESIDE)[0]
+        barred = np.zeros(places.shape[:2], int)
+        barred.flat[near] = 1
+        # A walker is longer than wide, and needs a way to step aside.
+        barred = maximum_filter1d(barred, 3, axis=0)
+        for step in (1, -1):
+            line = barred[::step]
+            for row, before in zip(line[1:], line, strict=False):
+                row |= minimum_filter1d(
+                    before, 2 * _ASIDE + 1, mode="constant", cval=1
+                )
+        free = np.pad(1 - barred, ((0, 0), (1, 1)))
+        limits = np.full((len(points), 2), np.nan)
+        last = np.array([0, _ACROSS])
+        for row, edges in enumerate(np.diff(free)):
+            gaps = np.flatnonzero(edges).reshape(-1, 2)
+            shared = np.minimum(gaps, last)[:, 1] - np.maximum(gaps, last)[:, 0]
+            gaps = gaps[shared > 1]
+            if len(gaps):
+                last = max(gaps, key=np.ptp)
+                limits[row] = across[last - (0, 1)]
+            else:
+                last = np.array([0, _ACROSS])
+        bars = np.flatnonzero(np.isnan(limits[:, 0]))
+        if way.crossing >= 0 and len(bars):
+            continue
+        for before, after in pairwise([-1, *bars.tolist(), len(points)]):
+            rows, ends = slice(before + 1, after), [way.start, way.end]
+            if after - before <= _ALONG:
+                continue
+            for k, is_cut in enumerate((before >= 0, after < len(points))):
+                if is_cut:
+                    ends[k], num_nodes = num_nodes, num_nodes + 1
+            found.append(
+                replace(
+                    way,
+                    points=way.points[rows],
+                    start=ends[0],
+                    end=ends[1],
+                    free=limits[rows],
+                )
+            )
+    # Nobody crosses to where there is no walkway.
+    reached = {n for w in found if w.crossing < 0 for n in (w.start, w.end)}
+    return [
+        way
+        for way in found
+        if way.crossing < 0 or {way.start, way.end} <= reached
+    ]
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,6 @@ _PATH = np.dtype(
     [
         ("first", int),  # Row of its first point.
         ("num_points", int),
-        ("half_width", float),  # [m]
         ("crossing", int),  # Number of the crossing, -1 for none.
         ("node", int),  # The place where it ends.
     ]
@@ -88,11 +87,13 @@ class Paths(NamedTuple):
         points: (M, 3) in walking direction [m].
         tangents: (M, 2) unit vectors from each point to the next; that of the
             last point of a path is the one before.
+        limits: (M, 2) least and greatest offset to the right [m].
     """
 
     paths: np.ndarray
     points: np.ndarray
     tangents: np.ndarray
+    limits: np.ndarray
 
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
@@ -175,7 +176,7 @@ class Crowd:
         is_stuck = (speed < _GOING) & ~is_waiting
         walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + dt, 0.0)
         paths = self._paths.paths[walkers["path"]]
-        back = (walkers["stuck"] > _PATIENCE) & (paths["crossing"] < 0)
+        back = walkers["stuck"] > _PATIENCE
         walkers["stuck"][back] = 0.0
         walkers["path"][back] ^= 1
         at = paths["num_points"] - 2 - walkers["at"]
@@ -184,7 +185,7 @@ class Crowd:
 
     def _follow_paths(self) -> np.ndarray:
         """Notes the points that walkers pass; returns who is near the end."""
-        walkers, (_, points, tangents) = self.walkers, self._paths
+        walkers, (_, points, tangents, _) = self.walkers, self._paths
         paths = self._paths.paths[walkers["path"]]
 
         def ahead(rows: np.ndarray) -> np.ndarray:
@@ -264,7 +265,7 @@ class Crowd:
         Returns:
             (..., 5): x, y, z on the ground [m], yaw, phase of the gait [rad].
         """
-        paths, points, _ = self._paths
+        paths, points, *_ = self._paths
         path = paths[walkers["path"]]
         row = path["first"] + np.minimum(walkers["at"], path["num_points"] - 2)
         here = points[row]
@@ -285,18 +286,19 @@ def _make_paths(walkways: Sequence[Walkway]) -> Paths:
     count = np.repeat([len(way.points) for way in walkways], 2)
     paths["num_points"] = count
     paths["first"] = np.cumsum(count) - count
-    paths["half_width"] = np.repeat([way.half_width for way in walkways], 2)
     paths["crossing"] = np.repeat([way.crossing for way in walkways], 2)
     paths["node"] = [node for way in walkways for node in (way.end, way.start)]
     points, tangents = [np.zeros((0, 3))], [np.zeros((0, 2))]
+    limits = [np.zeros((0, 2))]
     for way in walkways:
+        limits += [way.limits, -way.limits[::-1, ::-1]]
         for line in (way.points, way.points[::-1]):
             x, y = np.diff(line[:, :2], axis=0).T
             length = np.sqrt(x * x + y * y)
             along = np.column_stack([x / length, y / length])
             points.append(line)
             tangents += [along, along[-1:]]
-    return Paths(paths, np.concatenate(points), np.concatenate(tangents))
+    return Paths(paths, *map(np.concatenate, (points, tangents, limits)))
 
 
 def _place_walkers(
@@ -313,10 +315,12 @@ def _place_walkers(
             forward = bool(rng.integers(2))
             at = int(rng.integers(len(points) - 1))
             line = points if forward else points[::-1]
-            tangent = (line[at + 1] - line[at])[:2]
-            xy = line[at, :2]
+            x, y = (line[at + 1] - line[at])[:2]
+            aside = walkways[way].limits[:: 1 if forward else -1][at].mean()
+            aside = (aside if forward else -aside) / np.hypot(x, y)
+            xy = line[at, :2] + aside * np.array([y, -x])
             if all(np.hypot(*(xy - row[2])) > 1.5 * _APART for row in rows):
-                yaw = float(np.arctan2(tangent[1], tangent[0]))
+                yaw = float(np.arctan2(y, x))
                 rows.append((2 * way + 1 - forward, at, xy, yaw))
                 break
     walkers = np.zeros(len(rows), _WALKER)
@@ -349,12 +353,14 @@ def _forces(
     force = np.zeros((len(walkers), 2))
     for i in range(len(walkers)):
         one, path = walkers[i], paths.paths[walkers[i].path]
-        here, half = path.first + one.at, path.half_width
+        here = path.first + one.at
+        low, high = paths.limits[here]
         right = (paths.tangents[here, 1], -paths.tangents[here, 0])
         wanted_x = wanted_y = 0.0
         if not is_waiting[i]:
             target = path.first + min(one.at + _AHEAD, path.num_points - 1)
-            aside = one.aside * half
+            left, most = paths.limits[target]
+            aside = 0.5 * (left + most + one.aside * (most - left))
             x = paths.points[target, 0] + aside * right[0] - one.xy[0]
             y = paths.points[target, 1] + aside * right[1] - one.xy[1]
             distance = max(np.sqrt(x * x + y * y), 1e-6)
@@ -367,7 +373,7 @@ def _forces(
             + (paths.points[here, 1] - one.xy[1]) * right[1]
         )
         for side in (-1.0, 1.0):
-            room = half - side * across
+            room = high - across if side > 0.0 else across - low
             push = side * _EDGE_STRENGTH * np.exp(-max(room, 0.0) / _EDGE_REACH)
             force[i, 0] -= push * right[0]
             force[i, 1] -= push * right[1]
@@ -422,16 +428,17 @@ def _move(
     for i in range(len(walkers)):
         one = walkers[i]
         x, y, vx, vy = one.xy[0], one.xy[1], one.velocity[0], one.velocity[1]
-        stop_x, stop_y = _stop(x, y, vx, vy)
-        off = _distance_off(paths, one, stop_x, stop_y)
+        rest_x, rest_y = _stop(x, y, vx, vy)
+        off = _distance_off(paths, one, rest_x, rest_y)
         change_x, change_y = force[i, 0] * dt, force[i, 1] * dt
         for attempt in range(3):
             if attempt == 1:
-                # Try the lateral part of the step only.
+                # Try the lateral part of the step only, and a little back.
                 c, s = np.cos(one.yaw), np.sin(one.yaw)
-                aside, ahead = change_y * c - change_x * s, vx * c + vy * s
-                change_x = -aside * s - ahead * c
-                change_y = aside * c - ahead * s
+                aside = change_y * c - change_x * s
+                back = vx * c + vy * s + 0.5 * abs(aside)
+                change_x = -aside * s - back * c
+                change_y = aside * c - back * s
             elif attempt == 2:
                 change_x, change_y = -vx, -vy
             part = np.sqrt(change_x * change_x + change_y * change_y)
@@ -442,6 +449,8 @@ def _move(
             new_vx, new_vy = part * new_vx, part * new_vy
             new_x = x + 0.5 * (vx + new_vx) * dt
             new_y = y + 0.5 * (vy + new_vy) * dt
+            if attempt == 2 and speed == 0.0:
+                new_x, new_y = rest_x, rest_y
             stop_x, stop_y = _stop(new_x, new_y, new_vx, new_vy)
             yaw = one.yaw
             if speed > _GOING:
@@ -485,11 +494,13 @@ def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
         distance = dx * dx + dy * dy
         if distance < best:
             best, nearest = distance, at
-    row, half = path.first + nearest, path.half_width
+    row = path.first + nearest
+    low, high = paths.limits[row]
     tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
     dx, dy = x - points[row, 0], y - points[row, 1]
     along, across = dx * tx + dy * ty, dx * ty - dy * tx
-    beyond = max(abs(across) - half, 0.0)
+    beyond = max(across - high, low - across, 0.0)
+    half = 0.5 * (high - low)
     if nearest == path.num_points - 1:
         return np.hypot(beyond, max(along - half, 0.0))
     if nearest == 0:
