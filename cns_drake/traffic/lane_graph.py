@@ -135,6 +135,8 @@ def kept_clear(
         for step in (1, -1):
             line = barred[::step]
             for row, before in zip(line[1:], line, strict=False):
+                if before.all():
+                    continue
                 row |= minimum_filter1d(
                     before, 2 * _ASIDE + 1, mode="constant", cval=1
                 )
