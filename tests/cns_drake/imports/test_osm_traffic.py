@@ -284,7 +284,7 @@ def test_nobody_meets_anybody(blocks):
         return np.column_stack([x, np.full(len(x), -71.7)]), np.zeros(len(x))
 
     plan = plan_traffic(
-        graph, walkways, vehicles=12, walkers=12, seed=3, duration=120.0,
+        graph, walkways, vehicles=12, walkers=12, seed=4, duration=120.0,
         ego=ego, ego_box=EGO_BOX,
     )  # fmt: skip
     assert len(plan.kinds) == plan.walkers.values.shape[1] == 12
