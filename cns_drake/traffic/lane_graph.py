@@ -171,7 +171,7 @@ def kept_clear(
                     free=limits[rows],
                 )
             )
-    # Nobody crosses to where there is no walkway.
+    # No crossing leads to where there is no walkway.
     reached = {n for w in found if w.crossing < 0 for n in (w.start, w.end)}
     return [
         way
