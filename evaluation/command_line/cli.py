@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -34,11 +34,11 @@ from evaluation.command_line.options import (
     overlap_of,
     with_protocol,
 )
+from evaluation.command_line.trajectories import drives, trajectory
 from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
-    from evaluation.drives.comparison import DriveComparison
     from evaluation.methods.method import Method
     from evaluation.recognition.place_recognition import PlaceRecognition
     from evaluation.recognition.resampling import Interval
@@ -104,37 +104,7 @@ def tcr(
         terminal.print_rows(_change_rows(report))
 
 
-@app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))
-def drives(
-    first: Annotated[Path, typer.Argument(metavar="A")],
-    second: Annotated[Path, typer.Argument(metavar="B")],
-    align: Align = AlignName.AUTO,
-    lidar: LidarName = None,
-    json: Json = False,
-) -> None:
-    """How the ways of two drives differ, beside real pairs.
-
-    Offsets, lanes, headings, heights and stops of B at a stop of A every 5 m,
-    beside those of two pairs of real drives along one route (Boreas, 28 days
-    apart; KAIST 01 and 02 of MulRan).
-    """
-    from evaluation.alignment import in_one_world
-    from evaluation.drives import open_drive
-    from evaluation.drives.comparison import compare_drives
-
-    a, b = (open_drive(path, lidar) for path in (first, second))
-    for drive in (a, b):
-        for note in drive.notes:
-            terminal.note(note)
-    alignment = in_one_world(a, b, align.value, terminal.track)
-    if alignment is not None:
-        a, b = alignment.first, alignment.second
-        terminal.note(alignment.report.to_text())
-    found = compare_drives(a, b)
-    if json:
-        terminal.print_json(found.to_json())
-    else:
-        terminal.print_rows(_drive_rows(found))
+app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(drives)
 
 
 @app.command(
@@ -431,55 +401,12 @@ def ranking(
     )
 
 
-@app.command(
+app.command(
     epilog=example(
         "cns-eval trajectory drives/metropolis_04 \\",
         "    results/latest/metropolis_04_poses_tum.txt",
     )
-)
-def trajectory(
-    drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
-    estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE.tum")],
-    frame: Annotated[
-        Literal["lidar", "base_link"],
-        typer.Option(
-            help="Frame whose poses are estimated: the LiDAR's or the "
-            "vehicle's."
-        ),
-    ] = "lidar",
-    time_offset: Annotated[
-        float,
-        typer.Option(
-            metavar="S", help="Time to add to that of the estimate [s]."
-        ),
-    ] = 0.0,
-    lidar: LidarName = None,
-    json: Json = False,
-) -> None:
-    """Errors of an estimated trajectory, as evo and KITTI define them.
-
-    The estimate is a TUM file: seconds, x y z, and a quaternion x y z w. Prints
-    ATE, the root mean square of its distances from DRIVE after rigid alignment,
-    and drift, the error of its motion over 100 m of path.
-    """
-    from evaluation.alignment.trajectory_errors import trajectory_errors
-    from evaluation.drives import open_drive
-    from evaluation.drives.text_tables import read_tum
-
-    truth = open_drive(drive, lidar)
-    for note in truth.notes:
-        terminal.note(note)
-    errors = trajectory_errors(truth, read_tum(estimate), frame, time_offset)
-    if errors.num_outside:
-        terminal.note(
-            f"{estimate}: {errors.num_outside} poses before or after the drive,"
-            " left out"
-        )
-    if json:
-        named = {"drive": truth.name, "frame": frame}
-        terminal.print_json(named | errors.to_json())
-    else:
-        terminal.print_rows(errors.to_rows())
+)(trajectory)
 
 
 def main() -> None:
@@ -499,61 +426,6 @@ def _chosen_method(
     if name.endswith(".py"):
         name = load_method(Path(name)).name
     return make_method(name, parameters)
-
-
-def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:
-    """Yields the rows of `drives`: the pair, then Boreas, then KAIST."""
-
-    def row(value: float | str, boreas: str = "", kaist: str = "") -> str:
-        if isinstance(value, float):
-            value = "-" if isnan(value) else f"{value:.2f}"
-        return f"{value:>12}{boreas:>14}{kaist:>14}".rstrip()
-
-    yield "", row("these", "Boreas", "KAIST")
-    yield (
-        "stops that meet the other drive",
-        row(
-            f"{found.num_met} of {found.num_stops}",
-            "1593 of 1593",
-            "1166 of 1194",
-        ),
-    )
-    yield (
-        "  in the opposite direction only",
-        row(found.reverse, "0", ".15 to .20"),
-    )
-    yield "offset, 50 % [m]", row(found.offset_50, ".33", ".37")
-    yield "  75 %", row(found.offset_75, ".64", "1.11")
-    yield "  90 %", row(found.offset_90, "1.53", "2.44")
-    yield "  95 %", row(found.offset_95, "2.82", "2.83")
-    yield "  99 %", row(found.offset_99, "3.48", "3.14")
-    yield "in another lane", row(found.other_lane, ".10", ".17")
-    yield "  for, 50 % [m]", row(found.episode_50, "15 to 20", "65 to 80")
-    yield "  90 %", row(found.episode_90, "43", "200 to 270")
-    yield "spread within the lane [m]", row(found.wander, ".49", ".55")
-    yield "  correlated over [m]", row(found.wander_length, "45", "50 to 55")
-    yield "heading, spread [deg]", row(found.heading_spread_deg, "1.6", "1.6")
-    yield "  5 %", row(found.heading_5_deg, "-2.5", "-2.6")
-    yield "  95 %", row(found.heading_95_deg, "2.5", "2.8")
-    yield "height, 5 % [m]", row(found.height_5, "-.07", "-.2")
-    yield "  95 %", row(found.height_95, ".04", ".2")
-    yield (
-        "opposite direction, 25 % [m]",
-        row(found.reverse_25, "", "1.1 to 3.0"),
-    )
-    yield "  50 %", row(found.reverse_50, "", "2.7 to 5.9")
-    yield "  75 %", row(found.reverse_75, "", "3.3 to 6.6")
-    yield "  95 %", row(found.reverse_95, "", "3.7 to 9.3")
-    for drive, standing, fast in (
-        (found.first, ".22", "13"),
-        (found.second, ".13", "14"),
-    ):
-        yield f"{drive.name}: standing", row(drive.standing, standing)
-        yield "  moving, 10 % [m/s]", row(drive.speed_10, "2.9")
-        yield "  50 %", row(drive.speed_50, "9.1")
-        yield "  90 %", row(drive.speed_90, fast)
-        yield "  roll, spread [deg]", row(drive.roll_spread_deg, ".9")
-        yield "  pitch, spread [deg]", row(drive.pitch_spread_deg, ".9")
 
 
 def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
