@@ -7,16 +7,18 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 import shapely
 
+from cns_drake.city.geometry.upper_sides import (
+    from_above,
+    turned_up,
+    unit_normals,
+)
 from cns_drake.transient.scene_editing import Look, SceneEditing, Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
     GroundSurface,
     StructurePart,
     draws,
-    faced_up,
-    from_above,
     triangle_corners,
-    upwardness,
 )
 
 CAUSE = "snow"
@@ -77,8 +79,8 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
 
 def _is_below_road(part: StructurePart, ground: GroundSurface) -> bool:
     """Returns whether ground continues below a carriageway."""
-    corners = faced_up(triangle_corners(part))
-    corners = corners[upwardness(corners) > 0.0]
+    corners = turned_up(triangle_corners(part))
+    corners = corners[unit_normals(corners)[:, 2] > 0.0]
     inner = ground.carriageway.buffer(-0.5)
     if inner.is_empty or len(corners) == 0:
         return False
@@ -100,8 +102,8 @@ def _cover(
     """
     corners = triangle_corners(part)
     if is_ground:
-        corners = faced_up(corners)
-    corners = corners[upwardness(corners) > _LEAST_UP]
+        corners = turned_up(corners)
+    corners = corners[unit_normals(corners)[:, 2] > _LEAST_UP]
     if is_ground:
         corners = _beside(corners, ground)
     if len(corners) == 0:
@@ -220,7 +222,7 @@ def _lay_banks(
             meshes += [np.stack([a, d, c], 1), np.stack([a, c, b], 1)]
     if meshes:
         corners = np.concatenate(meshes)
-        if np.median(upwardness(corners)) < 0.0:
+        if np.median(unit_normals(corners)[:, 2]) < 0.0:
             corners = corners[:, ::-1]
         around.editing.add_mesh(
             "snow_banks", "terrain", *_merged(corners), _LOOK, CAUSE

@@ -17,6 +17,12 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from cns_drake.city.geometry.polygons import polygons_of
+from cns_drake.city.geometry.upper_sides import (
+    UpperSides,
+    from_above,
+    turned_up,
+    unit_normals,
+)
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
@@ -261,41 +267,36 @@ class GroundSurface:
                     corners.append(found)
                     road = thing.semantic_class == "road"
                     is_road.append(np.full(len(found), road))
-        self._corners = np.concatenate(corners)
-        self._is_road = np.concatenate(is_road)
-        self._tree = shapely.STRtree(from_above(self._corners))
+        triangles, of_road = np.concatenate(corners), np.concatenate(is_road)
+        self._roads = triangles[of_road]
+        self._sides = {k: UpperSides(triangles[of_road == k]) for k in (0, 1)}
 
     def _upward(self, part: StructurePart) -> np.ndarray:
-        corners = faced_up(triangle_corners(part))
+        corners = turned_up(triangle_corners(part))
         middles = corners[:, :, :2].mean(axis=1)
         return corners[
-            (upwardness(corners) > _LEAST_UP)
+            (unit_normals(corners)[:, 2] > _LEAST_UP)
             & shapely.contains_xy(self.near, middles)
         ]
 
     @cached_property
     def carriageway(self) -> BaseGeometry:
         """The area of class `road`, seen from above [m]."""
-        roads = from_above(self._corners[self._is_road])
-        joined = shapely.unary_union(roads, grid_size=0.001)
+        joined = shapely.unary_union(from_above(self._roads), grid_size=0.001)
         return joined.buffer(_SEAM).buffer(-_SEAM)
 
-    def heights(self, xy: np.ndarray, *, of_road: bool) -> np.ndarray:
+    def heights(
+        self, xy: np.ndarray, *, of_road: bool | None = None
+    ) -> np.ndarray:
         """Returns the height of the ground at places; NaN without ground.
 
         Args:
             xy: (N, 2) places [m].
-            of_road: whether of carriageways, or of all other ground.
+            of_road: whether of carriageways, or of all other ground; None: of
+                whichever is higher.
         """
-        place, index = self._tree.query(shapely.points(xy), "intersects")
-        right = self._is_road[index] == of_road
-        place, index = place[right], index[right]
-        a, b, c = np.moveaxis(self._corners[index], 1, 0)
-        normals = np.cross(b - a, c - a)
-        offset = xy[place] - a[:, :2]
-        z = a[:, 2] - (normals[:, :2] * offset).sum(axis=1) / normals[:, 2]
-        found = np.full(len(xy), -np.inf)
-        np.maximum.at(found, place, z)
+        kinds = (False, True) if of_road is None else (of_road,)
+        found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)
         return np.where(np.isfinite(found), found, np.nan)
 
     def kerbs(self, spacing: float) -> Iterator[Kerb]:
@@ -342,25 +343,6 @@ def triangle_corners(part: StructurePart) -> np.ndarray:
     if not isinstance(surface, TriangleSurface):
         return np.zeros((0, 3, 3))
     return part.p_WPs[surface.triangles]
-
-
-def faced_up(corners: np.ndarray) -> np.ndarray:
-    """Returns triangles of ground, with either winding in the file."""
-    down = upwardness(corners) < 0.0
-    return np.where(down[:, None, None], corners[:, ::-1], corners)
-
-
-def from_above(corners: np.ndarray) -> np.ndarray:
-    """Returns the (M,) polygons of triangles (M, 3, 3) seen from above."""
-    return np.asarray(shapely.polygons(corners[:, :, :2]), object)
-
-
-def upwardness(corners: np.ndarray) -> np.ndarray:
-    """Returns the z of the normals of triangles (M, 3, 3); 0 of slivers."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1)
-    return normals[:, 2] / np.where(lengths > 0.0, lengths, np.inf)
 
 
 def draws(seed: int, cause: str, name: str) -> np.random.Generator:

@@ -15,6 +15,11 @@ from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
+from cns_drake.city.geometry.upper_sides import (
+    UpperSides,
+    looks_up,
+    turned_up,
+)
 from cns_drake.imports.dressing.facade_pieces import (
     FacadePlan,
     Faces,
@@ -28,12 +33,9 @@ from cns_drake.imports.dressing.facade_pieces import (
 from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.wall_panels import (
     Panel,
-    UpperSides,
     find_panels,
     is_upright,
     joined,
-    looks_up,
-    turned_up,
 )
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported, Street, random_generator

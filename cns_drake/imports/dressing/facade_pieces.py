@@ -19,16 +19,18 @@ from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import Model
+from cns_drake.city.geometry.upper_sides import (
+    UpperSides,
+    long_normals,
+    unit_normals,
+)
 from cns_drake.imports.dressing.styles import Style, Use
 from cns_drake.imports.dressing.wall_panels import (
     Openings,
     Panel,
-    UpperSides,
     boxes_on,
     framed,
-    long_normals,
     open_wall,
-    unit_normals,
 )
 
 # Between the end of a wall and its first window [m].

@@ -1,6 +1,6 @@
 """Plane walls of imported buildings, and openings and boxes on them.
 
-Walls are found in the triangles of a file; so are the upper sides of solids.
+Walls are found in the triangles of a file.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 import shapely
-from shapely import STRtree
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.polygons import triangulate
+from cns_drake.city.geometry.upper_sides import long_normals, unit_normals
 
 # A face is upright if the z of its unit normal is below this.
 _UPRIGHT = 0.02
@@ -88,29 +88,6 @@ class Panel:
 def joined(some: Iterable[np.ndarray]) -> np.ndarray:
     """Returns all triangles (M, 3, 3) of any number of arrays."""
     return np.concatenate([np.zeros((0, 3, 3)), *some])
-
-
-def long_normals(triangles: np.ndarray) -> np.ndarray:
-    """Returns normals (M, 3) twice as long as the areas of triangles [m^2].
-
-    As `np.cross`, which takes far longer for the few triangles of a wall.
-
-    Args:
-        triangles: (M, 3, 3) [m].
-    """
-    u = triangles[:, 1] - triangles[:, 0]
-    v = triangles[:, 2] - triangles[:, 0]
-    normal = np.empty(u.shape)
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        normal[:, k] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
-    return normal
-
-
-def unit_normals(triangles: np.ndarray) -> np.ndarray:
-    """Returns the unit normals (M, 3) of triangles (M, 3, 3), or zeros."""
-    normal = long_normals(triangles)
-    size = np.linalg.norm(normal, axis=1, keepdims=True)
-    return normal / np.where(size > 1e-9, size, np.inf)
 
 
 def is_upright(triangles: np.ndarray) -> np.ndarray:
@@ -270,51 +247,6 @@ def _panel(
     return Panel(
         building, origin, along, length, height, outline, triangles, is_plane
     )
-
-
-# The z of a unit normal is greater than this on faces that look upwards.
-_UPWARDS = 0.05
-
-
-def looks_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns which of the triangles (M, 3, 3) look upwards."""
-    return np.asarray(unit_normals(triangles)[:, 2] > _UPWARDS)
-
-
-def turned_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3) with those that look downwards reversed."""
-    is_down = unit_normals(triangles)[:, 2] < 0.0
-    return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
-
-
-class UpperSides:
-    """The upper sides of solids, with their height at any place."""
-
-    def __init__(self, triangles: np.ndarray):
-        """Collects the upper sides.
-
-        Args:
-            triangles: (M, 3, 3) of solids; those that do not look upwards are
-                left out [m].
-        """
-        self._triangles = triangles[looks_up(triangles)]
-        self._normals = unit_normals(self._triangles)
-        rings = self._triangles[:, [0, 1, 2, 0], :2]
-        self._tree = STRtree(np.asarray(shapely.polygons(rings)))
-
-    def heights(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the greatest height (N,) at places (N, 2), or -inf [m]."""
-        highest = np.full(len(xy), -np.inf)
-        place, triangle = self._tree.query(shapely.points(xy), "intersects")
-        corner = self._triangles[triangle, 0]
-        normal = self._normals[triangle]
-        aside = ((xy[place] - corner[:, :2]) * normal[:, :2]).sum(axis=1)
-        np.maximum.at(highest, place, corner[:, 2] - aside / normal[:, 2])
-        return highest
-
-    def hides(self, points: np.ndarray) -> np.ndarray:
-        """Returns which of the points (N, 3) are below an upper side."""
-        return np.asarray(self.heights(points[:, :2]) > points[:, 2])
 
 
 # Distance of openings from the edge of a panel that is no rectangle, and width

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from cns_drake.city.geometry.structures import part_triangles
+from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.imports.dressing.dressed_city import plan_buildings
-from cns_drake.imports.dressing.wall_panels import UpperSides, turned_up
 from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.ground import ground_of

@@ -6,6 +6,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 import shapely
 
+from cns_drake.city.geometry.upper_sides import turned_up, unit_normals
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
@@ -13,9 +14,7 @@ from cns_drake.simulation.scanning import scan_world
 from cns_drake.transient.changing import change_world
 from cns_drake.transient.world_structures import (
     GroundSurface,
-    faced_up,
     read_structures,
-    upwardness,
 )
 
 X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
@@ -160,9 +159,11 @@ def test_kerbs_and_heights_of_a_plane_road(changed):
 def test_ground_is_ground_whichever_way_round_it_is():
     rng = np.random.default_rng(2)
     corners = rng.uniform(-1, 1, (50, 3, 3))
-    faced = faced_up(corners)
-    assert (upwardness(corners) < 0).sum() > 10
-    assert np.allclose(upwardness(faced), abs(upwardness(corners)))
+    faced = turned_up(corners)
+    assert (unit_normals(corners)[:, 2] < 0).sum() > 10
+    assert np.allclose(
+        unit_normals(faced)[:, 2], abs(unit_normals(corners)[:, 2])
+    )
     assert np.array_equal(np.sort(faced, axis=1), np.sort(corners, axis=1))
 
 

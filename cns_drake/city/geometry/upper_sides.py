@@ -1,0 +1,77 @@
+"""The sides of triangles that look upwards, and their height at any place."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+# The z of a unit normal is greater than this on faces that look upwards.
+_UPWARDS = 0.05
+
+
+def long_normals(triangles: np.ndarray) -> np.ndarray:
+    """Returns normals (M, 3) twice as long as the areas of triangles [m^2].
+
+    As `np.cross`, which takes far longer for the few triangles of a wall.
+
+    Args:
+        triangles: (M, 3, 3) [m].
+    """
+    u = triangles[:, 1] - triangles[:, 0]
+    v = triangles[:, 2] - triangles[:, 0]
+    normal = np.empty(u.shape)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        normal[:, k] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
+    return normal
+
+
+def unit_normals(triangles: np.ndarray) -> np.ndarray:
+    """Returns the unit normals (M, 3) of triangles (M, 3, 3), or zeros."""
+    normal = long_normals(triangles)
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    return normal / np.where(size > 1e-9, size, np.inf)
+
+
+def looks_up(triangles: np.ndarray) -> np.ndarray:
+    """Returns which of the triangles (M, 3, 3) look upwards."""
+    return np.asarray(unit_normals(triangles)[:, 2] > _UPWARDS)
+
+
+def turned_up(triangles: np.ndarray) -> np.ndarray:
+    """Returns triangles (M, 3, 3) with those that look downwards reversed."""
+    is_down = unit_normals(triangles)[:, 2] < 0.0
+    return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
+
+
+def from_above(triangles: np.ndarray) -> np.ndarray:
+    """Returns the (M,) polygons of triangles (M, 3, 3) seen from above."""
+    return np.asarray(shapely.polygons(triangles[:, :, :2]), object)
+
+
+class UpperSides:
+    """The upper sides of solids, with their height at any place."""
+
+    def __init__(self, triangles: np.ndarray):
+        """Collects the upper sides.
+
+        Args:
+            triangles: (M, 3, 3) of solids; those that do not look upwards are
+                left out [m].
+        """
+        self._triangles = triangles[looks_up(triangles)]
+        self._normals = unit_normals(self._triangles)
+        self._tree = shapely.STRtree(from_above(self._triangles))
+
+    def heights(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the greatest height (N,) at places (N, 2), or -inf [m]."""
+        highest = np.full(len(xy), -np.inf)
+        place, triangle = self._tree.query(shapely.points(xy), "intersects")
+        corner = self._triangles[triangle, 0]
+        normal = self._normals[triangle]
+        aside = ((xy[place] - corner[:, :2]) * normal[:, :2]).sum(axis=1)
+        np.maximum.at(highest, place, corner[:, 2] - aside / normal[:, 2])
+        return highest
+
+    def hides(self, points: np.ndarray) -> np.ndarray:
+        """Returns which of the points (N, 3) are below an upper side."""
+        return np.asarray(self.heights(points[:, :2]) > points[:, 2])
