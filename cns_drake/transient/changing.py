@@ -27,6 +27,8 @@ _FURNITURE = frozenset({"pole", "traffic-sign"})
 # Greatest move of furniture [m].
 _NEAREST, _FARTHEST = 0.3, 2.0
 _TURN = 0.15  # [rad]
+# Ground that differs by more in height is beyond a kerb [m].
+_KERB = 0.1
 _TRIES = 24
 _LEAVES = ("crown", "lea", "foliage", "canopy", "plants", "hedge")
 # Share of the surface of a shrub without separate wood that stays, as twigs.
@@ -84,7 +86,7 @@ def change_world(
 def _move_furniture(around: Surroundings, share: float) -> None:
     """Replaces a share of poles, lamps and signs within 2 m.
 
-    An object without room around it stays.
+    An object without room around it stays, and none crosses a kerb.
     """
     wanted = around.of_classes(_FURNITURE)
     if not wanted:
@@ -99,11 +101,12 @@ def _move_furniture(around: Surroundings, share: float) -> None:
             angle, turn = rng.uniform(-1, 1, 2) * (np.pi, _TURN)
             by = rng.uniform(_NEAREST, _FARTHEST)
             offset = by * np.array([np.cos(angle), np.sin(angle)])
-            if obstacles.is_free(
+            rise = around.ground.rise(middle, middle + offset)
+            if abs(rise) < _KERB and obstacles.is_free(
                 shapely.affinity.translate(foot, *offset), (thing.name,)
             ):
                 X_new = (
-                    RigidTransform([*(middle + offset), 0.0])
+                    RigidTransform([*(middle + offset), rise])
                     @ RigidTransform(RollPitchYaw(0, 0, turn), np.zeros(3))
                     @ RigidTransform([*-middle, 0.0])
                 )

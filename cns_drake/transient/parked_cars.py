@@ -9,9 +9,10 @@ from shapely import Polygon
 
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.structures import Model, part_triangles
-from cns_drake.transient.scene_editing import SceneEditing, Surroundings
+from cns_drake.transient.scene_editing import Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
+    GroundSurface,
     Obstacles,
     Structure,
 )
@@ -170,14 +171,14 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
         if fate < _GONE:
             editing.remove(car, CAUSE)
         elif fate < _GONE + _MOVED:
-            X_new = _moved(bay, car, rng)
+            X_new = _moved(bay, car, around.ground, rng)
             editing.move(car, X_new, f"parked_{car.name}", CAUSE)
         else:
-            _replace(editing, car, bay, rng)
+            _replace(around, car, bay, rng)
 
 
 def _moved(
-    bay: Bay, car: Structure, rng: np.random.Generator
+    bay: Bay, car: Structure, ground: GroundSurface, rng: np.random.Generator
 ) -> RigidTransform:
     """Returns the transformation of a moved car's points."""
     own = Bay(car)
@@ -192,15 +193,16 @@ def _moved(
             middle, yaw = found
             break
     X_WC = RigidTransform(RollPitchYaw(0, 0, own.yaw), [*own.middle, 0])
-    X_new = RigidTransform(RollPitchYaw(0, 0, yaw), [*middle, 0])
+    rise = ground.rise(own.middle, middle)
+    X_new = RigidTransform(RollPitchYaw(0, 0, yaw), [*middle, rise])
     return X_new @ X_WC.inverse()
 
 
 def _replace(
-    editing: SceneEditing, car: Structure, bay: Bay, rng: np.random.Generator
+    around: Surroundings, car: Structure, bay: Bay, rng: np.random.Generator
 ) -> None:
     """Puts another car into a bay, or none if the bay is too small."""
-    forms = list(_FORMS)
+    editing, forms = around.editing, list(_FORMS)
     shares = np.array(list(_FORMS.values()), float)
     for k in rng.choice(len(forms), len(forms), False, shares / shares.sum()):
         builder = PARKED_CARS[forms[k]]
@@ -213,7 +215,8 @@ def _replace(
         R = RollPitchYaw(0, 0, yaw)
         # The origin of the model is not exactly in the middle of the car.
         offset = R.ToRotationMatrix() @ [*((low + high) / 2), 0.0]
-        X_WS = RigidTransform(R, [*middle, car.bottom] - offset)
+        z = car.bottom + around.ground.rise(Bay(car).middle, middle)
+        X_WS = RigidTransform(R, [*middle, z] - offset)
         editing.remove(car, CAUSE)
         editing.add(
             f"parked_{car.name}",

@@ -9,6 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.furniture.pavilions import FENCES
 from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
+from cns_drake.city.geometry.polygons import placed
 from cns_drake.city.geometry.structures import (
     Builder,
     Model,
@@ -60,11 +61,6 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
     obstacles = around.obstacles(classes=_NOT_THROUGH)
     for building, rng in around.chosen("scaffolds", fronts, share):
         X_WF, length = _front(building, around.drive)
-        xy = X_WF.translation()[None, :2]
-        foot = float(around.ground.heights(xy, of_road=False)[0])
-        if not np.isfinite(foot):
-            foot = building.bottom
-        height = min(float(building.p_WPs[:, 2].max()) - foot, _HIGHEST)
         length = min(length, _LONGEST)
         corners = [
             X_WF @ [x, y, 0.0]
@@ -74,6 +70,9 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
             )
         ]  # fmt: skip
         area = shapely.Polygon([corner[:2] for corner in corners])
+        # A quay beside the front is not below it.
+        foot = max(around.ground.lowest(area, building.bottom), building.bottom)
+        height = min(float(building.p_WPs[:, 2].max()) - foot, _HIGHEST)
         if (
             length >= _LEAST_LENGTH
             and height >= _LEAST_HEIGHT
@@ -289,15 +288,7 @@ class _Site:
             model = builder.build(self._rng)
             if name == "brick_pallets":
                 turn += np.pi / 2  # Its row runs along y.
-            area = shapely.affinity.translate(
-                shapely.affinity.rotate(
-                    model.footprint,
-                    turn + self._stretch.yaw,
-                    origin=(0, 0),
-                    use_radians=True,
-                ),
-                *self._stretch.place(x, y),
-            )
+            area = self._placed(model, x, y, turn)
             inside = self._stretch.rectangle(
                 self._x, self._length, _SITE_INNER, self._width
             )
@@ -310,6 +301,13 @@ class _Site:
                 kind = builder.semantic_class
                 self._add(suffix, kind, model, x, y, turn, 0.0)
                 taken.append(area)
+
+    def _placed(
+        self, model: Model, x: float, y: float, turn: float
+    ) -> BaseGeometry:
+        """Returns the footprint of a model on the site, in the world [m]."""
+        at = self._stretch.place(x, y).tolist()
+        return placed(model.footprint, at, turn + self._stretch.yaw)
 
     def _add(
         self,
@@ -331,6 +329,8 @@ class _Site:
         ends = np.array([middle, middle - along, middle + along])
         z = ground.heights(ends, of_road=y < 0.0)
         at = float(z[0])
+        if length == 0.0:  # It stands upright.
+            at = ground.lowest(self._placed(model, x, y, turn), at)
         if not np.isfinite(at):  # No ground beside the road.
             edge = self._stretch.place(x, -0.1)[None]
             at = float(ground.heights(edge, of_road=True)[0])

@@ -299,6 +299,25 @@ class GroundSurface:
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)
         return np.where(np.isfinite(found), found, np.nan)
 
+    def lowest(self, area: BaseGeometry, default: float) -> float:
+        """Returns the least height at the corners of an area [m].
+
+        Args:
+            area: in the world [m].
+            default: height without ground there [m].
+        """
+        z = self.heights(shapely.get_coordinates(area))
+        z = z[np.isfinite(z)]
+        return float(z.min()) if len(z) else default
+
+    def rise(self, old: np.ndarray, new: np.ndarray) -> float:
+        """Returns how far the ground rises from a place to another (2,) [m].
+
+        It is 0 where either has no ground.
+        """
+        z = self.heights(np.array([old, new]))
+        return float(z[1] - z[0]) if np.isfinite(z).all() else 0.0
+
     def kerbs(self, spacing: float) -> Iterator[Kerb]:
         """Yields the edges of the carriageway within the area.
 

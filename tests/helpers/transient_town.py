@@ -29,6 +29,8 @@ _VISUAL = """
 # The street lies turned, away from the origin of the world.
 ORIGIN = (30.0, -12.0, 0.4, 0.0, 0.0, 0.35)
 COLUMNS = 20
+# The lawn of a sloping town rises along y, from a line.
+SLOPE, SLOPE_FROM = 0.08, 4.5
 
 
 def _numbers(values):
@@ -59,7 +61,12 @@ def visual(name, shape, *pose):
     )
 
 
-def write_transient_town(folder):
+def slope_height(y):
+    """Returns the height of a sloping lawn at y, in the town's frame [m]."""
+    return 0.05 + SLOPE * (y - SLOPE_FROM)
+
+
+def write_transient_town(folder, *, slopes=False):
     """Writes a world and its table; returns the path of the world.
 
     Along x: cars side by side at y = 8, cars nose to tail at y = 3, lamps and
@@ -75,6 +82,14 @@ def write_transient_town(folder):
         visual("lawn/plate", box_shape(200, 40, 1), 0, 23, -0.45),
     ]
     rows = {"west": "fence", "east": "fence", "road": "road", "lawn": "terrain"}
+    if slopes:
+        # A low parking bay, and beyond its kerb the lawn.
+        roll = np.arctan(SLOPE)
+        c, s = np.cos(roll), np.sin(roll)
+        y, z = SLOPE_FROM + 20 * c + 0.5 * s, 0.05 + 20 * s - 0.5 * c
+        visuals[-1] = visual("lawn/plate", box_shape(200, 40, 1), 0, y, z, roll)
+        visuals.append(visual("bay/plate", box_shape(200, 2, 1), 0, 4, -1))
+        rows["bay"] = "parking"
     forms = ("hatchback", "estate", "suv", "van")
     for k in range(COLUMNS):
         form = forms[int(rng.integers(len(forms)))]

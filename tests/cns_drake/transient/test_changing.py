@@ -1,6 +1,12 @@
 """Objects that change between drives: parked cars, leaves, poles."""
 
-from helpers.transient_town import ORIGIN, change_maker, write_transient_town
+from helpers.transient_town import (
+    ORIGIN,
+    SLOPE_FROM,
+    change_maker,
+    slope_height,
+    write_transient_town,
+)
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
@@ -33,6 +39,41 @@ def sdf(tmp_path_factory):
 def changed(sdf):
     """Returns the world after changes and its structures, cached."""
     return change_maker(sdf, DRIVE, LANES)
+
+
+@pytest.fixture(scope="module")
+def sloping(tmp_path_factory):
+    """Returns the changes of a town whose lawn slopes down to a bay."""
+    sdf = write_transient_town(tmp_path_factory.mktemp("slope"), slopes=True)
+    return change_maker(sdf, DRIVE, LANES)
+
+
+def middle_and_bottom(thing):
+    """Returns y of the middle and the lowest z of a thing, in the town [m]."""
+    hull = shapely.MultiPoint(thing.p_WPs[:, :2]).convex_hull
+    box = hull.minimum_rotated_rectangle if hull.area > 1 else thing.footprint
+    x, y = box.centroid.coords[0]
+    return (X_WT.inverse() @ [x, y, 0])[1], thing.bottom - ORIGIN[2]
+
+
+@pytest.mark.parametrize(
+    ("switch", "prefix"), [("parked_cars", "parked_"), ("furniture", "new_")]
+)
+def test_on_a_slope_things_keep_their_height_above_it(sloping, switch, prefix):
+    _, before = sloping()
+    checked = 0
+    for seed in range(3):
+        _, after = sloping(**{switch: 1.0}, seed=seed)
+        for name in after.keys() - before.keys():
+            y, z = middle_and_bottom(after[name])
+            y_old, z_old = middle_and_bottom(before[name.removeprefix(prefix)])
+            if y_old > SLOPE_FROM:
+                # Nothing moves over the kerb, into the bay.
+                assert y > SLOPE_FROM
+                rise = slope_height(y) - slope_height(y_old)
+                assert z - z_old == pytest.approx(rise, abs=2e-3)
+                checked += abs(rise) > 5e-3
+    assert checked > 10
 
 
 def places(things):

@@ -1,11 +1,17 @@
 """Objects added between drives: scaffolds, roadworks, snow."""
 
-from helpers.transient_town import ORIGIN, change_maker, write_transient_town
+from helpers.transient_town import (
+    ORIGIN,
+    change_maker,
+    slope_height,
+    write_transient_town,
+)
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 import shapely
 
+from cns_drake.city.geometry.structures import ROOT_DEPTH
 from cns_drake.city.geometry.upper_sides import turned_up, unit_normals
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
@@ -74,6 +80,16 @@ def test_every_front_along_the_drive_has_a_scaffold_at_one(changed):
         assert p_TPs[:, 2].max() == pytest.approx(9.075, abs=0.01)
 
 
+def test_a_scaffold_stands_on_the_lowest_ground_below_it(tmp_path):
+    sdf = write_transient_town(tmp_path, slopes=True)
+    fresh = new_things(change_maker(sdf, DRIVE, LANES), scaffolds=1.0)
+    assert fresh
+    for scaffold in fresh.values():
+        p_TPs = in_town(scaffold.p_WPs)
+        foot = slope_height(p_TPs[:, 1].min()) - ROOT_DEPTH
+        assert p_TPs[:, 2].min() == pytest.approx(foot, abs=0.02)
+
+
 def test_fronts_are_drawn_one_by_one(changed):
     counts = [
         len(new_things(changed, scaffolds=0.5, seed=seed)) for seed in range(4)
@@ -121,7 +137,7 @@ def test_a_part_of_the_works(changed):
 def test_over_slits_of_the_ground_there_are_no_works(sdf, monkeypatch):
     """An object at a height of NaN would hide the whole world from rays."""
 
-    def heights(ground, xy, *, of_road):
+    def heights(ground, xy, *, of_road=None):
         return np.full(len(xy), np.nan)
 
     monkeypatch.setattr(GroundSurface, "heights", heights)
