@@ -130,9 +130,7 @@ def _import_city(
         )
         if lanes is not None:
             (draft / LANES_NAME).write_text(lanes, "utf-8")
-        bottom = bottom_of(bare, ground)
-        if dressing is not None:
-            bottom = dressing.ground(bottom)
+        bottom = dressing.bottom if dressing else bottom_of(bare, ground)
         sizes = write_world(draft, source, staged, bottom, dressing)
         facts = city_facts(
             city, options, list(staged.standing), growth, dressing

@@ -31,6 +31,57 @@ def check_no_structure_stands_in_a_lane(standing, network):
         assert not lanes.intersects(footprint), structure.name
 
 
+# Nothing floats higher above the ground, and nothing stands higher or deeper
+# than on it [m]. Of things on slopes one side is sunk in.
+FLOATS = 0.02
+SUNK_IN = 0.5
+
+
+def check_things_stand_on_the_ground(structures):
+    """Casts rays down from all feet onto the ground, with Open3D.
+
+    No kind of thing hangs free: signs and lights have posts, cranes a base.
+    """
+    import open3d
+
+    scene = open3d.t.geometry.RaycastingScene()
+    for structure in structures:
+        if is_ground(structure):
+            for part in structure.model.parts:
+                p, triangles = part_triangles(part, structure.model.meshes)
+                scene.add_triangles(
+                    p.astype(np.float32), triangles.astype(np.uint32)
+                )
+    things = [s for s in structures if not is_ground(s)]
+    feet = [_feet(thing) for thing in things]
+    p_WFs = np.concatenate(feet)
+    # From 1 m above, so that a bridge does not count for what is below it, and
+    # twice, as one ray may pass a slit of a millimetre.
+    gaps = np.full(len(p_WFs), np.inf)
+    for aside in (0.0, 0.004):
+        down = np.tile([aside, aside, -1.0], (len(p_WFs), 1))
+        rays = np.concatenate([p_WFs + np.array([0.0, 0.0, 1.0]), down], axis=1)
+        hits = scene.cast_rays(open3d.core.Tensor(rays.astype(np.float32)))
+        gaps = np.minimum(gaps, hits["t_hit"].numpy() - 1.0)
+    ends = np.cumsum([len(foot) for foot in feet])
+    for thing, below in zip(things, np.split(gaps, ends[:-1]), strict=True):
+        # The first is the thing's own frame, which lies on the ground.
+        origin = below[0]
+        assert -SUNK_IN < origin < FLOATS, f"{thing.name} {origin:.3f}"
+        assert max(below) < FLOATS, f"{thing.name} {max(below):.3f}"
+
+
+def _feet(structure) -> np.ndarray:
+    """Returns the frame and the lowest vertices of a structure, in W."""
+    model = structure.model
+    p = np.concatenate(
+        [part_triangles(part, model.meshes)[0] for part in model.parts]
+    )
+    bottom = p[:, 2].min()
+    low = p[p[:, 2] < bottom + 0.001]
+    return np.array([structure.p_WP(q) for q in [(0.0, 0.0, 0.0), *low]])
+
+
 def check_nothing_low_reaches_far_out_of_its_footprint(standing, network):
     """Tests of footprints rely on this.
 

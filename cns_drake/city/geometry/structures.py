@@ -107,6 +107,18 @@ class Structure:
         """The ground area of the model, in the world [m]."""
         return placed(self.model.footprint, self.xyz[:2], self.yaw)
 
+    @property
+    def p_WFs(self) -> np.ndarray:
+        """The feet: (N, 3) lowest points of the model, in the world [m]."""
+        p_SPs = np.concatenate(
+            [
+                part_mesh(part, self.model.meshes).vertices
+                for part in self.model.parts
+            ]
+        )
+        is_low = p_SPs[:, 2] < p_SPs[:, 2].min() + _FEET
+        return p_SPs[is_low] @ rotation((0.0, 0.0, self.yaw)).T + self.xyz
+
     def p_WP(
         self, p_SP: tuple[float, float, float]
     ) -> tuple[float, float, float]:
@@ -126,6 +138,8 @@ ROOT_DEPTH = 0.3
 # Parts above this height (crowns, signs, mast arms) leave the ground below them
 # free [m].
 HEADROOM = 2.4
+# The lowest points of a model up to this height are its feet [m].
+_FEET = 0.05
 _FOOTPRINT_MARGIN = 0.02
 _ROUND_SIDES = 12
 
@@ -265,6 +279,13 @@ def ground_footprint(
     # Rounded to millimetres: the last bits of a sine differ between machines.
     hull = hull_of(np.round(np.concatenate(corners), 3))
     return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
+
+
+def ground_triangles(structures: Iterable[Structure]) -> np.ndarray:
+    """Returns the (M, 3, 3) triangles of ground, whose meshes are in W [m]."""
+    meshes = [m for one in structures for m in one.model.meshes.values()]
+    found = [mesh.vertices[mesh.triangles()] for mesh in meshes]
+    return np.concatenate([np.zeros((0, 3, 3)), *found])
 
 
 def part_triangles(

@@ -21,6 +21,7 @@ from cns_drake.city.geometry.structures import (
     Part,
     SphereShape,
     Structure,
+    ground_triangles,
 )
 from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.city.placement.frontage import station_at
@@ -148,6 +149,9 @@ def _turned(
 # Least distance of all objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
 _FROM_WALL, _BETWEEN = 0.25, 0.2
+# Nothing stands where the ground falls by more below it, or on a street that is
+# this far above the guessed ground [m].
+_STEEPEST, _BRIDGE = 0.5, 1.0
 # Radius about the middle of a trunk that nothing else takes [m].
 _TRUNK = 0.4
 
@@ -183,6 +187,7 @@ class StreetRoom:
         structures: Sequence[Imported],
         drives: Sequence[WaypointDrive],
         ground: Ground,
+        bottom: Sequence[Structure],
         found: StreetThings,
     ):
         self.found = found
@@ -203,7 +208,8 @@ class StreetRoom:
         self._solids = UpperSides(joined(solids))
         roads = [one.triangles for one in structures if one.kind == "Road"]
         self._roads = UpperSides(turned_up(joined(roads)))
-        self._paved = UpperSides(turned_up(joined(paved)))
+        laid = joined([*paved, ground_triangles(bottom)])
+        self._laid = UpperSides(turned_up(laid))
         self._taken = Occupancy()
         self._names = {one.structure.name for one in structures}
         self.lamps: list[tuple[float, float]] = []
@@ -235,7 +241,7 @@ class StreetRoom:
         yaw: float,
         rng: np.random.Generator,
     ) -> bool:
-        """Places an object, if there is room for it.
+        """Places an object on the lowest ground below it, if there is room.
 
         Only cars stand on carriageways.
         """
@@ -245,9 +251,20 @@ class StreetRoom:
         if not is_car and np.isfinite(self._roads.heights(at)[0]):
             return False
         model = without_curves(builder.build(rng))
+        x, y = round(xy[0], 3), round(xy[1], 3)
+        structure = Structure(
+            name, builder.semantic_class, model, (x, y, 0.0), round(yaw, 4)
+        )
+        feet = structure.p_WFs[:, :2]
+        heights, guessed = self._laid.heights(feet), self._ground.height(feet)
+        # A street far above the guessed ground is a bridge, or a roof.
+        is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE)
+        heights = np.where(is_laid, heights, guessed)
+        z = round(float(heights.min()), 3)
         footprint = placed(model.footprint, xy, yaw)
         if (
-            self.paths.distance(footprint) < _FROM_DRIVE
+            np.ptp(heights) > _STEEPEST
+            or self.paths.distance(footprint) < _FROM_DRIVE
             or not self._taken.is_free(footprint, _BETWEEN)
             or self._is_built(footprint)
         ):
@@ -256,15 +273,7 @@ class StreetRoom:
         while name in self._names:
             name += "_"
         self._names.add(name)
-        x, y = round(xy[0], 3), round(xy[1], 3)
-        at = np.array([[x, y]])
-        z = float(self._ground.height(at)[0])
-        paved = float(self._paved.heights(at)[0])
-        # A street far above the guessed ground is a bridge, or a roof.
-        z = round(paved if abs(paved - z) < 1.0 else z, 3)
-        structure = Structure(
-            name, builder.semantic_class, model, (x, y, z), round(yaw, 4)
-        )
+        structure = replace(structure, name=name, xyz=(x, y, z))
         self.found.structures.append(
             Imported(structure, title_of(kind), None, _footing(footprint, z))
         )
@@ -433,6 +442,7 @@ def dress_streets(
     streets: Sequence[Street],
     drives: Sequence[WaypointDrive],
     ground: Ground,
+    bottom: Sequence[Structure],
     seed: int,
 ) -> StreetThings:
     """Returns the small things along the streets of a city.
@@ -443,12 +453,13 @@ def dress_streets(
         streets: streets of the file.
         drives: kept free of things; without any nothing is placed.
         ground: below the city.
+        bottom: the structures of the guessed ground.
         seed: seed of the random draws.
     """
     found = StreetThings()
     if not drives:
         return found
-    placing = StreetRoom(structures, drives, ground, found)
+    placing = StreetRoom(structures, drives, ground, bottom, found)
     near = [s for s in streets if placing.is_near(s.line, _THINGS_WITHIN)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)

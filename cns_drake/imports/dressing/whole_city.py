@@ -25,7 +25,7 @@ from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.dressing.wall_panels import joined
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.ground import Ground
+from cns_drake.imports.ground import Ground, bottom_of
 from cns_drake.imports.staged_city import StagedCity
 
 _TERRAIN = "TINRelief"
@@ -40,17 +40,13 @@ class Dressing:
         origins: name of a structure -> `dressed` or `lot`; all others are as
             the file has them.
         facts: counts of parts from the file and at random, to be written.
-        is_paved: whether ground of unknown kind is paved.
+        bottom: the guessed ground, with its class and colour.
     """
 
     city: StagedCity
     origins: Mapping[str, str]
     facts: Mapping[str, Any]
-    is_paved: bool
-
-    def ground(self, bottom: Sequence[Structure]) -> list[Structure]:
-        """Returns the guessed ground with its class and colour."""
-        return [paved(one) if self.is_paved else one for one in bottom]
+    bottom: Sequence[Structure]
 
 
 def _has_ground_kind(one: Imported) -> bool:
@@ -109,8 +105,15 @@ def dress_city(
     marks = list(lane_marks(city.streets, drives)) if drives else []
     added = [with_kerb(one) if one.kind == "Sidewalk" else one for one in laid]
     added += marks
+    bottom = bottom_of(staged.kept, ground)
     things = dress_streets(
-        [*staged.kept, *added], city.things, city.streets, drives, ground, seed
+        [*staged.kept, *added],
+        city.things,
+        city.streets,
+        drives,
+        ground,
+        bottom,
+        seed,
     )
     paving = [
         one.triangles
@@ -163,4 +166,6 @@ def dress_city(
             f" more than instance ids can count ({MAX_STRUCTURES}); or give"
             " --within"
         )
-    return Dressing(dressed, origins, facts, is_paved)
+    if is_paved:
+        bottom = list(map(paved, bottom))
+    return Dressing(dressed, origins, facts, bottom)

@@ -1,7 +1,9 @@
 """Streets get furniture from the file, then at random, away from the drives."""
 
+from dataclasses import replace
 from itertools import combinations
 
+from helpers.city_checks import check_things_stand_on_the_ground
 from helpers.small_cityjson import CityWriter
 from helpers.small_osm import OsmWriter
 import numpy as np
@@ -10,6 +12,7 @@ from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import HEADROOM, part_triangles
+from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing import whole_city
 from cns_drake.imports.dressing.grounds import (
@@ -54,9 +57,14 @@ def drive_of(city, y=2.25):
 
 def dressed(city, seed=0):
     ground = ground_of(city.structures)
-    drives = [drive_of(city)]
     return dress_streets(
-        city.structures, city.things, city.streets, drives, ground, seed
+        city.structures,
+        city.things,
+        city.streets,
+        [drive_of(city)],
+        ground,
+        bottom_of(city.structures, ground),
+        seed,
     )
 
 
@@ -119,6 +127,25 @@ def test_things_of_the_file_stand_at_their_place(tmp_path):
     np.testing.assert_allclose(np.diff(trees), 8.0, atol=0.01)
     assert found.by_file["Lamp post"] == 1
     assert found.no_room == 1
+
+
+def test_things_stand_on_the_ground_below_them(tmp_path):
+    """Beside the street the ground lies lower than the street."""
+    osm = OsmWriter()
+    write_street(osm, sidewalk="right")
+    for x in range(-90, 90, 12):
+        osm.node(x, 6.5, amenity="bench")
+        osm.node(x + 6, -4.5, amenity="waste_basket")
+    city = read(osm, tmp_path)
+    ground = [one.structure for one in city.structures if one.is_ground]
+    ground += bottom_of(city.structures, ground_of(city.structures))
+    walks = [o.structure for o in city.structures if o.kind == "Sidewalk"]
+    check_things_stand_on_the_ground(
+        [
+            *(replace(one, tags=(GROUND_TAG,)) for one in [*ground, *walks]),
+            *(one.structure for one in dressed(city).structures),
+        ]
+    )
 
 
 def test_nothing_stands_in_the_way_or_in_each_other(tmp_path):
@@ -253,9 +280,8 @@ def test_a_city_counts_what_is_from_the_file_and_what_at_random(
     with pytest.raises(InputError, match="more than instance ids"):
         dress_city(staged, again, [drive_of(again)], ground, 0)
     (bottom,) = bottom_of(staged.kept, ground)
-    (seen,) = result.ground([bottom])
+    (seen,) = result.bottom
     # Four houses of 500 m^2 in 180 m by 44 m.
-    assert result.is_paved
     assert seen.model.parts[0].rgb == paved(bottom).model.parts[0].rgb
     assert seen.model.parts[0].rgb != bottom.model.parts[0].rgb
 
