@@ -23,10 +23,12 @@ from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import snap
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry.structures import Structure, ground_triangles
+from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.city.ground.districts import share_out
 from cns_drake.city.ground.elevation import aprons, make_ground
 from cns_drake.city.ground.streets import (
+    GROUND_TAG,
     kerb_height,
     marking_structure,
     street_structures,
@@ -201,18 +203,19 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
         ),
         lambda name: draft.rng(name, "relief"),
     )
-    draft.ground_height = shape
+    ground = [
+        *streets.structures,
+        *ground_structures(districts, shape, plan.water_level),
+        *bridge_structures(districts, draft.streets, shape, plan.water_level),
+    ]
+    surfaces = [one for one in ground if GROUND_TAG in one.tags]
+    draft.ground = UpperSides(ground_triangles(surfaces))
     streets.furnish(draft)
     for district in districts:
         furnish(draft, district, plan.cars, source)
     furnish_sidewalks(draft, plan, districts, streets.junctions)
     streets.park(draft)
     plant_medians(draft, plan.medians or plan.street)
-    ground = [
-        *streets.structures,
-        *ground_structures(districts, shape, plan.water_level),
-        *bridge_structures(districts, draft.streets, shape, plan.water_level),
-    ]
     return City((*ground, *draft.structures), plan.cars)
 
 

@@ -13,8 +13,9 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.polygons import HeightMap, Occupancy, snap
+from cns_drake.city.geometry.polygons import Occupancy, snap
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
+from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import SPECIES
@@ -48,7 +49,7 @@ class Draft:
         base: height of sidewalks and of the ground between them in W,
             without what buildings and relief change about it.
         structures: what has been placed, in the order of placement.
-        ground_height: height of the finished ground in W; set once the
+        ground: upper sides of the finished ground in W; set once the
             buildings stand and the ground has been shaped around them.
     """
 
@@ -62,7 +63,7 @@ class Draft:
         self.frontage = self.streets
         self.base: Ground = LevelGround(kerb_height)
         self.structures: list[Structure] = []
-        self.ground_height: HeightMap | None = None
+        self.ground: UpperSides | None = None
         self._seed = seed
         self._counts: Counter[str] = Counter()
         self._walls = Occupancy()
@@ -173,12 +174,28 @@ class Draft:
         fall = self._fall(footprint)
         if fall > _STEEPEST:
             return None
-        assert self.ground_height is not None, "the ground has no shape yet"
-        z = float(self.ground_height(np.array([x]), np.array([y]))[0])
-        structure = replace(structure, xyz=(x, y, round(z - fall / 2, 3)))
+        foot = self._foot(structure, fall)
+        structure = replace(structure, xyz=(x, y, foot))
         self._occupancy.add(footprint)
         self.structures.append(structure)
         return structure
+
+    def _foot(self, structure: Structure, fall: float) -> float:
+        """Returns the height at which an object stands on the ground [m].
+
+        Args:
+            structure: at height 0.
+            fall: how far the ground falls below it [m].
+        """
+        p_WFs = structure.p_WFs
+        assert self.ground is not None, "the ground has no shape yet"
+        z = self.ground.heights(np.vstack([structure.xyz, p_WFs])[:, :2])
+        z[0] -= fall / 2
+        z[1:] -= p_WFs[:, 2].min()
+        # There is no ground in slits of a millimetre, and the water beside a
+        # quay is below no foot.
+        z = z[np.isfinite(z)]
+        return round(float(z[z > z[0] - _STEEPEST].min()), 3)
 
     def _fall(self, footprint: BaseGeometry) -> float:
         """Returns how far the ground falls below a footprint [m]."""

@@ -46,6 +46,7 @@ def _furnish_arm(
     arm: Arm,
     rng: np.random.Generator,
 ) -> None:
+    carriageway = draft.areas.carriageway()
     starts = arm.end == "start"
     incoming: Direction = "backward" if starts else "forward"
     outgoing: Direction = "forward" if starts else "backward"
@@ -64,10 +65,14 @@ def _furnish_arm(
         """
         outwards = 1 if starts else -1
         edge = road.first_station if starts else road.last_station
-        offset = side * outwards * (road.half_width + _FROM_KERB)
-        x, y, _, heading = road.evaluate([edge + outwards * distance], offset)[
-            0
-        ]
+        # Behind a parking bay, where there is one.
+        for width in (road.half_width, road.half_width + road.parking):
+            x, y, _, heading = road.evaluate(
+                [edge + outwards * distance],
+                side * outwards * (width + _FROM_KERB),
+            )[0]
+            if not shapely.contains_xy(carriageway, x, y):
+                break
         yaw = (heading if starts else heading + math.pi) + turn
         tags, model = ("junction", junction.name), OBJECTS[name].build(rng)
         draft.place(name, model, (x, y), yaw, tags, clearance=0.1)

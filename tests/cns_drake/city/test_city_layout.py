@@ -2,6 +2,7 @@
 
 from functools import cache
 
+from helpers.city_checks import check_things_stand_on_the_ground
 from helpers.small_city import PLAN, ROADS
 import numpy as np
 import pytest
@@ -93,6 +94,17 @@ def test_relief_leaves_paths_buildings_and_borders_level(lay_out_text):
     assert len(trees) > 10
     # Trees stand on the swells, not under them.
     assert max(s.xyz[2] for s in trees) > 0.5
+
+
+def test_things_stand_on_the_ground_and_cars_in_bays(lay_out_text):
+    city = lay_out_text(PLAN)
+    check_things_stand_on_the_ground(city.structures)
+    bays = [s for s in city.structures if s.tags[0] == "bay"]
+    assert len(bays) > 5
+    assert {s.xyz[2] for s in bays} == {0.0}
+    signs = [s for s in city.structures if s.semantic_class == "traffic-sign"]
+    assert len(signs) > 5
+    assert {s.xyz[2] for s in signs} == {0.12}
 
 
 def test_a_district_does_not_disturb_another(lay_out_text):

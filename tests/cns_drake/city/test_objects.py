@@ -7,7 +7,7 @@ from shapely.geometry import MultiPoint
 
 from cns_drake.city.furniture.pavilions import RUN_KINDS
 from cns_drake.city.geometry.mesh import FOLDER, Mesh, object_mesh
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.geometry.structures import MeshShape, part_mesh
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.scene.semantics import CLASS_IDS
@@ -75,6 +75,13 @@ def test_model_is_complete(name):
             if isinstance(part.shape, MeshShape):
                 # A negative factor would turn the mesh inside out.
                 assert min(part.shape.scale) > 0
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_its_lowest_point_is_on_the_ground_or_below(name):
+    model = build(name, 2)
+    low = [part_mesh(p, model.meshes).vertices[:, 2].min() for p in model.parts]
+    assert min(low) < 0.02
 
 
 @pytest.mark.parametrize("name", OBJECTS)
