@@ -213,6 +213,19 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
         yield
 
 
+def remove_lock(path: Path) -> None:
+    """Removes the lock of a killed process, unless another one holds it."""
+    lock = path.with_name(f"{path.name}.lock")
+    if lock.is_file():
+        # What cannot be locked is in use, or no lock of ours.
+        with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
+            _lock(lock, stack, _refuse_to_wait)
+
+
+def _refuse_to_wait() -> None:
+    raise BlockingIOError
+
+
 def _lock(
     lock: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
 ) -> bool:

@@ -9,7 +9,13 @@ import typer
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
-from cns_drake.command_line.options import Jobs, Maps, Output, Scheduler
+from cns_drake.command_line.options import (
+    Jobs,
+    Maps,
+    MethodFiles,
+    Output,
+    Scheduler,
+)
 from evaluation.command_line.options import Costs, Settings, with_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
 
@@ -36,6 +42,7 @@ def reproduce(
             help="Only the report: simulate without recording.",
         ),
     ] = False,
+    method: MethodFiles = None,
     parameter: Settings = None,
     costs: Costs = True,
     protocol: RetrievalProtocol,
@@ -57,6 +64,7 @@ def reproduce(
         with_pages=pages is not False,
         quick=quick,
         protocol=protocol,
+        own_methods=method or (),
         settings=parameter or (),
         with_costs=costs,
         on_note=note,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cns_drake.base.drives.drive import PlacedDrive, check_same_map
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.options import Jobs, MethodFiles, Results, Scheduler
 from cns_drake.command_line.simulating import family_members
@@ -63,6 +64,8 @@ def trend(
     methods = choose_methods(method or (), parameter or ())
     query_drive = load_scenario(query)
     members = family_members(vary, output, cluster)
+    for member in members:
+        check_same_map(*map(_placed, (member, query_drive)))
     controls = family_controls(members, query_drive)
     points = measure_drives(
         query_drive.name,
@@ -80,6 +83,11 @@ def trend(
         protocol,
     )
     print(write_trend(points, output))
+
+
+def _placed(scenario: Scenario) -> PlacedDrive:
+    city = None if scenario.map is None else {"map": scenario.map}
+    return PlacedDrive(scenario.name, "map", city)
 
 
 def family_controls(

@@ -57,6 +57,9 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     path = shipped.get(str(name_or_file), Path(name_or_file))
     # Unlike pathlib, os.path accepts names that no file can have.
     if not os.path.isfile(path):
+        folder = shipped_maps().get(str(name_or_file), path)
+        if os.path.isdir(folder):
+            raise InputError(_name_drives(name_or_file, MapFolder(folder)))
         if re.fullmatch(r"\w+", str(name_or_file)):
             raise InputError(
                 f"unknown drive '{name_or_file}'; there are: "
@@ -66,6 +69,20 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     scenario = read_scenario_file(path)
     check_files(scenario)
     return scenario
+
+
+def _name_drives(given: str | Path, folder: MapFolder) -> str:
+    """Returns the fault that a folder was given in place of one drive."""
+    files = folder.drives()
+    if not files:
+        return f"{given}: a folder without a drive (sequence_NN.yaml)"
+    names = [
+        drive_name(file)
+        if shipped_drives().get(drive_name(file)) == file
+        else str(Path(given) / file.name)
+        for file in files
+    ]
+    return f"{given}: a map; use one of its drives: {', '.join(names)}"
 
 
 def read_scenario_file(path: Path) -> Scenario:

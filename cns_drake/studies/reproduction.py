@@ -39,6 +39,7 @@ def reproduce_maps(
     with_pages: bool = True,
     quick: bool = False,
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    own_methods: Sequence[Path] = (),
     settings: Sequence[str] = (),
     with_costs: bool = False,
     on_note: Callable[[str], None] = lambda text: None,
@@ -59,7 +60,7 @@ def reproduce_maps(
             recorded yet are evaluated while they are simulated, and not
             recorded.
         protocol: that of place recognition.
-        settings: see `choose_methods`.
+        own_methods, settings: see `choose_methods`.
         with_costs: measure the costs of methods, too.
         on_note: receives notes on cities without drives to compare.
 
@@ -70,7 +71,7 @@ def reproduce_maps(
         InputError: a map is unknown, the folder cannot be made, or a step
             failed.
     """
-    methods = choose_methods(settings=settings)
+    methods = choose_methods(own_methods, settings)
     folders = [recordable_map(name) for name in maps or _recordable_maps()]
     drives, controls, pictures = [], [], []
     for folder in folders:

@@ -68,7 +68,7 @@ def tcr(
     lidar: LidarName = None,
     json: Json = False,
 ) -> None:
-    """Temporal change ratio of two drives or maps.
+    """Structural change of two drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
@@ -256,7 +256,7 @@ def scores(
     gate: Gate = False,
     radius: Radius = PAPER_PROTOCOL.radius,
 ) -> None:
-    """Scores of all pairs of scans of two folders.
+    """Scores of all pairs of scans of folders.
 
     Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
     place; searches that only save time are left out. An empty score means that

@@ -23,7 +23,7 @@ def drives(
     lidar: LidarName = None,
     json: Json = False,
 ) -> None:
-    """How the ways of two drives differ, beside real pairs.
+    """How the ways of two drives differ.
 
     Offsets, lanes, headings, heights and stops of B at a stop of A every 5 m,
     beside those of two pairs of real drives along one route (Boreas, 28 days
@@ -67,11 +67,12 @@ def trajectory(
     lidar: LidarName = None,
     json: Json = False,
 ) -> None:
-    """Errors of an estimated trajectory, as evo and KITTI define them.
+    """Errors of an estimated trajectory.
 
-    The estimate is a TUM file: seconds, x y z, and a quaternion x y z w. Prints
-    ATE, the root mean square of its distances from DRIVE after rigid alignment,
-    and drift, the error of its motion over 100 m of path.
+    They are those of evo and KITTI. The estimate is a TUM file: seconds, x y z,
+    and a quaternion x y z w. Prints ATE, the root mean square of its distances
+    from DRIVE after rigid alignment, and drift, the error of its motion over
+    100 m of path.
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
     from evaluation.drives import open_drive

@@ -32,7 +32,7 @@ def check_no_structure_stands_in_a_lane(standing, network):
 
 
 # Nothing floats higher above the ground, and nothing stands higher or deeper
-# than on it [m]. Of things on slopes one side is sunk in.
+# than on it [m]. Among things on slopes one side is sunk in.
 FLOATS = 0.02
 SUNK_IN = 0.5
 

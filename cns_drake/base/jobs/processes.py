@@ -31,7 +31,7 @@ from cns_drake.base.errors import (
     one_line,
     shows_traceback,
 )
-from cns_drake.base.files import exclusive
+from cns_drake.base.files import exclusive, remove_lock
 from cns_drake.base.interrupts import (
     end_interrupted,
     ignore_interrupts,
@@ -109,6 +109,8 @@ def run_process(
             kind, text = _listen(ours, on_message, is_wanted)
         finally:
             status = _end(process)
+            if status == -signal.SIGKILL:
+                _clean_up(job)
     if kind == "fault":
         raise JobError(text)
     if kind != "done":
@@ -187,6 +189,14 @@ def _end(process: BaseProcess) -> int:
         process.join()
     assert process.exitcode is not None  # It has ended.
     return process.exitcode
+
+
+def _clean_up(job: bytes) -> None:
+    """Removes the lock that the killed process of a job left."""
+    with uninterrupted():
+        output = pickle.loads(job).output
+    if output is not None:
+        remove_lock(output)
 
 
 def _describe(status: int) -> str:

@@ -167,6 +167,16 @@ def test_weather_that_cannot_be(files, tmp_path, capfd, words, fault):
     assert line.startswith(f"cns-drake: error: {fault}")
 
 
+def test_a_trend_through_two_maps_measures_nothing(tmp_path, capfd):
+    family = tmp_path / "family.yaml"
+    family.write_text("base: suburbia_01\nmissing: [0.0]\n")
+    output = tmp_path / "output"
+    words = ["--vary", family, "--query", "riverside_01", "--output", output]
+    result = run_here(capfd, "trend", *words)
+    assert_one_line(result, "riverside_01: a drive through riverside, but sub")
+    assert {path.name for path in output.iterdir()} == {"scenarios"}
+
+
 def test_diagram_script_has_options():
     """Where the documents run one, `test_recipes` does."""
     shown = run("--help", script=DIAGRAMS / "metropolis_04.py")
@@ -179,6 +189,8 @@ def test_diagram_script_has_options():
     ("arguments", "fault"),
     [
         (["simulate", "atlantis_01"], "unknown drive 'atlantis_01'"),
+        (["simulate", "riverside"], "riverside: a map; .*: riverside_01, "),
+        (["simulate", "{files}"], "a folder without a drive"),
         (["simulate", "{files}/none.yaml"], "none.yaml: no such"),
         (["simulate", "{files}/typo.yaml"], "typo.yaml: stge: "),
         (["simulate", "{files}/type.yaml"], "type.yaml: frames: "),

@@ -90,7 +90,7 @@ def test_options_have_units():
         for each in find(*words).params
         for unit in re.findall(r"\[.*?\]", each.help or "")
     }
-    assert units == {"[m]", "[m, rad]"}
+    assert units == {"[m]", "[m, rad]", "[s]"}
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -110,7 +110,7 @@ def test_version(program, capsys):
         ("cns-drake", "sim", ["simulate"]),
         ("cns-drake", "city --s", ["--start", "--seed"]),
         ("cns-eval", "pr --mode f", ["filtered"]),
-        ("cns-eval", "t", ["tcr", "trend"]),
+        ("cns-eval", "t", ["tcr", "trend", "trajectory"]),
     ],
 )
 def test_completion(program, begun, completed, capsys, monkeypatch):

@@ -15,6 +15,7 @@ from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction
 from cns_drake.studies.recording import Record
 from cns_drake.studies.reproduction import control_drives, recording_info
+from evaluation.methods import method
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.collection import find_recordings, group_cities
 
@@ -133,17 +134,44 @@ def test_a_world_is_no_stage(tmp_path):
         reproduction.reproduce_maps([str(folder)], tmp_path, Cluster())
 
 
-def test_quick_gives_the_same_tables(tmp_path):
+COUNTING = """
+import numpy as np
+from evaluation import Method, MethodConfig, register
+
+@register("counting")
+class Counting(Method):
+    Config = MethodConfig
+
+    def describe(self, points):
+        return len(points)
+
+    def build_database(self, places):
+        return np.array(places)
+
+    def score(self, query, database, *, exhaustive=False):
+        return -np.abs(database - query) / 1e6
+"""
+
+
+def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     """The tables include controls, and come from simulation alone."""
+    # Other tests do not find the method registered.
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
     cluster = Cluster(2)
+    own = tmp_path / "counting.py"
+    own.write_text(COUNTING)
     quick = reproduction.reproduce_maps(
-        [str(town)], tmp_path / "quick", cluster, quick=True
+        [str(town)], tmp_path / "quick", cluster, quick=True, own_methods=[own]
     )
     assert {path.name for path in (tmp_path / "quick").iterdir()} == {"report"}
     full = reproduction.reproduce_maps(
-        [str(town)], tmp_path / "full", cluster, with_pages=False
+        [str(town)],
+        tmp_path / "full",
+        cluster,
+        with_pages=False,
+        own_methods=[own],
     )
     assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
     for name in (
@@ -156,6 +184,8 @@ def test_quick_gives_the_same_tables(tmp_path):
     ):
         ours, theirs = (path.parent / name for path in (quick, full))
         assert ours.read_text() == theirs.read_text(), name
+    rows = _rows(quick.parent / "place_recognition.csv")
+    assert "counting" in {row["method"] for row in rows}
     rows = _rows(quick.parent / "survival.csv")
     assert {row["control"] for row in rows} == {"town_01_stage_04"}
 

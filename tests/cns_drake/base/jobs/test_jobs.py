@@ -117,7 +117,7 @@ def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
         job("process", job_functions.note_process, process),
         job("refused", job_functions.refuse),
         job("stumbles", job_functions.stumble),
-        job("dies", job_functions.die, tries),
+        job("dies", job_functions.die, tries, output=tries),
         job("survives", job_functions.die_first, tmp_path / "s", survivor),
         job("orphan", job_functions.join, [], tmp_path / "o", needs=["dies"]),
         job("orphan 2", job_functions.join, [], last, needs=["orphan"]),
