@@ -26,6 +26,7 @@ from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.scenarios import variation
 from cns_drake.scenarios.scenario import (
+    DriverConfig,
     RideConfig,
     Scenario,
     TrafficConfig,
@@ -44,6 +45,7 @@ SCENARIO: Sections = {
     "Scenario": Scenario,
     "Route": RouteLeg,
     "Speeds": Speeds,
+    "Driver": DriverConfig,
     "Ride": RideConfig,
     "Traffic": TrafficConfig,
     "Transient": TransientConfig,

@@ -37,6 +37,7 @@ def run_drive(
     weather: WeatherConfig | None = None,
     traffic: int | None = None,
     transient: Mapping[str, float | str] | None = None,
+    driver: Literal["real", "none"] | None = None,
     ride: str | None = None,
     imu_rate: int | None = None,
     recording: Path | str | None = None,
@@ -55,6 +56,8 @@ def run_drive(
         traffic: how many vehicles, and how many walkers, in place of the
             scenario's.
         transient: switches of the section `transient`, and their values.
+        driver: `real` for one like those of published drives, or `none`, in
+            place of the scenario's.
         ride: class of the road, A to E, or `none`, in place of the scenario's.
         imu_rate: samples per second of the IMU, in place of the scenario's.
         recording: where to save a web page of the drive.
@@ -83,6 +86,8 @@ def run_drive(
         scenario = scenario.with_traffic(traffic)
     if transient:
         scenario = scenario.with_transient(**transient)
+    if driver is not None:
+        scenario = scenario.with_driver(driver)
     if ride is not None:
         change: dict = {"ride": {"roughness": ride}}
         scenario = scenario.with_fields(change, "--ride")

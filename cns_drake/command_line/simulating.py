@@ -137,6 +137,13 @@ def simulate(
             "snow, scaffolds, works, furniture, seed; may be repeated.",
         ),
     ] = None,
+    driver: Annotated[
+        Literal["real", "none"] | None,
+        typer.Option(
+            help="A driver like those of published drives, who wanders and "
+            "changes lanes, or one who keeps to the middle of his lane.",
+        ),
+    ] = None,
     ride: Annotated[
         Literal["A", "B", "C", "D", "E", "none"] | None,
         typer.Option(
@@ -172,6 +179,7 @@ def simulate(
         weather=weather,
         traffic=traffic,
         transient=_switches(transient or ()),
+        driver=driver,
         ride=ride,
         imu_rate=imu_rate,
         recording=recording,

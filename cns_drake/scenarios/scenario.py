@@ -99,6 +99,33 @@ class RideConfig(Section):
         return RoadProfile(self.roughness, self.seed)
 
 
+class DriverConfig(Section):
+    """How the driver departs from the middle of the lanes.
+
+    Attributes:
+        wander: standard deviation of the car's offset from its line, where the
+            road has room for it; the offsets of two drives differ by the square
+            root of two of it [m].
+        wander_length: distance after which the correlation of the offset has
+            fallen to 1/e [m].
+        lane_changes: rate at which the car goes to a lane beside its own, and
+            back after 15 to 270 m, where there is one [1/km].
+        follows: whether the car is a vehicle among those of `traffic`.
+        seed: seed of all draws; by default the drive's name is one.
+    """
+
+    wander: float = Field(default=0.0, ge=0.0, le=1.0)
+    wander_length: float = Field(default=50.0, ge=20.0, le=1000.0)
+    lane_changes: float = Field(default=0.0, ge=0.0, le=10.0)
+    follows: bool = False
+    seed: int | None = Field(default=None, ge=0)
+
+
+# Pairs of drives of Boreas and of MulRan KAIST differ by 0.5 m in a lane, and
+# are in different lanes on 10 to 17 % of the way.
+REAL_DRIVER = DriverConfig(wander=0.35, lane_changes=2.0, follows=True)
+
+
 class TrafficConfig(Section):
     """Vehicles and walkers that move while a drive is recorded.
 
@@ -192,6 +219,7 @@ class Scenario(Section):
             junctions, within the room of the road; to the left if negative, at
             most 3 [m].
         speeds: speed and acceleration.
+        driver: how the driver departs from the middle of the lanes.
         ride: motion of the car by springs and the road.
         traffic: moving vehicles and walkers.
         transient: passing changes since the stage was built.
@@ -222,6 +250,7 @@ class Scenario(Section):
     waypoints: str | None = _Optional
     u_turns: bool = False
     speeds: Speeds
+    driver: DriverConfig = field_off_by_default(DriverConfig())
     ride: RideConfig = field_off_by_default(RideConfig())
     traffic: TrafficConfig = field_off_by_default(TrafficConfig())
     transient: TransientConfig = Field(
@@ -255,6 +284,17 @@ class Scenario(Section):
             ):
                 raise ValueError(fault)
         return value
+
+    @field_validator("driver")
+    @classmethod
+    def _check_driver(
+        cls, driver: DriverConfig, info: ValidationInfo
+    ) -> DriverConfig:
+        if driver.lane_changes and info.data.get("waypoints") is not None:
+            raise ValueError(
+                "waypoints have no lanes for lane_changes; give a route"
+            )
+        return driver
 
     @field_validator("lidars")
     @classmethod
@@ -407,6 +447,21 @@ class Scenario(Section):
             InputError: there is no such switch, or its value is not usable.
         """
         return self.with_fields({"transient": changes}, self.source)
+
+    def with_driver(self, driver: Literal["real", "none"]) -> Scenario:
+        """Returns the scenario with another driver, of the same seed.
+
+        Args:
+            driver: `real` for the values of published drives; along waypoints,
+                which have no lanes, without changes of lane.
+        """
+        update: dict = {"seed": self.driver.seed}
+        if self.waypoints is not None:
+            update["lane_changes"] = 0.0
+        chosen = DriverConfig()
+        if driver == "real":
+            chosen = REAL_DRIVER.model_copy(update=update)
+        return self.model_copy(update={"driver": chosen})
 
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with the unit of every LiDAR replaced.

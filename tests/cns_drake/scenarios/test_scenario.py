@@ -228,6 +228,48 @@ def test_a_ride_is_written_only_where_there_is_one(small_map):
     assert "suspension" not in digest_inputs(rigid)
 
 
+def test_a_driver_is_written_only_where_there_is_one(small_map):
+    values = scenario_values(small_map)
+    calm = make_scenario(values, "test")
+    assert "driver" not in describe_scenario(calm)
+    real = calm.with_driver("real")
+    assert describe_scenario(real)["driver"]["wander"] == 0.35
+    assert real.with_driver("none") == calm
+    seeded = make_scenario({**values, "driver": {"seed": 7}}, "test")
+    assert seeded.with_driver("real").driver.seed == 7
+
+
+@pytest.mark.parametrize(
+    "driver",
+    [
+        {"wander": -0.1},
+        {"wander": 1.01},
+        {"wander_length": 19.0},
+        {"lane_changes": -1.0},
+        {"lane_changes": 10.1},
+        {"seed": -1},
+        {"swerve": 1},
+    ],
+)
+def test_a_driver_that_is_none_is_named(small_map, driver):
+    values = {**scenario_values(small_map), "driver": driver}
+    (field,) = driver
+    with pytest.raises(InputError, match=f"^test: driver.{field}: "):
+        make_scenario(values, "test")
+
+
+def test_along_waypoints_there_is_no_lane_to_change_to(small_map):
+    values = scenario_values(small_map)
+    del values["route"]
+    values["waypoints"] = "way.csv"
+    values["driver"] = {"wander": 0.35, "lane_changes": 2.0}
+    with pytest.raises(InputError, match=r"^test: driver: .*lane_changes"):
+        make_scenario(values, "test")
+    values["driver"] = {"wander": 0.35}
+    driver = make_scenario(values, "test").with_driver("real").driver
+    assert (driver.wander, driver.lane_changes) == (0.35, 0.0)
+
+
 @pytest.mark.parametrize(
     "ride", [{"roughness": "F"}, {"seed": -1}, {"class": 1}]
 )
