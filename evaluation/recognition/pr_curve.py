@@ -108,10 +108,10 @@ def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
     """Returns the areas (B,) under curves (B, K), K possibly 0."""
     if precision.shape[1] == 0:
         return np.zeros(len(precision))
-    start = precision[:, :1] * recall[:, :1]
+    start = precision[:, 0] * recall[:, 0]
     heights = 0.5 * (precision[:, 1:] + precision[:, :-1])
     widths = np.diff(recall, axis=1)
-    return start[:, 0] + (heights * widths).sum(axis=1)
+    return start + (heights * widths).sum(axis=1)
 
 
 def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:

@@ -1,3 +1,5 @@
+import dataclasses
+
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
@@ -92,6 +94,7 @@ def test_mask_keeps_what_both_drives_passed(drives):
     masked = values["coverage_masked"]
     assert masked["radius"] == 40.0
     assert 0 < masked["in_hull"] < values["in_hull"]
+    assert "reason" not in masked
     assert masked["tcr_sym"] == pytest.approx(
         1.0 - masked["unchanged"] / masked["in_hull"]
     )
@@ -127,17 +130,20 @@ def test_map_files_have_no_coverage_and_no_control(tmp_path, drives):
 def test_control_on_a_third_route(tmp_path, drives):
     other = drive(tmp_path / "other", "late", "south", reach=50.0)
     shifted = survey(other)
-    # The same drive, 3 m aside.
-    aside = type(shifted)(
-        shifted.name,
-        shifted.voxels,
-        shifted.positions + np.array([0.0, 3.0, 0.0]),
-        shifted.drive,
-    )
     a, b = drives["early", "south"], drives["late", "north"]
-    compare(a, b, shifted)
-    with pytest.raises(InputError, match=r"other: .* neither route: 3\.0 m"):
-        compare(a, b, aside)
+
+    def aside(y):
+        positions = shifted.positions + np.array([0.0, y, 0.0])
+        return dataclasses.replace(shifted, positions=positions)
+
+    for y in (0.0, 0.99):
+        compare(a, b, aside(y))
+    with pytest.raises(InputError, match=r"other: .* neither route: 1\.0 m"):
+        compare(a, b, aside(1.01))
+    # No drive passes within the coverage radius of the other.
+    masked = compare(a, aside(500.0)).to_json()["coverage_masked"]
+    assert masked["tcr_sym"] is None
+    assert "no point of either map" in masked["reason"]
 
 
 def test_disjoint_maps_are_undefined_with_a_reason(tmp_path):

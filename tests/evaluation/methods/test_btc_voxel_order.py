@@ -1,9 +1,15 @@
 """The order of a hash table, against that of the C++ library."""
 
+import math
+
 import numpy as np
 import pytest
 
-from evaluation.methods.btc_planes import hash_table_order, voxel_order
+from evaluation.methods.btc_planes import (
+    _NUM_BUCKETS,
+    hash_table_order,
+    voxel_order,
+)
 
 # The order of these 40 voxels, inserted one after the other, in a
 # std::unordered_map with the public program's hash (GCC 12.2, x86-64). The
@@ -55,6 +61,11 @@ def test_order_by_the_rules(number):
     codes = rng.integers(0, 2**64, number, dtype=np.uint64)
     codes[::3] %= np.uint64(50)
     assert hash_table_order(codes).tolist() == by_lists(codes)
+
+
+def test_numbers_of_buckets_are_primes():
+    for number in _NUM_BUCKETS:
+        assert (number % np.arange(2, math.isqrt(number) + 1) > 0).all()
 
 
 def test_a_large_table_holds_every_element_once():

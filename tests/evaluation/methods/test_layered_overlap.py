@@ -1,14 +1,15 @@
 """Layered overlap: its counts by brute force, and its poses."""
 
+import itertools
 import math
 
-from helpers.layered_scans import matrix, seen_from, some_cells, town
+from helpers.layered_scans import image, matrix, seen_from, some_cells, town
 import numpy as np
 import pytest
 
 from evaluation.methods import make_method
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
-from evaluation.methods.overlap_maps import layer_cells
+from evaluation.methods.overlap_maps import climb, layer_cells, turns
 
 
 def method(**parameters) -> LayeredOverlap:
@@ -70,6 +71,26 @@ class TestLayers:
                 wanted[layer] = 1
             assert np.diff(starts).tolist() == wanted
 
+    # A layer ends with its upper limit, a pole and a kerb begin with theirs.
+    @pytest.mark.parametrize(
+        ("limit", "until", "beyond"),
+        [
+            (0.08, [4], [4]),
+            (0.30, [4], []),
+            (0.35, [], [0]),
+            (1.5, [0], [1]),
+            (2.0, [1, 3], [1, 3]),
+            (4.0, [1, 3], [2, 3]),
+        ],
+    )
+    def test_limits_of_height(self, limit, until, beyond):
+        below, above = np.nextafter(limit, [0.0, 9.0])
+        before = {0.08: [], 2.0: [1]}.get(limit, until)
+        for z, layers in ((below, before), (limit, until), (above, beyond)):
+            points = np.array([[10.2, 3.2, 0.0], [10.2, 3.2, z]])
+            _, starts = layer_cells(points, 0.0, 0.5, 1)
+            assert np.flatnonzero(np.diff(starts)).tolist() == layers
+
     def test_the_ground_is_followed_uphill(self):
         rng = np.random.default_rng(3)
         xy = rng.uniform(-60.0, 60.0, (20000, 2))
@@ -102,6 +123,8 @@ class TestFinding:
         np.testing.assert_allclose(X_PQ[:2, 3], [x, y], atol=0.5)
         error = X_PQ[:3, :3].T @ matrix(yaw)
         assert abs(math.degrees(math.atan2(error[1, 0], error[0, 0]))) < 1.5
+        np.testing.assert_array_equal(X_PQ[2], [0.0, 0.0, 1.0, 0.0])
+        np.testing.assert_array_equal(X_PQ[:, 2], [0.0, 0.0, 1.0, 0.0])
 
     def test_half_of_it_is_gone(self):
         chosen = method()
@@ -151,6 +174,90 @@ class TestFinding:
         assert np.isfinite(some).sum() == 2
         assert np.isfinite(every).all()
         assert np.nanargmax(some) == np.nanargmax(every) == 1
+
+
+def pictures(scan, turn, halvings):
+    """Returns the four coarse maps of a scan, (4, n, n) of bool."""
+    low, middle, *others = (
+        image(scan.cells, scan.starts, layer, turn, halvings)
+        for layer in range(5)
+    )
+    return np.array([low | middle, *others])
+
+
+def look_near(query, place, weights, start, moves):
+    """Returns how much the best pose is above chance, and that pose."""
+    best, size = (-1, None), place.shape[1]
+    for heading, row, column in np.array(start) + moves:
+        turned = query[heading % len(query)]
+        wide = np.pad(turned, ((0, 0), (9, 9), (9, 9)))
+        shifted = wide[:, 9 - row :, 9 - column :][:, :size, :size]
+        total = weights @ (shifted & place).sum(axis=(1, 2))
+        if total > best[0]:
+            best = total, (heading % len(query), row, column)
+    product = query[best[1][0]].sum(axis=(1, 2)) * place.sum(axis=(1, 2))
+    variance = weights**2 @ product / size**2 + 1.0
+    return (best[0] - weights @ product / size**2) / math.sqrt(variance), best[
+        1
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_search_by_brute_force(seed):
+    query, *places = (
+        LayeredScan(*some_cells([seed, k], np.roll([9, 90, 40, 60, 20], k)))
+        for k in range(5)
+    )
+    # 15 deg and 4 m; all shifts by two cells at most, but for corners.
+    shifts = [*itertools.product(range(-2, 3), repeat=2)]
+    moves = [(0, r, c) for r, c in shifts if abs(r) + abs(c) < 4]
+    turned = [pictures(query, turn, 3) for turn in turns(24)]
+    found = []
+    for number, place in enumerate(places):
+        fixed, weights = (
+            pictures(place, (1 << 14, 0), 3),
+            np.array([1, 1, 2, 2]),
+        )
+        near = [
+            look_near(turned, fixed, weights, (heading, 0, 0), moves)
+            for heading in range(24)
+        ]
+        mean = np.mean([surprise for surprise, _ in near])
+        found += [(s - 0.5 * mean, number, pose) for s, pose in near]
+    # 5 deg and 2 m, then 2.5 deg.
+    turned = [pictures(query, turn, 2) for turn in turns(144)]
+    weights, scale = np.array([1, 1, 4, 2]), [6, 2, 2]
+    least = 12
+    for moves in (
+        [*itertools.product((-2, 0, 2), range(-1, 2), range(-1, 2))],
+        [*itertools.product(range(-3, 4), range(-2, 3), range(-2, 3))],
+    ):
+        starts = sorted(found, key=lambda one: -one[0])[:least]
+        found = []
+        for _, number, pose in starts:
+            fixed = pictures(places[number], (1 << 14, 0), 2)
+            surprise, pose = look_near(
+                turned, fixed, weights, np.array(pose) * scale, moves
+            )
+            found.append((surprise, number, pose))
+        scale, least = [1, 1, 1], 5
+    # 2.5 deg and 1 m, then half of that; two places only.
+    expected = np.full(len(places), np.nan)
+    weights = np.array([3, 3, 2, 60, 5])
+    best = {}
+    for _, number, pose in sorted(found, key=lambda one: -one[0]):
+        best.setdefault(number, np.array(pose) * [2, 8, 8])
+    for number, pose in [*best.items()][:2]:
+        place = places[number]
+        common = climb(
+            *(query.cells, query.starts, place.cells, place.starts),
+            *(weights, turns(288), pose, np.array([(2, 4), (1, 2)])),
+        )[3:]
+        cells = [weights @ np.diff(one.starts) + 150 for one in (query, place)]
+        expected[number] = weights @ common / math.sqrt(math.prod(cells))
+    chosen = method(poses=12, refined=5, candidates=2)
+    scores = chosen.score(query, chosen.build_database(places))
+    np.testing.assert_allclose(scores, expected, rtol=1e-12)
 
 
 class TestLittleToSee:

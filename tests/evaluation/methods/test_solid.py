@@ -94,6 +94,7 @@ class TestDescribe:
         )
         ranges = solid(**config).describe(scan).ranges
         np.testing.assert_array_equal(np.flatnonzero(ranges), [10, 15])
+        np.testing.assert_array_equal(ranges[[10, 15]], 1.0)
 
     def test_equal_counts_all_weigh_one(self):
         config = {"elevations": 2, "lowest_deg": -10.0, "highest_deg": 10.0}

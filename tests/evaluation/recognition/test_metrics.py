@@ -210,6 +210,7 @@ def test_recall_at_n():
     outcomes = judge(scores, matches)
     metrics = evaluate(outcomes)
     np.testing.assert_allclose(metrics.recall_at_n, np.arange(1, 26) / 30)
+    assert metrics.recall_at_1 == pytest.approx(1 / 30)
     # A hundredth of 200.
     assert outcomes.one_percent_rank == 2
     assert metrics.recall_at_1_percent == pytest.approx(2 / 30)
@@ -245,6 +246,8 @@ def test_auroc_counts_pairs(seed):
     yes, no = best[matches.any(axis=1)], best[~matches.any(axis=1)]
     wins = [(a > b) + 0.5 * (a == b) for a in yes for b in no]
     assert outcomes.match_auroc == pytest.approx(np.mean(wins))
+    one = judge(np.array([[5], [3], [4]]), np.array([[True], [True], [False]]))
+    assert one.match_auroc == 0.5
     assert np.isnan(judge(scores, matches | True).match_auroc)
     assert np.isnan(judge(scores, matches & False).match_auroc)
 
@@ -258,6 +261,8 @@ def test_bootstrap_intervals():
     assert metrics.recall_at_1_interval == again.recall_at_1_interval
     assert metrics.auc_interval == again.auc_interval
     assert evaluate(outcomes, seed=4).auc_interval != metrics.auc_interval
+    by_default = evaluate(outcomes, seed=0).auc_interval
+    assert evaluate(outcomes).auc_interval == by_default
     # For a part r of n: 1.96 standard deviations, up to the noise of 1000
     # samples.
     r = metrics.recall_at_1

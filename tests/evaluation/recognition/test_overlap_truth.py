@@ -153,6 +153,13 @@ def test_a_match_is_what_shows_the_same(rooms, capsys, tmp_path):
     expected = [[True, True, False], [True, True, False], [False, False, True]]
     assert result.retrieval.matches.tolist() == expected
     assert "a match shows 50% of" in result.protocol.to_text()
+    # The limit is itself enough.
+    overlaps = result.retrieval.overlaps
+    protocol = RetrievalProtocol(
+        overlap=float(overlaps[2, 2]), query_spacing=5.0
+    )
+    limit = run(database, query, method, protocol=protocol, overlaps=overlaps)
+    assert limit.retrieval.matches[2, 2]
     with pytest.raises(InputError, match="no place of a shows 100% of"):
         run(
             database,

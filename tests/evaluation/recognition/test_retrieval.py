@@ -111,6 +111,21 @@ def test_retrieval_from_two_drives(tmp_path):
     assert np.isnan(result.scores[:, -1]).all()
 
 
+def test_no_candidate_has_no_pose_error(tmp_path):
+    class Posed(OddOneOut):
+        def relative_pose(self, query, database, place):
+            return np.eye(4)
+
+    database = record_line(tmp_path / "a", [0.0, 5.0])
+    query = record_line(tmp_path / "b", [0.0, 11.0])
+    found = retrieve(database, query, Posed()).pose_errors.translation
+    np.testing.assert_allclose(found, [0.0, 11.0])
+    # Its only place is the last one.
+    alone = record_line(tmp_path / "c", [0.0])
+    found = retrieve(alone, query, Posed()).pose_errors
+    assert np.isnan([found.translation, found.rotation_deg]).all()
+
+
 def test_match_radius_is_inclusive(tmp_path):
     database = record_line(tmp_path / "a", [0.0])
     for x, is_match in ((7.5, True), (7.5 + 1e-6, False)):
@@ -176,6 +191,9 @@ def test_metrics_of_a_pair(tmp_path):
     assert values["queries"] == 5
     assert values["queries_with_match"] == 4
     assert values["true_positives"] == 3
+    assert values["f1_max_true_positives"] == 3
+    # These three, and the one that is missed.
+    assert values["f1_max_counted"] == 4
     assert values["recall_at_1"] == pytest.approx(3 / 4)
     assert values["places"] == 7
     assert (values["database"], values["query"]) == ("a", "b")
@@ -191,6 +209,7 @@ def test_auc_over_the_radius(tmp_path):
     query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
     result = run(database, query, OddOneOut())
     found = result.auc_over_radius()
+    assert [*found] == [2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0]
     assert found[7.5] == result.metrics.auc
     for radius, auc in found.items():
         protocol = RetrievalProtocol(radius=radius)
@@ -218,5 +237,6 @@ def test_a_drive_that_saw_nothing(tmp_path):
 def test_different_worlds(tmp_path):
     database = record_line(tmp_path / "a", [0.0, 5.0])
     query = record_line(tmp_path / "b", [0.0, 5.0], world_frame="utm")
-    with pytest.raises(InputError, match="frame 'utm'"):
-        retrieve(database, query, OddOneOut())
+    for compare in (retrieve, run):
+        with pytest.raises(InputError, match="frame 'utm'"):
+            compare(database, query, OddOneOut())
