@@ -20,7 +20,11 @@ from cns_drake.motion.suspension import (
     load_suspension_rates,
     ride_on_springs,
 )
-from cns_drake.motion.trajectory import Trajectory, poses_and_motion
+from cns_drake.motion.trajectory import (
+    BodyRide,
+    Trajectory,
+    poses_and_motion,
+)
 from cns_drake.motion.vehicle_motion import WheelMotion
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
@@ -51,6 +55,28 @@ def straight(start, end, angle=0.4):
     s = np.arange(start, end, 2.0)
     along = np.outer(s, [np.cos(angle), np.sin(angle), 0.0])
     return np.array([20.0, -30.0, 0.0]) + along
+
+
+def test_polynomials_of_degree_5_are_met():
+    rng = np.random.default_rng(4)
+    polynomials = [np.polynomial.Polynomial(c) for c in rng.normal(size=(3, 6))]
+
+    def at(times):
+        return [
+            np.stack([one.deriv(k)(times) for one in polynomials], axis=1)
+            for k in range(3)
+        ]
+
+    body = BodyRide(*at(0.25 * np.arange(9)), 0.25, 0.7)
+    # It stops with the last of the given times.
+    times = np.linspace(-0.5, 2.5, 61)
+    moments = body.at(times)
+    np.testing.assert_allclose(
+        [moments.q, moments.dq, moments.ddq],
+        at(times.clip(0.0, 2.0)),
+        atol=1e-10,
+    )
+    assert moments.pivot == 0.7
 
 
 def test_velocity_and_acceleration_are_derivatives_of_the_pose():

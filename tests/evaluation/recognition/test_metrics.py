@@ -246,8 +246,11 @@ def test_auroc_counts_pairs(seed):
     yes, no = best[matches.any(axis=1)], best[~matches.any(axis=1)]
     wins = [(a > b) + 0.5 * (a == b) for a in yes for b in no]
     assert outcomes.match_auroc == pytest.approx(np.mean(wins))
-    one = judge(np.array([[5], [3], [4]]), np.array([[True], [True], [False]]))
-    assert one.match_auroc == 0.5
+    # One query with a match, or one without, is between two others.
+    between = np.array([[False], [False], [True]])
+    for matches_of_three in (between, ~between):
+        three = judge(np.array([[5], [3], [4]]), matches_of_three)
+        assert three.match_auroc == 0.5
     assert np.isnan(judge(scores, matches | True).match_auroc)
     assert np.isnan(judge(scores, matches & False).match_auroc)
 
