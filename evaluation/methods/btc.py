@@ -161,12 +161,10 @@ class BtcDatabase:
 
     Attributes:
         places: their descriptions.
-        centers: trees of the centers of each place's planes.
         table: the triangles of all.
     """
 
     places: Sequence[BtcDescription]
-    centers: Sequence[cKDTree]
     table: TriangleTable
 
 
@@ -220,7 +218,6 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def build_database(self, places: Sequence[BtcDescription]) -> BtcDatabase:
         return BtcDatabase(
             places=places,
-            centers=[cKDTree(place.planes.centers) for place in places],
             table=make_table(
                 [place.triangles for place in places],
                 self.config.side_resolution,
@@ -243,7 +240,6 @@ class Btc(Method[BtcDescription, BtcDatabase]):
             overlap = plane_overlap(
                 query.planes,
                 planes,
-                database.centers[place],
                 X_PQ,
                 self.config.normal_limit,
                 self.config.distance_limit,
@@ -359,7 +355,6 @@ def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
 def plane_overlap(
     query: Planes,
     place: Planes,
-    place_centers: cKDTree,
     X_PQ: np.ndarray,
     normal_limit: float,
     distance_limit: float,
@@ -371,7 +366,6 @@ def plane_overlap(
     Args:
         query: patches of the query, at least one.
         place: patches of the place, at least one.
-        place_centers: tree of the centers of the latter.
         X_PQ: (4, 4) the query's frame in that of the place.
         normal_limit: upper limit of the difference of the two normals.
         distance_limit: upper limit of a center's distance from the other's
@@ -379,7 +373,7 @@ def plane_overlap(
     """
     centers = poses.transform(X_PQ, query.centers)
     normals = query.normals @ X_PQ[:3, :3].T
-    _, nearest = place_centers.query(centers)
+    _, nearest = cKDTree(place.centers).query(centers)
     # |n1 - n2| < d of unit vectors; either sign of a normal will do.
     cosines = np.abs((normals * place.normals[nearest]).sum(axis=1))
     offsets = ((centers - place.centers[nearest]) * place.normals[nearest]).sum(

@@ -34,6 +34,8 @@ _NUM_FEATURES = 6
 # removes a third of the power of the variance of z, and is therefore part of
 # the method.
 _NORM_EPSILON = 1e-5
+# Spectra of places that are kept, of a third of a megabyte each.
+_REFERENCES_KEPT = 64
 # The authors' scale of the correlation, chosen to make distances of 0 to 1.
 _CORRELATION_SCALE = 0.15
 
@@ -102,10 +104,12 @@ class RingDatabase:
     Attributes:
         places: the D descriptors.
         is_empty: (D,) bool, whether a place shows nothing.
+        reference: returns the conjugate spectrum of a place's map from above.
     """
 
     places: Sequence[Ring]
     is_empty: np.ndarray
+    reference: Callable[[int], np.ndarray]
 
 
 @register("ring++")
@@ -148,9 +152,14 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         )
 
     def build_database(self, places: Sequence[Ring]) -> RingDatabase:
+        def reference(place: int) -> np.ndarray:
+            return _spectrum(places[place].bev(self.config.cells)).conj()
+
         return RingDatabase(
             places=places,
             is_empty=np.array([len(place.filled) == 0 for place in places]),
+            # Queries that follow each other have many best places in common.
+            reference=functools.lru_cache(_REFERENCES_KEPT)(reference),
         )
 
     def score(
@@ -212,7 +221,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         num_cells = self.config.cells
         correlation = self._correlate(weighted, database.places[place].spectrum)
         shift = -_signed(int(correlation.argmax()), num_cells)
-        reference = _spectrum(database.places[place].bev(num_cells)).conj()
+        reference = database.reference(place)
         # Rows lie 360 / (n - 1) deg apart, but since the last one repeats the
         # first, a shift stands on average for 360 / n. Spectra of opposite
         # rays are equal, which leaves two headings.
