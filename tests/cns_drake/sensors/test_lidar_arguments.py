@@ -80,7 +80,7 @@ class Site:
         ),
         ({"range_noise": "x"}, ValueError, "range_noise: 'x' is not a length"),
         ({"dropout": "a"}, ValueError, "dropout: 'a' is not a probability"),
-        ({"dropout": 1.5}, ValueError, "dropout: 1.5 is not a probability"),
+        ({"dropout": 1.01}, ValueError, "dropout: 1.01 is not a probability"),
         ({"seed": -1}, ValueError, "seed: -1 is not an integer"),
         ({"seed": 0.5}, ValueError, "seed: 0.5 is not an integer"),
         (

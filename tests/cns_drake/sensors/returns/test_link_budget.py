@@ -9,6 +9,8 @@ from scipy.special import lambertw
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from cns_drake.sensors.returns.link_budget import (
+    CERTAIN_SNR,
+    HOPELESS_SNR,
     SheetRow,
     detection_probability,
     fit_link_budget,
@@ -57,6 +59,8 @@ def test_two_rows_fix_scale_and_extinction():
 
 
 def test_detection_rises_from_nothing_to_certainty():
+    assert detection_probability(HOPELESS_SNR) == 0.0
+    assert 1.0 - 1e-13 < detection_probability(CERTAIN_SNR) < 1.0
     snr = np.linspace(0.0, 100.0, 400)
     probability = np.array([detection_probability(value) for value in snr])
     assert (np.diff(probability) >= 0.0).all()

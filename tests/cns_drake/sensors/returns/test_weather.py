@@ -10,7 +10,11 @@ from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
-from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
+from cns_drake.sensors.returns.weather import (
+    Weather,
+    _quantiles,
+    tabulate_scattering,
+)
 
 OUTLIER = CLASS_IDS["outlier"]
 DIAMETERS_MM = np.linspace(0.01, 25.0, 4_000)
@@ -82,6 +86,33 @@ def test_the_table_of_drops_is_an_integral():
     assert table.counts[0] == 0.0
 
 
+def test_fog_sends_back_less_with_the_square_of_the_distance():
+    sheet = UNIT_SHEETS["os1-64"]
+    weather = Weather(visibility=100.0)
+    # From 3 m on, a beam lies whole in the field of view of the receiver.
+    table = tabulate_scattering(
+        weather, sheet.budget, sheet.divergence, sheet.resolution, 3.0
+    )
+    alpha = np.log(20.0) / 100.0
+    parts = [
+        integrate.quad(lambda r: np.exp(-2.0 * alpha * r) / r**2, 3.0, end)[0]
+        for end in table.distances
+    ]
+    np.testing.assert_allclose(
+        table.fog_counts, np.array(parts) / parts[-1], atol=2e-3
+    )
+    expected = np.pi * 0.046 / 100.0 * sheet.resolution
+    np.testing.assert_allclose(table.fog_energies, expected)
+
+
+def test_quantiles_are_those_of_the_weight():
+    values = np.random.default_rng(2).permutation(3200)
+    # Those from 1600 on weigh nothing.
+    found = _quantiles(values[None], (values[None] < 1600) * 0.5)
+    np.testing.assert_array_equal(found, [np.arange(49, 1600, 100)])
+    assert not _quantiles(values[None], np.zeros((1, 3200))).any()
+
+
 @pytest.mark.parametrize(
     "weather", [Weather(rain=10.0), Weather(rain=60.0), Weather(snowfall=0.2)]
 )
@@ -144,9 +175,16 @@ def test_wet_asphalt_is_darker():
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("visibility", 1.0), ("rain", -1.0), ("snowfall", 1e4), ("rain", np.nan)],
+    [
+        ("visibility", 4.999),
+        ("visibility", 1e6),
+        ("rain", -0.001),
+        ("snowfall", 300.001),
+        ("rain", np.nan),
+    ],
 )
 def test_senseless_weather(field, value):
+    assert not Weather(5.0, 300.0, 300.0).is_clear
     with pytest.raises(ValueError, match=field):
         Weather(**{field: value})
 
