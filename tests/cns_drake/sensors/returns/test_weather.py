@@ -149,6 +149,14 @@ def test_fog_shows_where_nothing_else_does():
     assert counts[-1] == 0
 
 
+def test_fog_behind_a_black_wall_is_hidden():
+    wall = plate("wall", 0.0, facing(6.0))
+    points = scan([wall], ahead(2_000), unit(weather=Weather(30.0)))
+    assert len(points) > 500
+    assert 5.5 < points["x"].max() < 6.5
+    assert (points["label"] == OUTLIER).all()
+
+
 def test_zero_rates_are_clear_air():
     wall = plate("wall", 0.3, facing(30.0))
     clear = scan([wall], ahead(3_000), unit())
