@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from pydrake.geometry import Role, SceneGraph
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,17 +13,53 @@ from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_adding import (
     connect_traffic,
     make_traffic,
     place_traffic,
     traffic_structures,
 )
-from cns_drake.traffic.traffic_motion import MOVING_SPEED, bodies_at
+from cns_drake.traffic.traffic_motion import (
+    MOVING_SPEED,
+    BodyStates,
+    LimbTable,
+    bodies_at,
+)
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, Tracks, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS
 
 T = 2.0
+
+
+def test_limbs_swing_about_their_joints():
+    joints = np.array([(0.3, -0.2, 1.1), (-0.4, 0.5, 0.8), (0.1, 0.2, 0.9)])
+    swings = 0.6, -0.35, 0.2
+    one, two, gone = (
+        Limb(f"limb_{k}", tuple(joint), swing, ())
+        for k, (joint, swing) in enumerate(zip(joints, swings, strict=True))
+    )
+    p_WBs = np.array([(4.0, -7.0, 0.2), (1.0, 2.0, 3.0)])
+    states = BodyStates(
+        p_WBs,
+        np.zeros((2, 3)),
+        yaw=np.array([0.9, -2.0]),
+        pitch=np.array([-0.15, 0.1]),
+        yaw_rate=np.zeros(2),
+        present=np.array([True, False]),
+        swing=np.array([0.7, -1.0]),
+    )
+    table = LimbTable([(one, two), (gone,)])
+    assert table.body.tolist() == [0, 0, 1]
+    X_WLs = table.poses(states)
+    X_WB = RigidTransform(RollPitchYaw(0.0, -0.15, 0.9), p_WBs[0])
+    for X_WL, joint, swing in zip(X_WLs, joints, swings[:2], strict=False):
+        X_BL = RigidTransform(RollPitchYaw(0.0, -0.7 * swing, 0.0), joint)
+        np.testing.assert_allclose(
+            X_WL, (X_WB @ X_BL).GetAsMatrix4(), atol=1e-12
+        )
+    # A body that is not there lies deep under the ground.
+    assert X_WLs[2, 2, 3] < -1_000.0
 
 
 def make_plan():

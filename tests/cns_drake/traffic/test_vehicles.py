@@ -3,15 +3,58 @@
 import numpy as np
 import pytest
 
+from cns_drake.traffic.streets import PIECE, Streets
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
 from cns_drake.traffic.vehicles import (
+    CURRENT,
     HARDEST_BRAKING,
     VEHICLE,
     free_acceleration,
     interaction,
+    vehicle_poses,
 )
 
 V0, T, A, B = 13.9, 1.5, 1.5, 2.0
+
+
+def straight_lanes(lengths, start, along):
+    """Returns pieces that follow each other on a line."""
+    rows, points, begin = np.zeros(len(lengths), PIECE), [], 0.0
+    for row, length in zip(rows, lengths, strict=True):
+        row["first"], row["num_points"] = len(points), 5
+        row["step"], row["length"] = length / 4, length
+        points += [start + s * along for s in begin + length * np.arange(5) / 4]
+        begin += length
+    nothing = [None] * (len(Streets._fields) - 2)
+    return Streets(rows, np.array(points), *nothing)
+
+
+@pytest.mark.parametrize("s", [0.4, 3.0, 12.0])
+def test_a_bus_stands_with_both_axles_on_its_way(s):
+    start = np.array([20.0, -30.0, 2.0])
+    heading, climb = 2.0, 0.1
+    along = np.array([*(np.cos(climb) * f(heading) for f in (np.cos, np.sin))])
+    along = np.append(along, np.sin(climb))
+    lengths = [7.0, 2.0, 1.5, 20.0]
+    bus = np.zeros(1, VEHICLE)
+    bus["length"], bus["front_axle"], bus["rear_axle"] = 12.0, 3.1, -2.8
+    bus["path"], bus["left_lane"], bus["s"] = -1, -1, s
+    bus["path"][0, CURRENT - 3 : CURRENT + 1] = range(4)
+    found = vehicle_poses(straight_lanes(lengths, start, along), bus)
+    middle = start + (sum(lengths[:3]) + s - 6.0) * along
+    np.testing.assert_allclose(found, [[*middle, heading, -climb]], atol=1e-12)
+    # In the middle of a change of lanes it is between both.
+    aside = 3.5 * np.array([-np.sin(heading), np.cos(heading), 0.0])
+    both = straight_lanes([*lengths, 20.0], start, along)
+    both.points[20:] = both.points[15:20] + aside
+    bus["s"], bus["left_lane"], bus["change_length"] = 12.0, 4, 40.0
+    bus["change_start"] = 12.0 - 6.0 + 0.5 * (3.1 - 2.8) - 20.0
+    found = vehicle_poses(both, bus)[0]
+    middle = start + (sum(lengths[:3]) + 6.0) * along + 0.5 * aside
+    np.testing.assert_allclose(found[:3], middle, atol=0.05)
+    # Over the distance of the axles, 15/8 of 3.5 m in 40 m.
+    turned = np.arctan(15.0 / 8.0 * 3.5 / 40.0 / np.cos(climb))
+    assert found[3] == pytest.approx(heading - turned, abs=0.01)
 
 
 def car(v):

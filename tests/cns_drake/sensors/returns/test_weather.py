@@ -150,10 +150,10 @@ def test_fog_shows_where_nothing_else_does():
 
 
 def test_fog_behind_a_black_wall_is_hidden():
-    wall = plate("wall", 0.0, facing(6.0))
+    wall = plate("wall", 0.0, facing(3.0))
     points = scan([wall], ahead(2_000), unit(weather=Weather(30.0)))
     assert len(points) > 500
-    assert 5.5 < points["x"].max() < 6.5
+    assert 2.9 < points["x"].max() < 3.2
     assert (points["label"] == OUTLIER).all()
 
 
