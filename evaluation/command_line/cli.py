@@ -157,6 +157,28 @@ def pr(
             "default they are found from the scans.",
         ),
     ] = None,
+    turn_queries: Annotated[
+        bool,
+        typer.Option("--turn-queries", help="Turn each query by a random yaw."),
+    ] = False,
+    tilt_queries: Annotated[
+        float,
+        typer.Option(
+            metavar="DEG",
+            help="Tilt each query by a random roll and pitch of up to this.",
+        ),
+    ] = 0.0,
+    hide_sector: Annotated[
+        float,
+        typer.Option(
+            metavar="DEG",
+            help="Hide a random sector of this angle from each query, as a "
+            "truck beside it would.",
+        ),
+    ] = 0.0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the changes of queries.")
+    ] = 0,
     json: Json = False,
     *,
     protocol: RetrievalProtocol,
@@ -177,7 +199,15 @@ def pr(
         write_overlaps,
     )
 
-    protocol = replace(protocol, overlap=overlap_of(truth))
+    protocol = replace(
+        protocol,
+        overlap=overlap_of(truth),
+        place="middle",
+        turn_queries=turn_queries,
+        tilt_queries=tilt_queries,
+        hide_sector=hide_sector,
+        seed=seed,
+    )
     for option, file in (
         ("--overlaps", overlaps),
         ("--exact-overlaps", exact_overlaps),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 import functools
 import inspect
@@ -13,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from cns_drake.base.errors import InputError
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 
 
 class ModeName(str, Enum):
@@ -197,13 +198,13 @@ def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
 
     Args:
         command: has a keyword `protocol`, a `RetrievalProtocol`, which the
-            options replace on the command line.
+            options replace on the command line; the rest is the paper's.
     """
 
     @functools.wraps(command)
     def with_options(**values: Any) -> None:
         chosen = {name: values.pop(name) for name in _OPTIONS}
-        command(**values, protocol=RetrievalProtocol(**chosen))
+        command(**values, protocol=replace(PAPER_PROTOCOL, **chosen))
 
     signature = inspect.signature(command, eval_str=True)
     own = [p for p in signature.parameters.values() if p.name != "protocol"]

@@ -15,6 +15,7 @@ from cns_drake.base import poses
 from cns_drake.base.compiled import compiled
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
+from evaluation.drives.query_sensor import QuerySensor
 
 
 def travelled(positions: np.ndarray) -> np.ndarray:
@@ -59,6 +60,7 @@ def gather(
     max_range: float,
     fields: tuple[str, ...] = (),
     num_before: int = 0,
+    sensor: QuerySensor | None = None,
 ) -> np.ndarray:
     """Returns the cloud that a method describes at a frame.
 
@@ -70,6 +72,8 @@ def gather(
         max_range: see `within_range`.
         fields: fields of the points, beside their coordinates.
         num_before: how many of the scans come before the frame.
+        sensor: turns the frame's sensor, and hides the same sector of each of
+            the scans; None for the cloud as recorded.
 
     Returns:
         (N, 3) float64, in the sensor frame of the frame's scan; with fields,
@@ -81,19 +85,23 @@ def gather(
     first = max(frame - num_before, 0)
     end = min(frame - num_before + num_scans, len(drive))
     X_WS = drive.X_WS
+    X_FS0 = None
+    if sensor is not None and sensor.X_SQ is not None:
+        X_FS0 = poses.inverse(sensor.X_SQ)
     X_S0W = poses.inverse(X_WS[frame])
-    return np.concatenate(
-        [
-            cropped(
-                drive.scan(index),
-                max_range,
-                None if index == frame else X_S0W @ X_WS[index],
-                fields,
-                drive.name,
-            )
-            for index in range(first, end)
-        ]
-    )
+
+    def seen(index: int) -> np.ndarray:
+        scan = drive.scan(index)
+        if sensor is not None:
+            scan = sensor.without_hidden(scan)
+        X_FS = X_FS0
+        if index != frame:
+            X_FS = X_S0W @ X_WS[index]
+            if X_FS0 is not None:
+                X_FS = X_FS0 @ X_FS
+        return cropped(scan, max_range, X_FS, fields, drive.name)
+
+    return np.concatenate([seen(index) for index in range(first, end)])
 
 
 @compiled

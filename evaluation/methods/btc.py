@@ -7,7 +7,7 @@ triangles, by their sides and the descriptors of their vertices, are candidates.
 A candidate counts if its triangles agree on a motion; its score is the fit of
 both clouds' planes under that motion.
 
-The clouds are several consecutive scans, in the frame of the first. (The
+The clouds are several consecutive scans, in the frame of one of them. (The
 method's authors describe them in a common world frame, which favours it:
 the grids on which planes and keypoints are found then coincide.)
 

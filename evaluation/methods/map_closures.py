@@ -24,7 +24,12 @@ from pydantic import PositiveFloat, PositiveInt
 
 from cns_drake.base.errors import InputError
 from evaluation.maps.voxel_maps import thin
-from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.method import (
+    Method,
+    MethodConfig,
+    PlaceScan,
+    register,
+)
 
 # Larger than any number of local maps, and the number of the first query. The
 # numbers of later queries fall, and stay far above those of places, since the
@@ -38,6 +43,8 @@ class MapClosuresConfig(MethodConfig):
     The height of the sensor is not used: the package finds the ground.
 
     Attributes:
+        place: which of the merged scans stands for a place, `middle` or
+            `first`.
         density_map_resolution: length of a pixel, and of the voxels to which
             local maps are thinned [m].
         density_threshold: density below which a pixel is empty, as a part of
@@ -46,6 +53,7 @@ class MapClosuresConfig(MethodConfig):
             differ.
     """
 
+    place: PlaceScan | None = "middle"
     density_map_resolution: PositiveFloat = 0.5
     density_threshold: PositiveFloat = 0.05
     hamming_distance_threshold: PositiveInt = 50
@@ -81,7 +89,6 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     Config = MapClosuresConfig
     config: MapClosuresConfig
     scans_per_place = 200
-    is_centred = True
 
     def __init__(self, config: MapClosuresConfig | None = None):
         """Prepares the package.
@@ -98,7 +105,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
                 "map-closures: not installed; run pip install "
                 "'cns-drake[map-closures]' (NumPy below 2.3)"
             ) from error
-        settings = self.config.model_dump(exclude={"sensor_height"})
+        settings = self.config.model_dump(exclude={"sensor_height", "place"})
         values = package_config.MapClosuresConfig(**settings)
         self._make_program: Callable[[], Any] = partial(
             map_closures.MapClosures, values

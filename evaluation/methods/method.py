@@ -13,7 +13,7 @@ import os
 from pathlib import Path
 import sys
 import traceback
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
@@ -23,6 +23,9 @@ from cns_drake.base.errors import InputError
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")
 
+# The scan of a merged place that stands for it: its pose is that of the place.
+PlaceScan = Literal["middle", "first"]
+
 
 class MethodConfig(BaseModel):
     """Parameters of a method; each default has its source.
@@ -30,6 +33,9 @@ class MethodConfig(BaseModel):
     Attributes:
         sensor_height: height of the LiDAR above the ground [m]. Default: the
             mount of the CNS vehicle.
+        place: which of the merged scans stands for a place, `middle` or
+            `first`; None for the choice of the protocol. Methods of single
+            scans do not use it.
 
     Example:
         from evaluation import MethodConfig
@@ -41,6 +47,7 @@ class MethodConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     sensor_height: NonNegativeFloat = 1.6
+    place: PlaceScan | None = None
 
 
 class Method(abc.ABC, Generic[Descriptor, Database]):
@@ -50,8 +57,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         name: as on the command line.
         Config: type of its parameters.
         scans_per_place: number of consecutive scans that are merged into the
-            described cloud, from that of the place on and in its frame.
-        is_centred: whether half of the merged scans come before the place's.
+            described cloud, in the frame of the scan that stands for it.
         point_fields: further fields of points that it needs, such as intensity,
             ring, t or label.
         batch_size: number of clouds for a call of `describe_batch`.
@@ -75,7 +81,6 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     name: ClassVar[str]
     Config: ClassVar[type[MethodConfig]] = MethodConfig
     scans_per_place: ClassVar[int] = 1
-    is_centred: ClassVar[bool] = False
     point_fields: ClassVar[tuple[str, ...]] = ()
     batch_size: ClassVar[int] = 1
     rerank_best: ClassVar[int] = 0

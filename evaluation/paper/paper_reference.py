@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import functools
 from importlib import resources
 import itertools
@@ -19,7 +19,7 @@ import numpy as np
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.metrics import Mode
 from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.reference import (
     NO_REFERENCE,
     Finding,
@@ -101,8 +101,8 @@ def paper() -> Reference:
         further=[("kaist (real)", "01 ↔ 06", changes[_KAIST])],
         recognitions=recognitions,
         protocols={
-            key[3]: RetrievalProtocol(
-                scans_per_place=10 if key[3] == "btc" else 1
+            key[3]: replace(
+                PAPER_PROTOCOL, scans_per_place=10 if key[3] == "btc" else 1
             )
             for key in recognitions
         },

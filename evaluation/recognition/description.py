@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Set
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -13,10 +13,12 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.method import Method
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 
 # The role of a drive.
 Role = Literal["places", "queries"]
+# A frame, with its cloud in each role that it has.
+_Waiting: TypeAlias = "tuple[int, Mapping[Role, np.ndarray]]"
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ def describe_drive(
     drive: Drive,
     methods: Iterable[Method],
     roles: Set[Role],
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
     track: Track = silent,
     visit: Callable[[int, np.ndarray], None] | None = None,
 ) -> list[DescribedDrive]:
@@ -79,7 +81,8 @@ def describe_drive(
         protocol: for the frames of places and queries, and their clouds.
         track: reports progress.
         visit: also receives each described frame and its single scan (N, 3),
-            cropped, in the frame of the sensor.
+            cropped, in the frame of the sensor: as recorded if the drive has
+            places, else as its queries see it.
 
     Returns:
         The descriptions by each method.
@@ -88,9 +91,7 @@ def describe_drive(
         InputError: if the drive cannot be read, it lacks a field that a
             method needs, or no described cloud has a point within range.
     """
-    describing = [
-        _Describing(method, drive, roles, protocol) for method in methods
-    ]
+    describing = [_Describing(method, drive, protocol) for method in methods]
     frames = {role: _frames(drive, role, protocol) for role in roles}
     wanted = np.unique(np.concatenate([*frames.values()])).tolist()
     # Number of merged scans of a cloud, of those before its frame, and fields
@@ -100,18 +101,35 @@ def describe_drive(
     if visit is not None:
         kinds.add(single)
     num_points = 0
+    members = {role: set(found.tolist()) for role, found in frames.items()}
     for frame in track(wanted, f"describing {drive.name}", len(wanted)):
+        sensors = {
+            role: protocol.query_sensor(frame) if role == "queries" else None
+            for role in sorted(roles)
+            if frame in members[role]
+        }
+        shown = None if "places" in roles else sensors["queries"]
+        needed = dict.fromkeys(sensors.values())
+        if visit is not None:
+            needed[shown] = None
         clouds = {
-            (number, before, fields): gather(
-                drive, frame, number, protocol.max_range, fields, before
+            (sensor, kind): gather(
+                drive,
+                frame,
+                kind[0],
+                protocol.max_range,
+                kind[2],
+                kind[1],
+                sensor,
             )
-            for number, before, fields in kinds
+            for sensor in needed
+            for kind in kinds
         }
         num_points += max(map(len, clouds.values()))
         if visit is not None:
-            visit(frame, clouds[single])
+            visit(frame, clouds[shown, single])
         for one in describing:
-            one.add(frame, clouds[one.kind])
+            one.add(frame, {r: clouds[s, one.kind] for r, s in sensors.items()})
     if num_points == 0:
         raise InputError(
             f"{drive.name}: no finite point within {protocol.max_range:g} m"
@@ -136,7 +154,6 @@ class _Describing:
         self,
         method: Method,
         drive: Drive,
-        roles: Set[Role],
         protocol: RetrievalProtocol,
     ):
         self.kind = (
@@ -145,21 +162,18 @@ class _Describing:
             tuple(method.point_fields),
         )
         self._method = method
-        self._waiting: list[tuple[int, np.ndarray]] = []
+        self._waiting: list[_Waiting] = []
         scans = {}
         for role in ("places", "queries"):
             frames = _frames(drive, role, protocol)
-            scans[role] = DescribedScans(
-                frames, drive.stamps_ns[frames], drive.X_WS[frames]
-            )
+            X_WS = drive.X_WS[frames]
+            if role == "queries":
+                X_WS = protocol.query_poses(X_WS, frames)
+            scans[role] = DescribedScans(frames, drive.stamps_ns[frames], X_WS)
         self._drive = DescribedDrive(drive.name, **scans)
-        self._members = {
-            role: set(scans[role].frames.tolist()) if role in roles else set()
-            for role in scans
-        }
 
-    def add(self, frame: int, cloud: np.ndarray) -> None:
-        self._waiting.append((frame, cloud))
+    def add(self, frame: int, clouds: Mapping[Role, np.ndarray]) -> None:
+        self._waiting.append((frame, clouds))
         if len(self._waiting) >= self._method.batch_size:
             self._flush()
 
@@ -169,32 +183,30 @@ class _Describing:
 
     def _flush(self) -> None:
         waiting, self._waiting = self._waiting, []
-        described = self._describe(waiting, self._members["places"], True)
-        self._keep(self._drive.places, described, waiting)
-        query_frames = self._members["queries"]
-        shared = described if self._method.describes_alike else {}
-        described = shared | self._describe(
-            waiting, query_frames - set(shared), False
-        )
-        described = {
-            f: one for f, one in described.items() if f in query_frames
-        }
-        self._keep(self._drive.queries, described, waiting)
+        places = self._describe(waiting, "places")
+        self._keep(self._drive.places, "places", places, waiting)
+        shared = {}
+        if self._method.describes_alike:
+            shared = {
+                frame: places[frame]
+                for frame, clouds in waiting
+                if frame in places and clouds.get("queries") is clouds["places"]
+            }
+        asked = [one for one in waiting if one[0] not in shared]
+        queries = shared | self._describe(asked, "queries")
+        self._keep(self._drive.queries, "queries", queries, waiting)
 
     def _describe(
-        self,
-        waiting: list[tuple[int, np.ndarray]],
-        members: set[int],
-        of_places: bool,
+        self, waiting: list[_Waiting], role: Role
     ) -> dict[int, object]:
-        """Returns frame -> descriptor of the frames that are members."""
+        """Returns frame -> descriptor of the frames that have a role."""
         chosen = [
-            (frame, cloud) for frame, cloud in waiting if frame in members
+            (frame, clouds[role]) for frame, clouds in waiting if role in clouds
         ]
         if not chosen:
             return {}
         found = self._method.describe_batch(
-            [cloud for _, cloud in chosen], of_places=of_places
+            [cloud for _, cloud in chosen], of_places=role == "places"
         )
         if len(found) != len(chosen):
             raise InputError(
@@ -208,11 +220,12 @@ class _Describing:
     def _keep(
         self,
         scans: DescribedScans,
+        role: Role,
         described: dict[int, object],
-        waiting: list[tuple[int, np.ndarray]],
+        waiting: list[_Waiting],
     ) -> None:
-        for frame, cloud in waiting:
+        for frame, clouds in waiting:
             if frame in described:
                 scans.descriptors.append(described[frame])
                 if self._method.rerank_best:
-                    scans.clouds.append(cloud)
+                    scans.clouds.append(clouds[role])

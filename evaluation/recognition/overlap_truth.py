@@ -79,7 +79,13 @@ def overlap_matrix(
 
     query_frames, placed = compared_frames(database, query, protocol)
     clouds = [
-        gather(query, frame, 1, protocol.max_range)
+        gather(
+            query,
+            frame,
+            1,
+            protocol.max_range,
+            sensor=protocol.query_sensor(frame),
+        )
         for frame in track(
             query_frames.tolist(),
             f"overlap: reading {query.name}",
@@ -89,7 +95,7 @@ def overlap_matrix(
     if see is None:
         see = see_scan
         clouds = [sampled(points) for points in clouds]
-    X_WQs = query.X_WS[query_frames]
+    X_WQs = protocol.query_poses(query.X_WS[query_frames], query_frames)
     reaches = np.array(
         [np.linalg.norm(points, axis=1).max(initial=0.0) for points in clouds]
     )

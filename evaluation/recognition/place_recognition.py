@@ -20,7 +20,7 @@ from evaluation.recognition.metrics import (
 )
 from evaluation.recognition.pose_errors import PoseMetrics, pose_metrics
 from evaluation.recognition.pr_curve import pr_curve
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.resampling import Interval
 from evaluation.recognition.retrieval import Retrieval, retrieve
@@ -121,7 +121,7 @@ def run(
     query: Drive,
     method: Method,
     mode: Mode = "all",
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
     track: Track = silent,
     *,
     across_maps: bool = False,

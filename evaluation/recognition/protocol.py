@@ -9,12 +9,24 @@ from typing import TYPE_CHECKING
 from cns_drake.base.errors import InputError
 
 if TYPE_CHECKING:
-    from evaluation.methods.method import Method
+    import numpy as np
+
+    from evaluation.drives.query_sensor import QuerySensor
+    from evaluation.methods.method import Method, PlaceScan
+
+
+_POSITIVE = (
+    *("radius", "query_spacing", "place_spacing", "max_range"),
+    *("scans_per_place", "exclude_recent", "overlap"),
+)
+_QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 
 
 @dataclass(frozen=True)
 class RetrievalProtocol:
-    """The protocol of a comparison of two drives; by default the paper's.
+    """The protocol of a comparison of two drives.
+
+    By default it is the paper's, but for the places of merged scans.
 
     Attributes:
         radius: greatest distance of a match from its query [m].
@@ -24,6 +36,10 @@ class RetrievalProtocol:
             left out [m].
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; None for each method's own number.
+        place: which of the merged scans stands for a place, unless the
+            method's own parameter says so: `middle`, or as in the paper
+            `first`. Truth goes by the pose of that scan. It becomes None for
+            one scan per place.
         exclude_recent: for a drive against itself: only places count that it
             passed at least this long before [s]. None for two drives.
         overlap: a place is a match at any distance if its scan shows at least
@@ -31,10 +47,17 @@ class RetrievalProtocol:
             for matches by the radius.
         gate: whether to reject those of a query's best places that the method's
             own pose puts farther away than the radius, see `gate`.
+        turn_queries: whether each query's sensor has a random yaw. Places stay
+            as recorded.
+        tilt_queries: greatest random roll, and pitch, of a query's sensor,
+            from 0 to 90 [deg].
+        hide_sector: angle of the random sector that is hidden from a query,
+            from 0 to below 360 [deg].
+        seed: of these random numbers, see `QuerySensor.draw`.
 
     Raises:
-        InputError: if a value is not positive, with the option that it has
-            on the command line.
+        InputError: if a value is out of range, with the option that it has on
+            the command line.
 
     Example:
         from evaluation import RetrievalProtocol
@@ -47,17 +70,34 @@ class RetrievalProtocol:
     place_spacing: float = 5.0
     max_range: float = 100.0
     scans_per_place: int | None = None
+    place: PlaceScan | None = "middle"
     exclude_recent: float | None = None
     overlap: float | None = None
     gate: bool = False
+    turn_queries: bool = False
+    tilt_queries: float = 0.0
+    hide_sector: float = 0.0
+    seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if name == "gate" or value is None:
-                continue
-            if not 0.0 < value < math.inf:
+        for name in _POSITIVE:
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
                 option = name.replace("_", "-")
                 raise InputError(f"--{option}: {value} is not positive")
+        if self.scans_per_place == 1:
+            object.__setattr__(self, "place", None)
+        if not 0.0 <= self.tilt_queries <= 90.0:
+            raise InputError(
+                f"--tilt-queries: {self.tilt_queries} is not from 0 to 90 deg"
+            )
+        if not 0.0 <= self.hide_sector < 360.0:
+            raise InputError(
+                f"--hide-sector: {self.hide_sector} is not from 0 to below"
+                " 360 deg"
+            )
+        if self.seed < 0:
+            raise InputError(f"--seed: {self.seed} is negative")
 
     def scans(self, method: Method) -> int:
         """Returns the number of scans of a method's place."""
@@ -67,7 +107,40 @@ class RetrievalProtocol:
 
     def scans_before(self, method: Method) -> int:
         """Returns how many scans of a method's place come before its own."""
-        return self.scans(method) // 2 if method.is_centred else 0
+        is_middle = self.of(method).place == "middle"
+        return self.scans(method) // 2 if is_middle else 0
+
+    def query_sensor(self, frame: int) -> QuerySensor | None:
+        """Returns the sensor of a query; None for the recorded one."""
+        if not self._changes_queries:
+            return None
+        from evaluation.drives.query_sensor import QuerySensor
+
+        return QuerySensor.draw(
+            self.seed,
+            frame,
+            self.turn_queries,
+            self.tilt_queries,
+            self.hide_sector,
+        )
+
+    def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Returns the poses (Q, 4, 4) of the queries' sensors.
+
+        Args:
+            X_WS: (Q, 4, 4) poses of the recorded sensor.
+            frames: (Q,) frames of the queries.
+        """
+        X_WQ = X_WS.copy()
+        for row, frame in enumerate(frames.tolist()):
+            sensor = self.query_sensor(frame)
+            if sensor is not None and sensor.X_SQ is not None:
+                X_WQ[row] = X_WS[row] @ sensor.X_SQ
+        return X_WQ
+
+    @property
+    def _changes_queries(self) -> bool:
+        return any(getattr(self, name) for name in _QUERY_CHANGES)
 
     @property
     def gate_radius(self) -> float | None:
@@ -76,17 +149,28 @@ class RetrievalProtocol:
 
     def of(self, method: Method) -> RetrievalProtocol:
         """Returns the protocol of a method's run, without open choices."""
-        return replace(self, scans_per_place=self.scans(method))
+        return replace(
+            self,
+            scans_per_place=self.scans(method),
+            place=method.config.place or self.place,
+        )
 
-    def described(self) -> dict[str, float | int | None]:
-        """Returns the options that the descriptions of a drive depend on."""
+    def described(self, *, queries: bool = True) -> dict[str, object]:
+        """Returns the options that the descriptions of a drive depend on.
+
+        Args:
+            queries: whether it has queries, and not only places.
+        """
         values = asdict(self)
-        for name in ("radius", "exclude_recent", "overlap", "gate"):
+        unused = ["radius", "exclude_recent", "overlap", "gate"]
+        if not (queries and self._changes_queries):
+            unused += [*_QUERY_CHANGES, "seed"]
+        for name in unused:
             del values[name]
         return values
 
-    def to_json(self) -> dict[str, float | int | None]:
-        """Returns all numbers of the protocol, by their names."""
+    def to_json(self) -> dict[str, object]:
+        """Returns all options of the protocol, by their names."""
         return asdict(self)
 
     def to_text(self) -> str:
@@ -103,11 +187,27 @@ class RetrievalProtocol:
             number = self.scans_per_place
             scans = "one scan" if number == 1 else f"{number} scans"
             parts.append(f"{scans} a place")
+            if self.place is not None:
+                parts.append(f"the {self.place} scan gives the pose")
         if self.exclude_recent is not None:
             parts.append(
                 "of a drive against itself places passed at least"
                 f" {self.exclude_recent:g} s before"
             )
+        if self.turn_queries:
+            parts.append("each query turned by a random yaw")
+        if self.tilt_queries:
+            parts.append(
+                "each query tilted by a random roll and pitch of up to"
+                f" {self.tilt_queries:g} deg"
+            )
+        if self.hide_sector:
+            parts.append(
+                f"a random sector of {self.hide_sector:g} deg hidden from each"
+                " query"
+            )
+        if self._changes_queries:
+            parts.append(f"seed {self.seed}")
         text = f"{', '.join(parts)}."
         if self.gate:
             text += f" {GATE_TEXT}"
@@ -120,11 +220,16 @@ GATE_TEXT = (
     " query, and places beyond the radius are rejected."
 )
 
-# The defaults, which are the paper's.
-PAPER_PROTOCOL = RetrievalProtocol()
+DEFAULT_PROTOCOL = RetrievalProtocol()
+
+# That of the paper, and of the tables of a study.
+PAPER_PROTOCOL = RetrievalProtocol(place="first")
 
 # Columns of a table of results: the options of the protocol. Tables are made
-# without matches by overlap.
+# without matches by overlap, and from queries as they were recorded; a sentence
+# says where merged scans stand.
 PROTOCOL_COLUMNS = tuple(
-    one.name for one in fields(RetrievalProtocol) if one.name != "overlap"
+    one.name
+    for one in fields(RetrievalProtocol)
+    if one.name not in ("overlap", "place", *_QUERY_CHANGES, "seed")
 )

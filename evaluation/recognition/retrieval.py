@@ -21,7 +21,7 @@ from evaluation.recognition.pose_errors import (
     checked_pose,
     pose_error,
 )
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.scoring import gated, ranking, score_places
 
 
@@ -69,7 +69,7 @@ def retrieve(
     database: Drive,
     query: Drive,
     method: Method,
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
     track: Track = silent,
     *,
     across_maps: bool = False,
@@ -108,7 +108,7 @@ def compare(
     method: Method,
     database: DescribedDrive,
     query: DescribedDrive,
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
     track: Track = silent,
     overlaps: np.ndarray | None = None,
 ) -> Retrieval:
@@ -141,7 +141,7 @@ def compare_both_ways(
     method: Method,
     database: DescribedDrive,
     query: DescribedDrive,
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
     track: Track = silent,
 ) -> tuple[Retrieval, Retrieval]:
     """Scores queries once; returns them without the gate, and with it.

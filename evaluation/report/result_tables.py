@@ -232,8 +232,10 @@ def recognition_table(
     protocol = beside = ""
     if results:
         # Each method sets its scans per place.
-        shared = replace(results[0].outcome.protocol, scans_per_place=None)
-        protocol = shared.to_text()
+        shared = replace(
+            results[0].outcome.protocol, scans_per_place=None, place=None
+        )
+        protocol = shared.to_text() + _merging_text(results)
     if any(map(reference.covers, results)):
         beside = f" In brackets or small: the value of {reference.title}."
     return Table(
@@ -243,6 +245,26 @@ def recognition_table(
         caption=f"Place recognition{captions[mode]}. {protocol}{beside}"
         " Bold: best of a row; underlined: second.",
     )
+
+
+def _merging_text(results: Sequence[RecognitionResult]) -> str:
+    """Returns a sentence on where merged scans stand; empty without them."""
+    methods: dict[str, list[str]] = {}
+    for one in in_table_order(result.method for result in results):
+        (place,) = {
+            result.outcome.protocol.place
+            for result in results
+            if result.method == one
+        }
+        if place is not None:
+            methods.setdefault(place, []).append(title(one))
+    if not methods:
+        return ""
+    chosen = " and ".join(
+        f"the {place} scan ({', '.join(names)})"
+        for place, names in methods.items()
+    )
+    return f" Where scans are merged, {chosen} gives the place its pose."
 
 
 def audit_table(

@@ -372,7 +372,11 @@ class Survey(Step):
             {
                 "drive": self.source.identity(),
                 "roles": sorted(self.roles),
-                "protocol": self.protocol.described() if self.roles else None,
+                "protocol": (
+                    self.protocol.described(queries="queries" in self.roles)
+                    if self.roles
+                    else None
+                ),
             }
         )
         expected = {
@@ -436,7 +440,9 @@ class DescribeDrive(Step):
             {
                 "drive": self.source.identity(),
                 "role": self.role,
-                "protocol": self.protocol.described(),
+                "protocol": self.protocol.described(
+                    queries=self.role == "queries"
+                ),
             }
         )
         expected = {

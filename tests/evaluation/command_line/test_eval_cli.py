@@ -18,9 +18,14 @@ def test_the_protocol_is_the_users(capsys, towns):
         "place_spacing": 5.0,
         "max_range": 100.0,
         "scans_per_place": 1,
+        "place": None,
         "exclude_recent": None,
         "overlap": None,
         "gate": False,
+        "turn_queries": False,
+        "tilt_queries": 0.0,
+        "hide_sector": 0.0,
+        "seed": 0,
     }
     options = ["--radius", "2", "--query-spacing", "20", "--max-range", "30"]
     options += ["--scans-per-place", "2", "--place-spacing", "10"]
@@ -35,13 +40,44 @@ def test_the_protocol_is_the_users(capsys, towns):
         "place_spacing": 10.0,
         "max_range": 30.0,
         "scans_per_place": 2,
+        "place": "middle",
         "exclude_recent": None,
         "overlap": None,
         "gate": False,
+        "turn_queries": False,
+        "tilt_queries": 0.0,
+        "hide_sector": 0.0,
+        "seed": 0,
     }
     _, out, _ = run(capsys, *both, *options)
     assert "a match within 2 m" in out
-    assert "2 scans a place" in out
+    assert "2 scans a place, the middle scan gives the pose" in out
+    _, out, _ = run(capsys, *both, *options, "--set", "place=first")
+    assert "2 scans a place, the first scan gives the pose" in out
+
+
+def test_queries_are_turned(capsys, towns):
+    both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
+    options = ["--turn-queries", "--tilt-queries", "2", "--hide-sector", "60"]
+    found = []
+    for more in ([], options, [*options, "--seed", "1"], options):
+        status, out, _ = run(capsys, *both, *more, "--json")
+        assert status == 0
+        found.append(json.loads(out))
+    protocol = found[1]["protocol"]
+    assert protocol["turn_queries"]
+    assert (protocol["tilt_queries"], protocol["hide_sector"]) == (2.0, 60.0)
+    assert found[1] == found[3]
+    assert found[1]["pose"] != found[2]["pose"] != found[0]["pose"]
+    _, out, _ = run(capsys, *both, *options)
+    assert "each query turned by a random yaw" in out
+    for option, value in (
+        ("--tilt-queries", "91"),
+        ("--tilt-queries", "nan"),
+        ("--hide-sector", "360"),
+        ("--seed", "-1"),
+    ):
+        assert_refused(capsys, [*both, option, value], f"{option}: {value}")
 
 
 def test_tcr_json(capsys, towns):

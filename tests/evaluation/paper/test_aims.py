@@ -1,16 +1,19 @@
 """The aims, judged on the paper's numbers and on numbers near them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from evaluation.paper.paper_reference import MET, MISSED, aims, paper
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 
 
 def asked(method):
     scans = 10 if method == "btc" else 1
-    return SimpleNamespace(protocol=RetrievalProtocol(scans_per_place=scans))
+    return SimpleNamespace(
+        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans)
+    )
 
 
 def make_results(change=lambda key: 0.0):

@@ -1,4 +1,5 @@
 from collections import Counter
+from dataclasses import replace
 import re
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ from evaluation.paper.paper_reference import (
     paper_trend,
     trend,
 )
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.result_tables import recognition_tables
 
 MODES = ("all", "filtered")
@@ -23,7 +24,9 @@ def metrics(auc):
 
 def asked(method):
     scans = 10 if method == "btc" else 1
-    return SimpleNamespace(protocol=RetrievalProtocol(scans_per_place=scans))
+    return SimpleNamespace(
+        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans)
+    )
 
 
 def make_results(city="metropolis", **aucs):

@@ -1,5 +1,7 @@
 """The user chooses queries, places and matches."""
 
+from dataclasses import replace
+
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
@@ -8,7 +10,11 @@ from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.place_recognition import run
-from evaluation.recognition.protocol import PROTOCOL_COLUMNS, RetrievalProtocol
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    PROTOCOL_COLUMNS,
+    RetrievalProtocol,
+)
 from evaluation.recognition.retrieval import retrieve
 
 
@@ -84,9 +90,9 @@ def test_scans_are_merged_for_every_method(drives):
             return super().describe(points)
 
     sizes = {4, 2}  # The last frame stands alone.
-    retrieve(*drives, Counting())
+    retrieve(*drives, Counting(), PAPER_PROTOCOL)
     sizes = {6, 2}
-    protocol = RetrievalProtocol(scans_per_place=3)
+    protocol = replace(PAPER_PROTOCOL, scans_per_place=3)
     outcome = run(*drives, Counting(), protocol=protocol)
     assert outcome.protocol.scans_per_place == 3
     assert run(*drives, Means()).protocol.scans_per_place == 1
@@ -131,12 +137,15 @@ def test_what_is_not_positive_is_refused(name, value):
 def test_it_is_part_of_every_number():
     protocol = RetrievalProtocol(radius=3.0, scans_per_place=4)
     values = {name: getattr(protocol, name) for name in PROTOCOL_COLUMNS}
-    assert values | {"overlap": None} == protocol.to_json()
+    others = {"overlap": None, "place": "middle", "turn_queries": False}
+    others |= {"tilt_queries": 0.0, "hide_sector": 0.0, "seed": 0}
+    assert values | others == protocol.to_json()
     assert protocol.of(Means()) == protocol
-    assert RetrievalProtocol().of(Means()).scans_per_place == 1
+    single = RetrievalProtocol().of(Means())
+    assert (single.scans_per_place, single.place) == (1, None)
     text = protocol.to_text()
     assert "within 3 m" in text
-    assert "4 scans a place" in text
+    assert "4 scans a place, the middle scan gives the pose" in text
 
 
 def test_the_gate_is_said():

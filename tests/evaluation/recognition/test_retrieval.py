@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
@@ -162,24 +164,33 @@ def test_merged_scans_are_in_the_frame_of_the_place(tmp_path):
         )
 
 
-def test_a_centred_place_has_as_many_scans_before_as_after(tmp_path):
+def test_the_middle_or_the_first_scan_stands_for_a_place(tmp_path):
     X_WBs = [yaw_pose(5.0 * i, 0.0, 0.0, 0.0) for i in range(9)]
     scans = [make_scan(np.array([[10.0, 0.0, 0.0]]))] * 9
     drive = open_drive(write_recording(tmp_path / "s", scans, X_WBs))
     seen = []
 
-    class Centred(OddOneOut):
+    class Merging(OddOneOut):
         scans_per_place = 4
-        is_centred = True
 
         def describe(self, points):
             seen.append(len(points))
             return super().describe(points)
 
     protocol = RetrievalProtocol(query_spacing=20.0)
-    (described,) = describe_drive(drive, [Centred()], {"queries"}, protocol)
-    assert described.queries.frames.tolist() == [0, 4, 8]
-    assert seen == [2, 4, 3]
+    first = MethodConfig(place="first")
+    for merging, sizes in (
+        (Merging(), [2, 4, 3]),
+        (Merging(first), [4, 4, 1]),
+    ):
+        seen.clear()
+        (described,) = describe_drive(drive, [merging], {"queries"}, protocol)
+        assert described.queries.frames.tolist() == [0, 4, 8]
+        assert seen == sizes
+    # The method's own choice comes before that of the protocol.
+    paper = replace(protocol, place="first")
+    assert paper.scans_before(Merging()) == 0
+    assert paper.scans_before(Merging(MethodConfig(place="middle"))) == 2
 
 
 def test_metrics_of_a_pair(tmp_path):
@@ -197,7 +208,7 @@ def test_metrics_of_a_pair(tmp_path):
     assert values["recall_at_1"] == pytest.approx(3 / 4)
     assert values["places"] == 7
     assert (values["database"], values["query"]) == ("a", "b")
-    assert values["parameters"] == {"sensor_height": 1.6}
+    assert values["parameters"] == {"sensor_height": 1.6, "place": None}
     filtered = result.counting("filtered").to_json()
     assert filtered["mode"] == "filtered"
     assert filtered["f1_max"] == pytest.approx(2 * 0.75 / 1.75)

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
 from matplotlib.figure import Figure
@@ -9,7 +10,7 @@ import pytest
 from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
 from evaluation.paper import reference_for
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report import curve_figures
 from evaluation.report.curve_figures import draw_auc_over_change
 from evaluation.report.drawing import PIXELS, save
@@ -56,7 +57,7 @@ def test_no_line_through_fewer_than_five_points(
     monkeypatch.setattr(
         curve_figures, "save", lambda figure, stem: drawn.append(figure)
     )
-    protocol = RetrievalProtocol(scans_per_place=10)
+    protocol = replace(PAPER_PROTOCOL, scans_per_place=10)
     around = SimpleNamespace(low=0.4, high=0.6)
     metrics = SimpleNamespace(auc=0.5, auc_interval=around)
     pairs = [(city, f"{stage:02d}", "09") for stage in range(5)]

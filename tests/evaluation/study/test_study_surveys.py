@@ -135,7 +135,7 @@ def test_stored_surveys_equal_computed_ones(recorded, source, files):
     found = survey_recording(recorded, BOTH, methods)
     assert_equal(files.drive.read(), found.drive)
     assert_equal(files.fine.read(), found.fine)
-    direct = describe_drive(recorded, methods, BOTH)
+    direct = describe_drive(recorded, methods, BOTH, PAPER_PROTOCOL)
     for choice, expected in zip(choices, direct, strict=True):
         placed, described = files.described(choice).read()
         assert_equal(described, expected)

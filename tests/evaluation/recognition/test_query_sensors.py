@@ -1,0 +1,228 @@
+"""Queries are turned, tilted and partly hidden; places are as recorded."""
+
+from dataclasses import replace
+
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.poses import transform
+from evaluation.drives import open_drive
+from evaluation.drives.query_sensor import QuerySensor
+from evaluation.drives.sampling import gather
+from evaluation.methods import Method, MethodConfig
+from evaluation.methods.btc import align
+from evaluation.recognition.description import describe_drive
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.retrieval import retrieve
+
+P_WL = np.random.default_rng(5).uniform(-30.0, 30.0, (200, 3))
+TURNED = RetrievalProtocol(turn_queries=True, tilt_queries=20.0)
+
+
+class Corresponding(Method):
+    """Aligns points, each with that of the same number; ignores headings."""
+
+    name = "corresponding"
+    Config = MethodConfig
+
+    def describe(self, points):
+        return points
+
+    def build_database(self, places):
+        return places
+
+    def score(self, query, database, *, exhaustive=False):
+        ranges = [np.linalg.norm(one, axis=1) for one in (query, *database)]
+        return np.array([-np.abs(one - ranges[0]).sum() for one in ranges[1:]])
+
+    def relative_pose(self, query, database, place):
+        return align(query, database[place])
+
+
+def record(folder, ys):
+    """Drives past the same landmarks, at other headings."""
+    X_WBs = [yaw_pose(6.0 * k, y, 0.1, 0.3 + y) for k, y in enumerate(ys)]
+    scans = [
+        make_scan((P_WL - X[:3, 3]) @ X[:3, :3] - [0.0, 0.0, 1.6])
+        for X in X_WBs
+    ]
+    return open_drive(write_recording(folder, scans, X_WBs))
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives")
+    ys = np.zeros(7)
+    return record(folder / "a", ys), record(folder / "b", ys + 0.7)
+
+
+def test_poses_are_judged_against_the_turned_sensor(drives):
+    plain, turned = (
+        run(*drives, Corresponding(), protocol=protocol)
+        for protocol in (RetrievalProtocol(), TURNED)
+    )
+    for found in (plain, turned):
+        assert found.pose.success == 1.0
+        assert found.retrieval.pose_errors.translation.max() < 1e-4
+        assert found.retrieval.pose_errors.rotation_deg.max() < 1e-4
+    np.testing.assert_allclose(
+        turned.retrieval.scores, plain.retrieval.scores, atol=1e-9
+    )
+    np.testing.assert_array_equal(
+        turned.retrieval.matches, plain.retrieval.matches
+    )
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_turned_cloud_is_the_same_in_the_world(drives, number):
+    drive = drives[1]
+    (described,) = describe_drive(
+        drive,
+        [Corresponding()],
+        {"places", "queries"},
+        replace(TURNED, scans_per_place=number, query_spacing=5.0),
+    )
+    assert described.queries.frames.tolist() == described.places.frames.tolist()
+    for place, query, X_WP, X_WQ in zip(
+        described.places.descriptors,
+        described.queries.descriptors,
+        described.places.X_WS,
+        described.queries.X_WS,
+        strict=True,
+    ):
+        assert np.abs(place - query).max() > 1.0
+        np.testing.assert_allclose(
+            transform(X_WQ, query), transform(X_WP, place), atol=1e-9
+        )
+    np.testing.assert_array_equal(
+        described.places.X_WS, drive.X_WS[described.places.frames]
+    )
+
+
+def test_places_are_described_as_ever(drives):
+    for protocol in (RetrievalProtocol(), replace(TURNED, hide_sector=90.0)):
+        (one,) = describe_drive(
+            drives[0], [Corresponding()], {"places", "queries"}, protocol
+        )
+        for frame, cloud in zip(
+            one.places.frames, one.places.descriptors, strict=True
+        ):
+            np.testing.assert_array_equal(
+                cloud, gather(drives[0], int(frame), 1, 100.0)
+            )
+        changed = protocol.turn_queries
+        assert changed is not np.array_equal(
+            one.queries.descriptors[0], one.places.descriptors[0]
+        )
+    plain = RetrievalProtocol()
+    assert TURNED.described(queries=False) == plain.described(queries=False)
+    assert TURNED.described() != plain.described()
+    assert replace(plain, seed=3).described() == plain.described()
+    assert replace(TURNED, seed=3).described() != TURNED.described()
+
+
+def test_points_are_cropped_where_the_turned_sensor_has_them(tmp_path):
+    corner = np.array([[14.0, 14.0, 0.0], [14.0, 0.0, 0.0]])
+    drive = open_drive(
+        write_recording(tmp_path / "d", [make_scan(corner)], [np.eye(4)])
+    )
+    for yaw, kept in ((0.0, 2), (np.pi / 4, 1), (2.0 * np.pi, 2)):
+        X_SQ = np.eye(4)
+        X_SQ[:3, :3] = Rotation.from_euler("z", yaw).as_matrix()
+        cloud = gather(drive, 0, 1, 14.1, sensor=QuerySensor(X_SQ))
+        assert len(cloud) == kept
+    # After a whole turn all is as before.
+    np.testing.assert_allclose(cloud, gather(drive, 0, 1, 14.1), atol=1e-12)
+
+
+def test_a_draw_depends_on_seed_and_frame_alone():
+    one = QuerySensor.draw(4, 17, True, 0.0, 0.0)
+    both = QuerySensor.draw(4, 17, True, 1.5, 60.0)
+    yaws, rolls, pitches = [], [], []
+    for frame in range(300):
+        R = QuerySensor.draw(4, frame, True, 1.5, 0.0).X_SQ[:3, :3]
+        yaw, pitch, roll = Rotation.from_matrix(R).as_euler("ZYX", degrees=True)
+        yaws.append(yaw)
+        pitches.append(pitch)
+        rolls.append(roll)
+    for values in (rolls, pitches):
+        assert 1.4 < np.max(np.abs(values)) <= 1.5
+    assert np.histogram(yaws, 4, (-180.0, 180.0))[0].min() > 50
+    heading = both.X_SQ[:3, 0] / np.hypot(*both.X_SQ[:2, 0])
+    np.testing.assert_allclose(heading[:2], one.X_SQ[:2, 0], atol=1e-12)
+    other = QuerySensor.draw(5, 17, True, 0.0, 0.0)
+    assert not np.allclose(one.X_SQ, other.X_SQ)
+    still = QuerySensor.draw(4, 17, False, 0.0, 60.0)
+    assert still.X_SQ is None
+    assert still.hidden_from == both.hidden_from
+
+
+def test_a_sector_is_hidden():
+    azimuths = np.radians(np.arange(0.5, 360.0))
+    scan = make_scan(
+        np.stack([np.cos(azimuths), np.sin(azimuths), azimuths], axis=1)
+    )
+    assert QuerySensor().without_hidden(scan) is scan
+    for frame in range(20):
+        sensor = QuerySensor.draw(1, frame, False, 0.0, 90.0)
+        kept = np.isin(scan["z"], sensor.without_hidden(scan)["z"])
+        assert 269 <= kept.sum() <= 271
+        # It is one sector: its two edges, all around.
+        assert np.count_nonzero(kept != np.roll(kept, 1)) == 2
+    nowhere = make_scan(np.full((1, 3), np.nan))
+    assert len(sensor.without_hidden(nowhere)) == 1
+
+
+def test_all_scans_of_a_query_lack_the_same_sector(drives):
+    protocol = RetrievalProtocol(
+        hide_sector=120.0, scans_per_place=3, query_spacing=18.0
+    )
+    (one,) = describe_drive(drives[0], [Corresponding()], {"queries"}, protocol)
+    sensor = protocol.query_sensor(18 // 6)
+    expected = sum(
+        len(sensor.without_hidden(drives[0].scan(k))) for k in (2, 3, 4)
+    )
+    assert len(one.queries.descriptors[1]) == expected < 600
+
+
+def test_nothing_hidden_nothing_tilted_changes_nothing(drives):
+    plain = retrieve(*drives, Corresponding())
+    zero = RetrievalProtocol(tilt_queries=0.0, hide_sector=0.0, seed=9)
+    same = retrieve(*drives, Corresponding(), zero)
+    np.testing.assert_array_equal(same.scores, plain.scores)
+    assert zero.to_text() == RetrievalProtocol().to_text()
+    text = replace(TURNED, hide_sector=45.0, seed=2).to_text()
+    for part in ("random yaw", "up to 20 deg", "sector of 45 deg", "seed 2"):
+        assert part in text
+
+
+def test_overlaps_do_not_depend_on_the_heading(drives):
+    protocol = RetrievalProtocol(overlap=0.3)
+    turned = replace(protocol, turn_queries=True)
+    plain, other = (
+        retrieve(*drives, Corresponding(), one).overlaps
+        for one in (protocol, turned)
+    )
+    np.testing.assert_allclose(other, plain, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        ({"tilt_queries": -0.1}, "--tilt-queries: -0.1 is not from 0 to 90"),
+        ({"tilt_queries": 90.1}, "--tilt-queries: 90.1"),
+        ({"tilt_queries": np.nan}, "--tilt-queries: nan"),
+        ({"hide_sector": 360.0}, "--hide-sector: 360.0 is not from 0 to below"),
+        ({"hide_sector": -1.0}, "--hide-sector: -1.0"),
+        ({"hide_sector": np.nan}, "--hide-sector: nan"),
+        ({"seed": -1}, "--seed: -1 is negative"),
+    ],
+)
+def test_values_out_of_range_are_refused(values, fault):
+    with pytest.raises(InputError, match=fault):
+        RetrievalProtocol(**values)
+    assert RetrievalProtocol(tilt_queries=90.0, hide_sector=359.9).seed == 0
