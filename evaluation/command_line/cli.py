@@ -517,6 +517,10 @@ def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
         f"{terminal.number(metrics.auc)}"
         f"  {_interval_text(metrics.auc_interval)}",
     )
+    yield (
+        "AUC strict",
+        f"{terminal.number(metrics.auc_strict)}  (recall = TP / N)",
+    )
     f1 = terminal.number(metrics.f1_max)
     if metrics.f1_max_index is not None:
         index = metrics.f1_max_index

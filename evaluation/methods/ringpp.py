@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import functools
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
@@ -48,6 +48,9 @@ class RingPlusPlusConfig(MethodConfig):
     Attributes:
         half_width: half the side of the square map from above [m]; 70. The
             protocol's limit of 100 m is wider.
+        crop: the points that count, all of the `square` map, or those in the
+            `round` part within half a side of its middle. A square shows other
+            points when it is turned.
         min_height: height above the ground from which points count [m]; 0.73
             (z > -1.0 m from a LiDAR at 1.73 m).
         max_height: height up to which they count [m]; 11.73 (z < 10 m).
@@ -60,6 +63,7 @@ class RingPlusPlusConfig(MethodConfig):
     """
 
     half_width: PositiveFloat = 70.0
+    crop: Literal["square", "round"] = "square"
     min_height: float = 0.73
     max_height: float = 11.73
     height_unit: PositiveFloat = 10.0
@@ -259,6 +263,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             & ((x != 0.0) | (y != 0.0) | (z != 0.0)),
             axis=0,
         )
+        if config.crop == "round":
+            x, y, _ = within.T
+            within = within[x * x + y * y < config.half_width**2]
         within = _without_duplicates(within)
         image = np.zeros((config.cells, config.cells, _NUM_FEATURES))
         if len(within) < 2:

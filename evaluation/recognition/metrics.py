@@ -11,6 +11,10 @@ A rejected query without a match counts nowhere. A query without a candidate
 is never accepted. In mode `all` every query counts; in mode `filtered` only
 those that have a match (then F1max carries no more than recall at 1).
 
+A wrong accepted answer to a query with a match thus leaves FN, so that recall =
+TP / (TP + FN) reaches 1 for every method that answers all queries. `auc_strict`
+is the area with recall = TP / N, of N queries with a match.
+
 In both modes R@N is the part of the queries with a match that have a match
 among their N best places.
 """
@@ -40,6 +44,7 @@ class PlaceRecognitionMetrics:
         mode: the queries that the curve counts.
         curve: the exact precision-recall curve.
         auc: area under it.
+        auc_strict: area with recall = TP / N at each of its points.
         f1_max: greatest F1 on it; 0 if nothing is accepted.
         f1_max_index: its point on the curve; None if that is empty.
         recall_at_n: (25,) R@1 to R@25.
@@ -60,6 +65,7 @@ class PlaceRecognitionMetrics:
     mode: Mode
     curve: PrCurve
     auc: float
+    auc_strict: float
     f1_max: float
     f1_max_index: int | None
     recall_at_n: np.ndarray
@@ -95,12 +101,14 @@ def evaluate(
     if mode == "filtered":
         counted = outcomes.subset(outcomes.has_match)
     curve = pr_curve(counted)
+    num_with_match = int(outcomes.has_match.sum())
     best = int(curve.f1.argmax()) if len(curve.thresholds) else None
     auc_interval, recall_interval = bootstrap_intervals(counted, seed)
     return PlaceRecognitionMetrics(
         mode=mode,
         curve=curve,
         auc=curve.auc,
+        auc_strict=curve.strict_auc(num_with_match),
         f1_max=0.0 if best is None else float(curve.f1[best]),
         f1_max_index=best,
         recall_at_n=np.array(
@@ -108,7 +116,7 @@ def evaluate(
         ),
         recall_at_1_percent=outcomes.recall_at(outcomes.one_percent_rank),
         num_queries=len(outcomes),
-        num_with_match=int(outcomes.has_match.sum()),
+        num_with_match=num_with_match,
         num_right=int(outcomes.is_right.sum()),
         auc_interval=auc_interval,
         recall_at_1_interval=recall_interval,

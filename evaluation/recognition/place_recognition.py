@@ -85,8 +85,10 @@ class PlaceRecognition:
             "database": self.database,
             "query": self.query,
             "auc": metrics.auc,
+            "auc_strict": metrics.auc_strict,
             "auc_interval_95": _interval(metrics.auc_interval),
             "recall_at_1": _number(metrics.recall_at_1),
+            "r1": _number(metrics.recall_at_1),
             "recall_at_1_interval_95": _interval(metrics.recall_at_1_interval),
             "recall_at_n": [
                 _number(float(value)) for value in metrics.recall_at_n

@@ -57,6 +57,17 @@ class PrCurve:
         """
         return float(areas_under(self.precision[None], self.recall[None])[0])
 
+    def strict_auc(self, num_with_match: int) -> float:
+        """Returns the area over recall = TP / N.
+
+        N, the number of queries with a match, includes those whose accepted
+        place is wrong; TP / (TP + FN) reaches 1 whatever they are.
+        """
+        recall = recall_of(
+            self.true_positives, num_with_match - self.true_positives
+        )
+        return float(areas_under(self.precision[None], recall[None])[0])
+
     @property
     def recall_at_full_precision(self) -> float:
         """Greatest recall without a false positive; 0 if none."""

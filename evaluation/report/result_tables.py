@@ -44,7 +44,8 @@ _CHANGE_CAPTION = (
 )
 _AUDIT_CAPTION = (
     "All numbers with 95 % intervals (bootstrap over queries) and the counts"
-    " they are made of: R@1 = TP / N, F1max = 2 TP / (TP + T)."
+    " they are made of: R@1 = TP / N, F1max = 2 TP / (TP + T). AUC strict: the"
+    " area with recall = TP / N, which wrong accepted answers lower, too."
 )
 _FAULT_CAPTION = (
     "Why best places are wrong: how many of the queries with a wrong best"
@@ -282,6 +283,7 @@ def audit_table(
             "AUC low": lambda c: c.metrics.auc_interval.low,
             "AUC high": lambda c: c.metrics.auc_interval.high,
             "paper's AUC": lambda c: c.printed and c.printed.auc,
+            "AUC strict": lambda c: c.metrics.auc_strict,
             "R@1": lambda c: c.metrics.recall_at_1,
             "R@1 low": lambda c: c.metrics.recall_at_1_interval.low,
             "R@1 high": lambda c: c.metrics.recall_at_1_interval.high,
@@ -313,6 +315,7 @@ def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
         ],
         {
             **_inner(_KEYS),
+            "auc_strict": lambda m: m.result.metrics["all"].auc_strict,
             "recall_at_1": lambda m: m.outcomes.recall_at(1),
             "recall_at_1_percent": lambda m: m.outcomes.recall_at(
                 m.outcomes.one_percent_rank

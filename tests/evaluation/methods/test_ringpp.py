@@ -296,3 +296,18 @@ class TestConfig:
     def test_faults(self, parameters, fault):
         with pytest.raises(InputError, match=fault):
             ring(**parameters)
+
+
+def test_a_round_crop_shows_the_same_points_at_any_heading():
+    corner, side = post(45.0, 45.0, 0.0, 2.0), post(50.0, 0.0, 0.0, 2.0)
+    settings = {"half_width": 60.0, "neighbours": 2}
+    both = np.concatenate([corner, side])
+    assert_same = np.testing.assert_array_equal
+    round_one = bev(both, crop="round", **settings)
+    assert_same(round_one, bev(side, **settings))
+    assert bev(corner, crop="square", **settings).any()
+    assert not bev(corner, crop="round", **settings).any()
+    # Exactly half a side away is outside, as on the square's edge.
+    for reach, is_seen in ((59.999, True), (60.0, False)):
+        edge = post(reach, 0.0, 0.0, 2.0)
+        assert bev(edge, crop="round", **settings).any() == is_seen

@@ -55,6 +55,11 @@ def test_curve_by_hand():
     area += (1 / 6) * (2 / 3 + 1 / 2) / 2
     area += (1 / 3) * (1 / 2 + 3 / 5) / 2
     assert metrics.auc == pytest.approx(area, abs=1e-15)
+    # With recall TP / N, of N = 4: 1/4, 1/4, 2/4, 2/4, 3/4.
+    strict = 1 / 4
+    strict += (1 / 4) * (1 / 2 + 2 / 3) / 2
+    strict += (1 / 4) * (1 / 2 + 3 / 5) / 2
+    assert metrics.auc_strict == pytest.approx(strict, abs=1e-15)
     assert metrics.f1_max == pytest.approx(3 / 4)
     assert metrics.f1_max_index == 4
     assert (metrics.num_queries, metrics.num_with_match) == (5, 4)
@@ -332,3 +337,17 @@ def test_long_drives_need_no_array_more_of_all_pairs():
     np.testing.assert_array_equal(
         found.first_right_ranks, 1 + right.argmax(axis=1)
     )
+
+
+@pytest.mark.parametrize("mode", ["all", "filtered"])
+def test_strict_recall_counts_every_query_with_a_match(mode):
+    right = [(1.0 - 0.1 * k, True, True) for k in range(3)]
+    perfect = evaluate(outcomes_of(right), mode)
+    assert (perfect.auc, perfect.auc_strict) == (1.0, 1.0)
+    # Two wrong answers come last: by the paper's counts recall still gets to 1.
+    wrong = [(0.1, False, True), (0.05, False, True)]
+    metrics = evaluate(outcomes_of(right + wrong), mode)
+    assert metrics.curve.recall[-1] == 1.0
+    assert metrics.auc_strict == pytest.approx(3 / 5)
+    nobody = evaluate(outcomes_of([(0.5, False, False)]), mode)
+    assert nobody.auc_strict == 0.0
