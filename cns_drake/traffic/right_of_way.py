@@ -7,7 +7,7 @@ green. Vehicles never stop on a way, so that none waits for ever.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.streets import WAIT, Streets, is_ego_far
 from cns_drake.traffic.vehicles import CURRENT, Occupants, choose_way
 
-# Signals: duration of a green phase, and of red for all after it [s].
-_GREEN, _RED = 14.0, 4.0
+# Signals: duration of a green phase, and of red for all after it [s]. Nobody
+# waits at red for a direction in which nobody comes.
+_GREEN, _RED = 27.0, 4.0
 # Traffic ahead of the ego car, if it comes within this time, goes first and
 # does not wait for signals [s].
 _EGO_IS_NEAR = 45.0
@@ -52,11 +53,10 @@ _CROSSING = np.dtype(
 
 
 class Permits(NamedTuple):
-    """The users of P pieces and C crossings.
+    """The walkers on C crossings.
 
     Attributes:
-        users: (P + C, 2) numbers of small and of large vehicles with a permit
-            for a way; walkers are small.
+        users: (C,) numbers of walkers with a permit.
         crossings: (C,) records `_CROSSING`.
     """
 
@@ -72,8 +72,7 @@ def make_permits(graph: LaneGraph) -> Permits:
     crossings["length"] = [
         np.linalg.norm(one.line[1] - one.line[0]) for one in graph.crossings
     ]
-    places = len(graph.pieces) + len(crossings)
-    return Permits(np.zeros((places, 2), int), crossings)
+    return Permits(np.zeros(len(crossings), int), crossings)
 
 
 @compiled
@@ -107,6 +106,7 @@ def grant_ways(
         if first[lane] < 0 or cars[i].s > cars[first[lane]].s:
             first[lane] = i
     since = np.full(num_cars + len(crossings), np.inf)
+    asked = np.zeros((len(streets.phases), streets.phases.max()), np.bool_)
     for lane in range(len(pieces)):
         if first[lane] < 0:
             continue
@@ -121,9 +121,26 @@ def grant_ways(
             since[first[lane]] = car.since
             if 0.0 < streets.until[k, lane] < _EGO_IS_NEAR:
                 since[first[lane]] = streets.until[k, lane] - _GOES_FIRST
+            phase = pieces[streets.after[pieces[lane].after_first]].phase
+            if phase >= 0:
+                asked[pieces[lane].junction, phase] = True
     for c in range(len(crossings)):
         since[num_cars + c] = crossings[c].waits
-    blocked = np.zeros(len(users), np.bool_)
+    # What small and what large vehicles must not enter now.
+    taken = np.zeros((2, len(pieces) + len(crossings)), np.bool_)
+    for i in range(num_cars):
+        if cars[i].held >= 0:
+            _take(
+                streets,
+                taken,
+                cars[i].held,
+                cars[i].large,
+                _rear(streets, cars[i]),
+            )
+    for c in range(len(crossings)):
+        if users[c] > 0:
+            _take(streets, taken, len(pieces) + c, False, 0.0)
+    blocked = np.zeros(taken.shape[1], np.bool_)
     for who in np.argsort(since):
         if since[who] == np.inf:
             break
@@ -132,38 +149,94 @@ def grant_ways(
             if car.path[CURRENT + 1] < 0:
                 choose_way(streets, cars, who, seed)
             place, is_large = car.path[CURRENT + 1], car.large
-            ready = _has_room(streets, cars, occupants, who, k, dt, seed)
+            ready = _is_green(streets, car, asked, k, dt) and _has_room(
+                streets, cars, occupants, who, k, dt, seed
+            )
         else:
-            place, is_large = len(pieces) + who - num_cars, False
-            crossing = crossings[who - num_cars]
-            needed = crossing.length / _WALKING + WALK_GROUP + _DAWDLING
+            c = who - num_cars
+            place, is_large = len(pieces) + c, False
+            needed = crossings[c].length / _WALKING + WALK_GROUP + _DAWDLING
             ready = (
-                users[place, 0] == 0
-                and t >= crossing.closed + _REST
+                users[c] == 0
+                and t >= crossings[c].closed + _REST
                 and streets.until[k, place] >= needed
             )
         if not ready or blocked[place]:
             continue
-        exclusions = streets.large if is_large else streets.small
-        is_taken = False
-        for other in range(len(users)):
-            if users[other, 1] > 0:
-                is_taken |= streets.large[place, other]
-            elif users[other, 0] > 0:
-                is_taken |= exclusions[place, other]
-        if is_taken:
+        if taken[int(is_large), place]:
             # Later arrivals must not always go first.
+            exclusions = streets.large if is_large else streets.small
             for other in range(len(blocked)):
-                blocked[other] |= exclusions[place, other]
-        elif who < num_cars:
+                blocked[other] |= exclusions[place, other] > 0.0
+            continue
+        _take(streets, taken, place, is_large, 0.0)
+        if who < num_cars:
             car = cars[who]
             car.granted, car.held = True, place
             car.since, car.refused = np.inf, 0.0
-            users[place, int(is_large)] += 1
         else:
             # A placeholder holds the permit until the group has begun to walk.
-            users[place, 0] += 1
+            users[who - num_cars] += 1
             crossings[who - num_cars].opened = t
+
+
+@compiled
+def _take(
+    streets: Streets, taken: np.ndarray, place: int, is_large: bool, rear: float
+) -> None:
+    """Notes what a vehicle on a way, or a walker on a crossing, excludes.
+
+    Args:
+        streets: the lanes.
+        taken: (2, P + C) what small and what large vehicles must not enter.
+        place: the way or crossing.
+        is_large: whether the vehicle is large.
+        rear: of the vehicle, along the way [m].
+    """
+    for other in range(taken.shape[1]):
+        is_near = rear < streets.large[place, other]
+        taken[1, other] |= is_near
+        taken[0, other] |= (
+            is_near if is_large else rear < streets.small[place, other]
+        )
+
+
+@compiled
+def _rear(streets: Streets, car: Any) -> float:
+    """Returns the place of a vehicle's rear along the way it holds [m]."""
+    rear = car.s - car.length
+    if car.path[CURRENT] == car.held:
+        return rear
+    if car.path[CURRENT - 1] == car.held:
+        return rear + streets.pieces[car.held].length
+    return 0.0
+
+
+@compiled
+def _is_green(
+    streets: Streets, car: Any, asked: np.ndarray, k: int, dt: float
+) -> bool:
+    """Returns whether a vehicle need not wait for a signal.
+
+    Args:
+        streets: the lanes, and the ego car.
+        car: a record `VEHICLE`, in a lane.
+        asked: (J, phases) the phases of each junction in which somebody comes.
+        k: number of the time.
+        dt: the step [s].
+    """
+    way = streets.pieces[car.path[CURRENT + 1]]
+    if (
+        way.phase < 0
+        or 0.0 < streets.until[k, car.path[CURRENT]] < _EGO_IS_NEAR
+    ):
+        return True
+    cycle = (_GREEN + _RED) * streets.phases[way.junction]
+    at = k * dt % cycle
+    now = int(at // (_GREEN + _RED))
+    if at - now * (_GREEN + _RED) >= _GREEN:
+        return False
+    return now == way.phase or not asked[way.junction, now]
 
 
 @compiled
@@ -176,7 +249,7 @@ def _has_room(
     dt: float,
     seed: int,
 ) -> bool:
-    """Returns whether the i-th vehicle's way is green, with room beyond it.
+    """Returns whether there is room beyond the i-th vehicle's way.
 
     Without room for some time it draws another way; see `grant_ways`.
     """
@@ -184,13 +257,6 @@ def _has_room(
     lane, way = car.path[CURRENT], car.path[CURRENT + 1]
     beyond = car.path[CURRENT + 2]
     is_ego_near = 0.0 < streets.until[k, lane] < _EGO_IS_NEAR
-    phase, junction = pieces[way].phase, pieces[way].junction
-    if phase >= 0 and not is_ego_near:
-        # Junctions switch at different times.
-        cycle = (_GREEN + _RED) * streets.phases[junction]
-        at = (k * dt + 7.0 * junction) % cycle - phase * (_GREEN + _RED)
-        if not 0.0 <= at < _GREEN:
-            return False
     distance = pieces[lane].length - car.s + pieces[way].length
     pace = max(3.0, 0.5 * streets.speed[pieces[way].first])
     needed = (distance + car.length) / pace + _EGO_MARGIN

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.compiled import compiled
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
@@ -58,7 +57,7 @@ class Streets(NamedTuple):
         speed: (M,) allowed speed there, with regard to bends [m/s].
         after: numbers of the pieces that follow each piece.
         phases: (J,) number of phases of a junction's signals.
-        small, large: (P + C, P + C) exclusions, see `find_conflicts`.
+        small, large: (P + C, P + C) exclusions [m], see `find_conflicts`.
         until: (K, P + C) float32 time until the ego car is there, 0 while it
             is, inf if it never will be [s].
         ego_rear, ego_front: (K, P) float32 distance of its ends along a piece
@@ -176,47 +175,62 @@ def _speeds(piece: Piece) -> np.ndarray:
 
 
 def find_conflicts(graph: LaneGraph) -> tuple[np.ndarray, np.ndarray]:
-    """Returns which pieces and crossings exclude each other.
+    """Returns how long pieces and crossings exclude each other.
 
     Two different ways exclude each other if their swept areas meet; lanes
-    exclude nothing.
+    exclude nothing. A vehicle on a way excludes the other until its rear has
+    passed the last place where the areas meet.
 
     Returns:
-        Two symmetric boolean (P + C, P + C) matrices over pieces and then
-        crossings: while all vehicles are small, and while one is large.
+        Two (P + C, P + C) matrices over pieces and then crossings: while all
+        vehicles are small, and while one is large. Entry (a, b) is the least
+        distance of a rear along a at which b is free again [m]: zero if the
+        two never meet, inf if a is a crossing.
     """
     small_axles = (-1.6, 1.75)
+    num_pieces = len(graph.pieces)
     results = []
     for size, axles in (
         (SMALL_SIZE, small_axles),
         (LARGEST.size[:2], LARGEST.axles),
     ):
-        areas = [
-            swept_area(piece, size, axles)
-            if piece.is_way
-            else shapely.Polygon()
+        swept = [
+            swept_hulls(piece, size, axles) if piece.is_way else None
             for piece in graph.pieces
+        ]
+        areas = [
+            shapely.Polygon() if one is None else shapely.union_all(one[1])
+            for one in swept
         ]
         areas += [crossing.area for crossing in graph.crossings]
         tree = shapely.STRtree(areas)
-        rows, columns = tree.query(areas, predicate="intersects")
-        matrix = np.zeros((len(areas), len(areas)), bool)
-        matrix[rows, columns] = True
-        matrix[len(graph.pieces) :, len(graph.pieces) :] = False
-        np.fill_diagonal(matrix, False)
+        matrix = np.zeros((len(areas), len(areas)))
+        pairs = tree.query(areas, predicate="intersects").T.tolist()
+        shapely.prepare(areas)
+        for one, other in pairs:
+            if one >= num_pieces > other:
+                matrix[one, other] = np.inf
+            elif one < num_pieces and one != other:
+                front, hulls = swept[one]
+                meets = shapely.intersects(areas[other], hulls)
+                last = front[1:][meets][-1]
+                matrix[one, other] = max(last - size[0], _STEP)
         results.append(matrix)
     return results[0], results[1]
 
 
-def swept_area(
+def swept_hulls(
     piece: Piece, size: tuple[float, float], axles: tuple[float, float]
-) -> BaseGeometry:
-    """Returns the area that a vehicle sweeps on a way.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the areas that a vehicle sweeps on a way, step by step.
 
     Args:
         piece: the way.
         size: length and width of the vehicle [m].
         axles: x of its rear and front axle from its middle [m].
+
+    Returns:
+        (N + 1,) places of its front bumper [m], and (N,) areas between two.
     """
     line = piece.points[:, :2]
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
@@ -256,7 +270,7 @@ def swept_area(
     hulls = shapely.convex_hull(
         shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=1))
     )
-    return shapely.union_all(hulls)
+    return front, hulls
 
 
 def _find_ego(

@@ -280,7 +280,7 @@ class Trial:
             grant_ways(streets, cars, occupants, permits, k, STEP, self._seed)
             wanted = accelerations(streets, cars, occupants)
             change_lanes(streets, cars, occupants, k)
-            advance(streets, cars, permits.users, wanted, STEP, self._seed)
+            advance(streets, cars, wanted, STEP, self._seed)
             crowd.step(k * STEP, STEP, self._seed + 1)
         rows = slice(steps.start, steps.stop)
         self._vehicles[rows] = vehicle_poses(streets, np.array(past_cars))

@@ -505,7 +505,6 @@ def _is_better(
 def advance(
     streets: Streets,
     cars: np.ndarray,
-    users: np.ndarray,
     accelerations: np.ndarray,
     dt: float,
     seed: int,
@@ -515,7 +514,6 @@ def advance(
     Args:
         streets: the lanes.
         cars: (N,) records `VEHICLE`.
-        users: (P + C, 2) small and large users of ways, see `Permits`.
         accelerations: (N,) [m/s^2].
         dt: the step [s].
         seed: seed of the drawn ways.
@@ -545,7 +543,6 @@ def advance(
         # A vehicle still before its way keeps the permit it has just got.
         is_before = car.held == car.path[CURRENT + 1] and car.granted
         if car.held >= 0 and not (piece.is_way or rear < 0.0 or is_before):
-            users[car.held, int(car.large)] -= 1
             car.held = -1
         if car.left_lane >= 0 and rear - car.change_start >= car.change_length:
             car.left_lane = -1
@@ -553,14 +550,29 @@ def advance(
 
 @compiled
 def choose_way(streets: Streets, cars: np.ndarray, i: int, seed: int) -> None:
-    """Draws the next way of the i-th vehicle, which is in a lane."""
+    """Draws the next way of the i-th vehicle, which is in a lane.
+
+    It draws two, and takes the one that leads to the emptier lane: no street
+    stays empty while vehicles queue in others.
+    """
     car = cars[i]
     lane = streets.pieces[car.path[CURRENT]]
-    car.draws += 1
-    pick = int(uniform(seed, i, car.draws) * lane.after_count)
-    way = streets.after[lane.after_first + min(pick, lane.after_count - 1)]
-    car.path[CURRENT + 1] = way
-    car.path[CURRENT + 2] = streets.after[streets.pieces[way].after_first]
+    least = np.inf
+    for _ in range(2):
+        car.draws += 1
+        pick = int(uniform(seed, i, car.draws) * lane.after_count)
+        way = streets.after[lane.after_first + min(pick, lane.after_count - 1)]
+        beyond = streets.after[streets.pieces[way].after_first]
+        number = 0.0
+        for j in range(len(cars)):
+            number += (
+                cars[j].path[CURRENT] == beyond
+                or cars[j].path[CURRENT + 2] == beyond
+            )
+        filled = number / streets.pieces[beyond].length
+        if filled < least:
+            least = filled
+            car.path[CURRENT + 1], car.path[CURRENT + 2] = way, beyond
 
 
 @compiled

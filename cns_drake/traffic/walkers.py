@@ -50,6 +50,9 @@ _PATIENCE = 4.0
 _CROSSES = 0.25
 # Length of sidewalk for one walker [m].
 _WALKER_SPACE = 3.0
+# Share of walkers with a companion behind them, which makes a third of them
+# walk in groups, and its distance in points of a walkway.
+_COMPANIONS, _BEHIND = 0.2, 3
 # Number of places that are drawn before a walker is given up.
 _TRIES = 200
 
@@ -65,6 +68,7 @@ _WALKER = np.dtype(
         ("aside", float),  # Offset to the right, part of the half width.
         ("next_path", int),  # -1 if not drawn yet.
         ("stuck", float),  # Time for which the walker has been blocked [s].
+        ("group", int),  # Number of the walker whose ways it takes.
         ("draws", int),  # Number of random numbers drawn.
     ]
 )
@@ -138,8 +142,7 @@ class Crowd:
             rng: draws the places.
         """
         self._permits = permits
-        num_pieces = len(permits.users) - len(permits.crossings)
-        self._users = permits.users[num_pieces:, 0]
+        self._users = permits.users
         self._paths = _make_paths(walkways)
         # Place -> the paths that begin there.
         self._after: dict[int, list[int]] = {}
@@ -251,7 +254,8 @@ class Crowd:
             else (1.0 if self._paths.paths["crossing"][other] < 0 else _CROSSES)
             for other in choices
         ]
-        pick = uniform(seed, i, self.walkers["draws"][i]) * sum(likings)
+        who, draw = self.walkers[["group", "draws"]][i]
+        pick = uniform(seed, who, draw) * sum(likings)
         below = np.flatnonzero(pick < np.cumsum(likings))
         other = choices[below[0] if len(below) else -1]
         return path ^ 1 if other // 2 == path // 2 else other
@@ -307,31 +311,46 @@ def _place_walkers(
     """Returns the records of walkers at their first places; see `Crowd`."""
     free = [k for k, way in enumerate(walkways) if way.crossing < 0]
     sizes = np.array([len(walkways[k].points) for k in free], float)
-    rows: list[tuple[int, int, np.ndarray, float]] = []
-    for _ in range(count if free else 0):
+    rows: list[tuple[int, int, np.ndarray, float, int]] = []
+
+    def place(way: int, forward: bool, at: int, group: int) -> bool:
+        """Puts a walker there, unless another one is near."""
+        points = walkways[way].points
+        line = points if forward else points[::-1]
+        x, y = (line[at + 1] - line[at])[:2]
+        aside = walkways[way].limits[:: 1 if forward else -1][at].mean()
+        aside = (aside if forward else -aside) / np.hypot(x, y)
+        xy = line[at, :2] + aside * np.array([y, -x])
+        is_free = all(np.hypot(*(xy - row[2])) > 1.4 * _APART for row in rows)
+        if is_free:
+            yaw = float(np.arctan2(y, x))
+            rows.append((2 * way + 1 - forward, at, xy, yaw, group))
+        return is_free
+
+    while free and len(rows) < count:
         for _ in range(_TRIES):
             way = free[int(rng.choice(len(free), p=sizes / sizes.sum()))]
-            points = walkways[way].points
             forward = bool(rng.integers(2))
-            at = int(rng.integers(len(points) - 1))
-            line = points if forward else points[::-1]
-            x, y = (line[at + 1] - line[at])[:2]
-            aside = walkways[way].limits[:: 1 if forward else -1][at].mean()
-            aside = (aside if forward else -aside) / np.hypot(x, y)
-            xy = line[at, :2] + aside * np.array([y, -x])
-            if all(np.hypot(*(xy - row[2])) > 1.5 * _APART for row in rows):
-                yaw = float(np.arctan2(y, x))
-                rows.append((2 * way + 1 - forward, at, xy, yaw))
+            at = int(rng.integers(len(walkways[way].points) - 1))
+            if place(way, forward, at, len(rows)):
                 break
+        else:
+            break
+        if rng.uniform() < _COMPANIONS and len(rows) < count and at >= _BEHIND:
+            place(way, forward, at - _BEHIND, len(rows) - 1)
     walkers = np.zeros(len(rows), _WALKER)
     for name, values in zip(
-        ("path", "at", "xy", "yaw"), zip(*rows, strict=True), strict=False
+        ("path", "at", "xy", "yaw", "group"),
+        zip(*rows, strict=True),
+        strict=False,
     ):
         walkers[name] = values
     number = len(rows)
     walkers["speed"] = np.clip(rng.normal(_SPEED, _SPREAD, number), 0.6, 2.2)
     walkers["phase"] = rng.uniform(0.0, 2 * np.pi, number)
     walkers["aside"] = rng.uniform(0.1, 0.7, number)
+    for name in ("speed", "aside"):
+        walkers[name] = walkers[name][walkers["group"]]
     walkers["next_path"] = -1
     return walkers
 

@@ -13,10 +13,16 @@ from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.traffic import traffic_plan
-from cns_drake.traffic.lane_graph import Walkway, kept_clear
+from cns_drake.traffic.lane_graph import (
+    LaneGraph,
+    Piece,
+    Walkway,
+    kept_clear,
+)
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox, find_conflicts
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
+from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 from cns_drake.traffic.vehicles import room_for_vehicles
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
@@ -316,6 +322,15 @@ def test_walkers_pass_what_stands_on_sidewalks():
     assert (moved > 5.0).mean() > 0.9
 
 
+def test_a_third_of_walkers_walks_in_groups(short):
+    """Of two who begin near each other, most still are a minute later."""
+    walkers = short.walkers.values[..., :2]
+    apart = np.linalg.norm(walkers[:, :, None] - walkers[:, None], axis=3)
+    apart[:, np.arange(40), np.arange(40)] = np.inf
+    first, last = (a.min(axis=1) < 5.0 for a in (apart[0], apart[-1]))
+    assert 0.2 < (first & last).mean() < 0.7
+
+
 def test_seeds_mix_all_kinds():
     traffic = plan("downtown_03", 120, 1.0)
     classes = {kind.semantic_class for kind in traffic.kinds}
@@ -343,6 +358,30 @@ def test_ways_that_cross_exclude_each_other():
         for b in range(a):
             if graph.pieces[a].is_way and graph.pieces[b].is_way:
                 meets = lines[a].distance(lines[b]) < 1.5
-                assert not meets or small[a, b]
-    assert (small == small.T).all()
-    assert (small <= large).all()
+                assert not meets or small[a, b] > 0.0
+    assert ((small > 0.0) == (small.T > 0.0)).all()
+    assert (small <= large + 1.0)[small == 0.0].all()
+    # A crossing excludes its ways for as long as walkers are on it.
+    crossing = small[num:, :num]
+    assert (np.isinf(crossing) == (crossing > 0.0)).all()
+
+
+def test_a_way_is_free_behind_the_last_place_where_it_meets_another():
+    """Two straight ways of 40 m that cross at right angles at 20 m."""
+    x = np.arange(0.0, 40.1, 0.5)
+    c, s = np.cos(0.4), np.sin(0.4)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    ways = [
+        Piece(line @ R.T, 10.0, True)
+        for line in (
+            np.column_stack([x, 0 * x, 0 * x]),
+            np.column_stack([20 + 0 * x, x - 20, 0 * x]),
+        )
+    ]
+    small, large = find_conflicts(LaneGraph(tuple(ways)))
+    for size, found in ((SMALL_SIZE, small), (LARGEST.size, large)):
+        # Half a vehicle with 0.25 m beside it on either way, and the step.
+        expected = 20.0 + size[1] / 2 + 0.25
+        assert expected <= found[0, 1] <= expected + 1.01
+        assert found[1, 0] == pytest.approx(found[0, 1], abs=1.0)
+        assert found[0, 0] == found[1, 1] == 0.0
