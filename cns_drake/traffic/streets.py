@@ -267,10 +267,8 @@ def swept_hulls(
         ],
         axis=1,
     )
-    hulls = shapely.convex_hull(
-        shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=1))
-    )
-    return front, hulls
+    points = np.concatenate([corners[:-1], corners[1:]], axis=1)
+    return front, np.array(shapely.convex_hull(shapely.multipoints(points)))
 
 
 def _find_ego(
