@@ -244,6 +244,9 @@ class TestParameters:
         with pytest.raises(InputError, match=said):
             method(**parameters)
 
+    def test_other_limits_are_taken(self):
+        assert method(side_range=(3.0, 3.1)).config.side_range == (3.0, 3.1)
+
 
 def test_scores_of_folders(tmp_path, scenes):
     for folder, seeds in (("places", (0, 1)), ("queries", (1, 0))):
