@@ -26,20 +26,28 @@ class Interval:
     high: float
 
 
-def resampled_weights(num_queries: int, seed: int = 0) -> np.ndarray:
+def resampled_weights(
+    num_queries: int, seed: int = 0, blocks: np.ndarray | None = None
+) -> np.ndarray:
     """Returns how often each query counts in each sample of a bootstrap.
 
     Args:
         num_queries: Q, one or more.
         seed: of the drawing; equal ones draw the same queries.
+        blocks: (Q,) the block of each query; whole blocks are drawn, as many
+            as there are. By default each query is a block.
 
     Returns:
-        (B, Q) float64 counts, each row of sum Q.
+        (B, Q) float64 counts; without blocks, each row of sum Q.
     """
-    rng = np.random.default_rng([seed, num_queries])
-    draws = rng.integers(num_queries, size=(_SAMPLES, num_queries))
+    number, of_query = num_queries, np.arange(num_queries)
+    if blocks is not None:
+        known, of_query = np.unique(blocks, return_inverse=True)
+        number = len(known)
+    rng = np.random.default_rng([seed, number])
+    draws = rng.integers(number, size=(_SAMPLES, number))
     return np.stack(
-        [np.bincount(draw, minlength=num_queries) for draw in draws]
+        [np.bincount(draw, minlength=number)[of_query] for draw in draws]
     ).astype(np.float64)
 
 

@@ -43,6 +43,7 @@ from evaluation.report.result_tables import (
     change_table,
     cost_numbers,
     cost_table,
+    difference_numbers,
     fault_numbers,
     fault_table,
     metric_numbers,
@@ -140,6 +141,7 @@ def write_report(report: Report, folder: Path) -> Path:
         "place_recognition": audit_table(results, report.reference),
         "poses": pose_numbers(results),
         "metrics": metric_numbers(results),
+        "differences": difference_numbers(results, report.tracks),
         "why": fault_numbers(results, report.evidence),
         "queries": query_table(
             [(one.pair, one) for one in results],

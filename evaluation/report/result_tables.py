@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+import itertools
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -16,6 +17,12 @@ from scipy.spatial.transform import Rotation
 
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
+from evaluation.recognition.differences import (
+    Difference,
+    auc_difference,
+    holm,
+    route_blocks,
+)
 from evaluation.recognition.fault_kinds import (
     FAULT_KINDS,
     PairEvidence,
@@ -331,6 +338,56 @@ def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
                 lambda m, radius: m.areas[radius],
             ),
             **protocol_columns("result.outcome.protocol"),
+        },
+    )
+
+
+class _Difference(NamedTuple):
+    """Two results of a pair, with the difference of their AUC."""
+
+    result: RecognitionResult
+    other: RecognitionResult
+    difference: Difference
+    p_value: float
+
+
+def difference_numbers(
+    results: Sequence[RecognitionResult], tracks: Mapping[str, DriveTrack]
+) -> Table:
+    """Returns AUC differences of methods, as `differences.csv` has them.
+
+    Args:
+        results: for all pairs and methods.
+        tracks: drive -> its track, for all query drives.
+    """
+    ordered = _by_pair_and_method(results)
+    both = [
+        (one, other)
+        for one, other in itertools.combinations(ordered, 2)
+        if one.pair == other.pair
+    ]
+    found = []
+    for one, other in both:
+        track = tracks[one.outcome.query].X_WS[:, :3, 3]
+        blocks = route_blocks(track, one.outcome.retrieval.query_frames)
+        found.append(
+            auc_difference(one.outcome.outcomes, other.outcome.outcomes, blocks)
+        )
+    corrected = holm(np.array([one.p_value for one in found])).tolist()
+    return Table.of(
+        [
+            _Difference(*pair, one, p)
+            for pair, one, p in zip(both, found, corrected, strict=True)
+        ],
+        {
+            **_inner({n: _KEYS[n] for n in ("map", "db", "query")}),
+            "gate": lambda d: d.result.outcome.protocol.gate,
+            "method_a": lambda d: d.result.method,
+            "method_b": lambda d: d.other.method,
+            "difference": lambda d: d.difference.value,
+            "low": lambda d: d.difference.interval.low,
+            "high": lambda d: d.difference.interval.high,
+            "p": lambda d: d.p_value,
         },
     )
 

@@ -47,7 +47,8 @@ def assemble(
     Files: `report.html`, which holds everything; `report.md`; `survival`,
     `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
     .csv (all numbers), .md and .tex;
-    `metrics.csv`, the metrics of other benchmarks; `why.csv`, the reasons
+    `metrics.csv`, the metrics of other benchmarks; `differences.csv`, the
+    differences between methods; `why.csv`, the reasons
     for wrong best places; `queries.csv` and
     `queries_unchanged.csv`, every query of the pairs and of their controls;
     and what is missing in the folder `figures`.

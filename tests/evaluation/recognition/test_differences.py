@@ -1,0 +1,92 @@
+"""Differences between methods, by paired bootstrap over blocks."""
+
+import numpy as np
+import pytest
+
+from evaluation.recognition.differences import (
+    auc_difference,
+    holm,
+    route_blocks,
+)
+from evaluation.recognition.query_outcomes import judge
+from evaluation.recognition.resampling import resampled_weights
+
+
+def outcomes_of(scores, is_right):
+    matches = np.stack([is_right, ~is_right], axis=1)
+    return judge(np.stack([scores, scores - 10.0], axis=1), matches)
+
+
+def equal_methods(rng, num_blocks, size=5):
+    """Returns two methods that are equally good, and wrong in stretches."""
+    number = num_blocks * size
+    return [
+        outcomes_of(
+            rng.normal(size=number),
+            rng.normal(size=number)
+            + np.repeat(rng.normal(size=num_blocks), size)
+            > 0.0,
+        )
+        for _ in range(2)
+    ]
+
+
+def test_blocks_of_one_query_are_the_plain_bootstrap():
+    for blocks in (np.arange(30), np.arange(30)[::-1] * 7):
+        weights = resampled_weights(30, 3, blocks)
+        if blocks[0] == 0:
+            np.testing.assert_array_equal(weights, resampled_weights(30, 3))
+        assert (weights.sum(axis=1) == 30).all()
+
+
+def test_blocks_are_drawn_whole():
+    blocks = np.repeat([4, 1, 9], [2, 3, 1])
+    weights = resampled_weights(6, 0, blocks)
+    for block in (4, 1, 9):
+        of_block = weights[:, blocks == block]
+        assert (of_block == of_block[:, :1]).all()
+    assert (weights[:, [0, 2, 5]].sum(axis=1) == 3).all()
+
+
+def test_blocks_follow_the_route():
+    # There and back: the way counts, not where the sensor is.
+    xs = np.concatenate([np.arange(0.0, 151.0), np.arange(149.0, 79.0, -1.0)])
+    positions = np.stack([xs, 0.0 * xs, 0.0 * xs], axis=1)
+    frames = np.array([0, 99, 100, 199, 200, 220])
+    assert route_blocks(positions, frames).tolist() == [0, 0, 1, 1, 2, 2]
+
+
+def test_equal_methods_differ_at_the_nominal_level():
+    rng = np.random.default_rng(8)
+    blocks = np.repeat(np.arange(20), 5)
+    runs = 200
+    wrong = sum(
+        auc_difference(*equal_methods(rng, 20), blocks).p_value < 0.05
+        for _ in range(runs)
+    )
+    # Within 2.6 deviations of the binomial distribution.
+    assert abs(wrong - 0.05 * runs) < 2.6 * np.sqrt(runs * 0.05 * 0.95)
+
+
+def test_a_difference_has_a_sign_and_an_interval():
+    rng = np.random.default_rng(2)
+    scores, blocks = rng.normal(size=100), np.repeat(np.arange(20), 5)
+    good = outcomes_of(scores, rng.random(100) < 0.9)
+    poor = outcomes_of(scores, rng.random(100) < 0.2)
+    one, other = (
+        auc_difference(*both, blocks) for both in ((good, poor), (poor, good))
+    )
+    assert one.value == -other.value > 0.3
+    assert 0.0 < one.interval.low < one.value < one.interval.high
+    assert one.p_value == pytest.approx(other.p_value)
+    assert one.p_value < 1e-6
+    same = auc_difference(good, good, blocks)
+    assert (same.value, same.p_value) == (0.0, 1.0)
+    assert np.isnan(auc_difference(good, poor, 0 * blocks).p_value)
+
+
+def test_holm_by_hand():
+    found = holm(np.array([0.03, np.nan, 0.01, 0.02, 0.6]))
+    np.testing.assert_allclose(found, [0.06, np.nan, 0.04, 0.06, 0.6])
+    assert holm(np.array([0.5, 0.9])).tolist() == [1.0, 1.0]
+    assert len(holm(np.array([]))) == 0
