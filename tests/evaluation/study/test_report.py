@@ -194,6 +194,17 @@ def test_figures_for_print_and_page(report):
         assert f"](figures/{stem}.png)" in text
 
 
+def test_differences_of_every_two_methods(report):
+    rows = read_csv(report / "differences.csv")
+    survival = read_csv(report / "survival.csv")
+    areas = {one["method"]: float(one["auc_changed"]) for one in survival}
+    assert len(rows) == len(areas) * (len(areas) - 1) // 2
+    for row in rows:
+        expected = areas[row["method_a"]] - areas[row["method_b"]]
+        assert float(row["difference"]) == pytest.approx(expected, abs=1e-12)
+        assert row["gate"] == "0"
+
+
 def test_report_is_the_same_for_any_number_of_workers(
     recordings, report, tmp_path
 ):
@@ -204,7 +215,7 @@ def test_report_is_the_same_for_any_number_of_workers(
         reference_for=reference_for,
     )
     files = studies.report_files(tmp_path)
-    assert len(files) == 18 + 15
+    assert len(files) == 19 + 15
     assert files == studies.report_files(report)
 
 
