@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from pydrake.trajectories import BsplineTrajectory
 
@@ -14,7 +16,7 @@ from cns_drake.roads.lane_path import Speeds
 
 # Distance of the knots of the time scaling [s]; acceleration changes within
 # about two of them, so the jerk stays near (acceleration / knot period).
-_KNOT_PERIOD = 0.3
+KNOT_PERIOD = 0.3
 # Grid on which the limits are evaluated [m].
 _STEP = 0.1
 # Margin for values between grid points: the limits are smooth over several
@@ -24,13 +26,37 @@ _MARGIN = 0.998
 _SMOOTHING_SLACK = 0.2
 
 
-def make_time_scaling(
-    path: SmoothPath, speed_limits: np.ndarray, speeds: Speeds
-) -> BsplineTrajectory:
-    """Returns the path parameter u(t), from rest to rest.
+class SpeedProfile(NamedTuple):
+    """The fastest drive along a path, from rest to rest.
 
-    First the fastest drive under the limits is found with stepwise constant
-    acceleration (a forward and a backward pass over v^2). Its positions at
+    Attributes:
+        u: (N,) even places on the path [m].
+        speed: (N,) the speed there [m/s].
+        acceleration: the bound of the acceleration [m/s^2].
+    """
+
+    u: np.ndarray
+    speed: np.ndarray
+    acceleration: float
+
+
+def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
+    """Returns the path parameter u(t) through places of a drive, smoothed.
+
+    Args:
+        positions: (N,) places at each `KNOT_PERIOD`, at rest for REACH of them
+            at both ends [m].
+    """
+    return make_uniform_spline(positions[:, None], KNOT_PERIOD)
+
+
+def find_speed_profile(
+    path: SmoothPath, speed_limits: np.ndarray, speeds: Speeds
+) -> SpeedProfile:
+    """Returns the fastest drive under bounds.
+
+    It is found with stepwise constant acceleration (a forward and a backward
+    pass over v^2). Its positions at
     even times are then the control points of a quintic B-spline: its u' is a
     weighted mean of the drive's speed, and its u'' of the acceleration, over
     at most REACH + 1 knot periods before and after. Bounds of acceleration
@@ -59,14 +85,19 @@ def make_time_scaling(
     parametric = np.max(np.abs(jet.dspeed) * limit**2)
     acceleration = _MARGIN * speeds.longitudinal_acceleration - parametric
     speed = np.sqrt(_reachable(limit**2, acceleration, u[1]))
+    return SpeedProfile(u, speed, acceleration)
+
+
+def drive_positions(profile: SpeedProfile) -> np.ndarray:
+    """Returns the places of the fastest drive at each `KNOT_PERIOD` [m]."""
+    u, speed, _ = profile
     times = np.concatenate(
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]
     )
     # With REACH knots of rest at both ends the spline too is at rest there.
-    knots = int(np.ceil(times[-1] / _KNOT_PERIOD)) + 2 * REACH
-    drive_times = (np.arange(knots + 1) - REACH) * _KNOT_PERIOD
-    positions = _drive(drive_times, times, u, speed)
-    return make_uniform_spline(positions[:, None], _KNOT_PERIOD)
+    knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * REACH
+    drive_times = (np.arange(knots + 1) - REACH) * KNOT_PERIOD
+    return _drive(drive_times, times, u, speed)
 
 
 def _at_knots(
@@ -83,7 +114,7 @@ def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:
     A drive that keeps to limit v within T * v of a place passes the place
     with at most v during at least T before and after.
     """
-    period = (REACH + 1) * _KNOT_PERIOD
+    period = (REACH + 1) * KNOT_PERIOD
     reach = np.ceil((period * limit + _SMOOTHING_SLACK) / step).astype(int)
     result = limit.copy()
     for shift in range(1, int(reach.max()) + 1):

@@ -18,7 +18,11 @@ from cns_drake.motion.path_geometry import (
     SmoothPath,
     SplineDerivatives,
 )
-from cns_drake.motion.speed_profile import make_time_scaling
+from cns_drake.motion.speed_profile import (
+    drive_positions,
+    find_speed_profile,
+    make_time_scaling,
+)
 from cns_drake.roads.lane_path import LanePath, Speeds
 
 
@@ -230,11 +234,20 @@ class Trajectory:
     def __init__(self, lane_path: LanePath, speeds: Speeds):
         """Makes the trajectory."""
         self._path = SmoothPath(lane_path.points, lane_path.spacing)
+        self.speed_profile = find_speed_profile(
+            self._path, lane_path.speed_limits, speeds
+        )
         self._time_scaling = SplineDerivatives(
-            make_time_scaling(self._path, lane_path.speed_limits, speeds), 2
+            make_time_scaling(drive_positions(self.speed_profile)), 2
         )
         self._travelled = PathIntegral(self._path, lambda jet: jet.speed)
         self._ride: BodyRide | None = None
+
+    def with_positions(self, positions: np.ndarray) -> Trajectory:
+        """Returns a drive along the same path; see `make_time_scaling`."""
+        drive = copy.copy(self)
+        drive._time_scaling = SplineDerivatives(make_time_scaling(positions), 2)
+        return drive
 
     def with_ride(self, ride: BodyRide) -> Trajectory:
         """Returns the same drive with a body that moves against its path."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cns_drake.base.errors import InputError
 from cns_drake.motion.suspension import (
     Suspension,
@@ -21,8 +23,15 @@ from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 
-def plan_drive(scenario: Scenario) -> Trajectory:
+def plan_drive(
+    scenario: Scenario, positions: np.ndarray | None = None
+) -> Trajectory:
     """Plans the drive of a scenario, along its route or its waypoints.
+
+    Args:
+        scenario: the scenario to plan.
+        positions: places on the path at even times, of a car that follows
+            others; see `TrafficPlan`. By default it is as fast as it may be.
 
     Raises:
         InputError: the roads, the waypoints or the vehicle's springs cannot
@@ -53,6 +62,8 @@ def plan_drive(scenario: Scenario) -> Trajectory:
         source = f"{scenario.source}: route"
         cure = "give the junction a greater kerb_radius"
     trajectory = Trajectory(path, scenario.speeds)
+    if positions is not None:
+        trajectory = trajectory.with_positions(positions)
     _check_steering(trajectory, source, cure)
     profile = scenario.ride.profile()
     if profile is None:

@@ -45,6 +45,9 @@ from cns_drake.transient.world_structures import (
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
+# A car that follows others takes at most this multiple of its own time, and
+# this time besides [s].
+_SLOWEST, _WAITS = 4.0, 300.0
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
 
@@ -89,9 +92,11 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     watch = FileWatch()
     inputs = digest_inputs(scenario, watch)
     trajectory = plan_drive(scenario)
+    if not scenario.driver.follows:
+        count_frames(scenario, trajectory)  # An error comes at once.
+    world, traffic, trajectory = load_stage_and_traffic(scenario, trajectory)
     num_frames = count_frames(scenario, trajectory)
     scenario = scenario.model_copy(update={"frames": num_frames})
-    world, traffic = load_stage_and_traffic(scenario, trajectory)
     changed = watch.changed()
     if changed is not None:
         raise InputError(f"{changed}: changed while it was being read")
@@ -116,8 +121,10 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
 
 def load_stage_and_traffic(
     scenario: Scenario, trajectory: Trajectory
-) -> tuple[World, TrafficPlan | None]:
+) -> tuple[World, TrafficPlan | None, Trajectory]:
     """Loads the stage of a scenario, and plans the traffic in it, if any.
+
+    The trajectory is another one if the vehicle follows others.
 
     Args:
         scenario: names the stage.
@@ -128,9 +135,11 @@ def load_stage_and_traffic(
     """
     world = load_stage(scenario, trajectory=trajectory)
     if scenario.traffic.is_off:
-        return world, None
+        return world, None, trajectory
     traffic = plan_scenario_traffic(scenario, trajectory, world)
-    return with_traffic(world, traffic), traffic
+    if traffic.positions is not None:
+        trajectory = plan_drive(scenario, traffic.positions)
+    return with_traffic(world, traffic), traffic, trajectory
 
 
 def load_stage(
@@ -236,6 +245,7 @@ def plan_scenario_traffic(
             scenario, with_vehicle=False, trajectory=trajectory
         )
         walkways = kept_clear(walkways, _things(world))
+    follows = scenario.driver.follows
     plan = plan_traffic(
         graph,
         walkways,
@@ -243,12 +253,20 @@ def plan_scenario_traffic(
         walkers=wanted.walkers,
         seed=wanted.seed,
         # Traffic is planned for the whole drive, not only for its frames.
-        duration=trajectory.duration + FRAME_PERIOD,
-        ego=ego,
+        duration=_SLOWEST * trajectory.duration + _WAITS
+        if follows
+        else trajectory.duration + FRAME_PERIOD,
+        ego=(lambda t: ego(0.0 * t)) if follows else ego,
         ego_box=EGO_BOX,
+        drive=trajectory if follows else None,
     )
     if wanted.vehicles and not plan.kinds:
         raise InputError(f"{where}: the car leaves no room for vehicles")
+    if follows and plan.positions is None:
+        raise InputError(
+            f"{scenario.source}: driver: follows: the car is held up for ever; "
+            "take fewer vehicles"
+        )
     return plan
 
 

@@ -191,9 +191,11 @@ class SimulatedDrive(PlannedDrive):
         """
         check_files(scenario)
         trajectory = plan_drive(scenario)
+        world, traffic, trajectory = load_stage_and_traffic(
+            scenario, trajectory
+        )
         num_frames = count_frames(scenario, trajectory)
         super().__init__(scenario, trajectory, num_frames)
-        world, traffic = load_stage_and_traffic(scenario, trajectory)
         self._instances = index_instances(structure_list(world), self.name)
         self._diagram = make_station(
             scenario, world=world, trajectory=trajectory, traffic=traffic

@@ -100,6 +100,8 @@ def make_station(
     if traffic is None and not scenario.traffic.is_off:
         traffic = plan_scenario_traffic(scenario, trajectory, world)
         world = with_traffic(world, traffic)
+        if traffic.positions is not None:
+            trajectory = plan_drive(scenario, traffic.positions)
     plant = world.plant
     base = plant.GetBodyByName("base_link", world.vehicle)
 

@@ -101,7 +101,7 @@ def grant_ways(
     first = np.full(len(pieces), -1)
     for i in range(num_cars):
         lane = cars[i].path[CURRENT]
-        if pieces[lane].is_way or cars[i].granted:
+        if lane < 0 or pieces[lane].is_way or cars[i].granted:
             continue
         if first[lane] < 0 or cars[i].s > cars[first[lane]].s:
             first[lane] = i
@@ -112,6 +112,8 @@ def grant_ways(
             continue
         car = cars[first[lane]]
         if car.held >= 0 or car.left_lane >= 0:
+            continue
+        if car.guided and car.path[CURRENT + 1] < 0:
             continue
         braking = car.v**2 / (2.0 * car.b)
         asked_from = max(_ASKED_FROM, _ASKED_BRAKING * braking + 5.0)
@@ -284,7 +286,7 @@ def _has_room(
             if comes and j != i:
                 end -= one.length + _ROOM
         has_room = end >= car.length + _ROOM
-    if not has_room:
+    if not has_room and not car.guided:
         car.refused += dt
         if car.refused > _PATIENCE or is_ego_near:
             car.refused = 0.0

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.traffic.follower import Follower, make_follower
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.right_of_way import grant_ways, make_permits
@@ -31,6 +33,8 @@ STEP = 0.1
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 # Steps for which traffic has moved when the drive begins.
 _FIRST = 200
+# Steps for which it goes on after a car that follows others has arrived.
+_AFTER = 20
 # Share of vehicles and walkers that are planned in excess, since some are left
 # out; and number of trials.
 _SPARE, _TRIES = 0.06, 4
@@ -138,12 +142,15 @@ class TrafficPlan:
             pitch [rad].
         walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
         left_out: number of wanted bodies left out because they would collide.
+        positions: places of the ego car on its path at each `KNOT_PERIOD` [m],
+            if it was one of the vehicles.
     """
 
     kinds: tuple[VehicleKind, ...]
     vehicles: Tracks
     walkers: Tracks
     left_out: int = 0
+    positions: np.ndarray | None = None
 
 
 class _Task(NamedTuple):
@@ -158,6 +165,8 @@ class _Task(NamedTuple):
             ego car's box at half steps.
         ego_box: its size.
         vehicles, walkers: wanted numbers.
+        drive: the ego car's, if it follows other vehicles; it then stands in
+            `streets` and `ego_track`.
     """
 
     graph: LaneGraph
@@ -167,6 +176,7 @@ class _Task(NamedTuple):
     ego_box: EgoBox
     vehicles: int
     walkers: int
+    drive: Trajectory | None
 
 
 def plan_traffic(
@@ -179,6 +189,7 @@ def plan_traffic(
     duration: float,
     ego: EgoPath,
     ego_box: EgoBox,
+    drive: Trajectory | None = None,
 ) -> TrafficPlan:
     """Plans traffic for a drive; equal arguments give an equal plan.
 
@@ -190,6 +201,8 @@ def plan_traffic(
         duration: length of the drive [s].
         ego: the ego car's motion.
         ego_box: its size.
+        drive: the ego car's, if it follows other vehicles; `ego` then stands at
+            its first place, and `duration` is the longest.
 
     Returns:
         The plan, without any collisions. It may have fewer bodies than wanted.
@@ -207,7 +220,11 @@ def plan_traffic(
         ego_box,
         vehicles,
         walkers,
+        drive,
     )
+    if drive is not None:
+        # The car is in the way at its first place, and then a vehicle.
+        task.streets.until[1:] = np.inf
     best: TrafficPlan | None = None
     for attempt in range(_TRIES):
         best = _try(task, np.random.default_rng([seed, attempt]), best)
@@ -227,6 +244,8 @@ def _try(
         trial.run(range(first, min(first + _PART, num_steps)))
         if best is not None and trial.left_out() >= best.left_out:
             return best
+        if trial.is_over(first + _PART):
+            return trial.plan()
     return trial.plan()
 
 
@@ -248,7 +267,17 @@ class Trial:
             _with_spare(task.walkers), task.walkways, self._permits, rng
         )
         self._seed = int(rng.integers(2**31))
-        self._occupants = make_occupants(len(task.graph.pieces), len(found))
+        self._follower: Follower | None = None
+        self._num_steps = 0
+        if task.drive is not None:
+            self._follower = make_follower(
+                task.graph, task.drive, task.ego_box, _FIRST, STEP
+            )
+            record = self._follower.record(task.streets)
+            self._cars = np.concatenate([self._cars, record])
+        self._occupants = make_occupants(
+            len(task.graph.pieces), len(self._cars)
+        )
         num_steps = len(task.streets.until)
         num_walkers = len(self._crowd.walkers)
         # See `TrafficPlan` for their columns.
@@ -274,11 +303,13 @@ class Trial:
         cars, permits, crowd = self._cars, self._permits, self._crowd
         past_cars, past_walkers = [], []
         for k in steps:
-            past_cars.append(cars.copy())
+            past_cars.append(cars[: len(self._kinds)].copy())
             past_walkers.append(crowd.walkers.copy())
             find_occupants(occupants, streets, cars, k)
             grant_ways(streets, cars, occupants, permits, k, STEP, self._seed)
             wanted = accelerations(streets, cars, occupants)
+            if self._follower is not None:
+                self._follower.step(streets, cars, occupants, k)
             change_lanes(streets, cars, occupants, k)
             advance(streets, cars, wanted, STEP, self._seed)
             crowd.step(k * STEP, STEP, self._seed + 1)
@@ -288,15 +319,29 @@ class Trial:
         # The step before, for the half step between.
         first = max(steps.start - 1, 0)
         rows = slice(first, steps.stop)
+        if self._follower is None:
+            ego = self._task.ego_track[2 * first : 2 * steps.stop - 1]
+        else:
+            ego = self._follower.poses(
+                np.arange(2 * first, 2 * steps.stop - 1) / 2
+            )
         poses = np.concatenate(
             [
-                self._task.ego_track[2 * first : 2 * steps.stop - 1, None],
+                ego[:, None],
                 _at_half_steps(self._vehicles[rows]),
                 _at_half_steps(self._walkers[rows]),
             ],
             axis=1,
         )
         find_overlaps(poses, self._half_sizes, self._overlaps)
+        self._num_steps = steps.stop
+
+    def is_over(self, num_steps: int) -> bool:
+        """Returns whether the ego car has arrived, and some time has passed."""
+        if self._follower is None:
+            return False
+        u = self._follower.u
+        return self._follower.arrived and u[num_steps - _AFTER] == u[-1]
 
     def _kept(self) -> tuple[list[int], list[int]]:
         """Returns the vehicles and the walkers that meet no other body."""
@@ -320,14 +365,19 @@ class Trial:
 
     def plan(self) -> TrafficPlan:
         """Returns the plan, after the last step."""
-        yaw = self._vehicles[:, :, 3]
+        vehicles_at = self._vehicles[: self._num_steps]
+        walkers_at = self._walkers[: self._num_steps]
+        yaw = vehicles_at[:, :, 3]
         yaw[:] = np.unwrap(yaw, axis=0)
         vehicles, walkers = self._kept()
         return TrafficPlan(
             tuple(self._kinds[k] for k in vehicles),
-            Tracks(STEP, _smooth(self._vehicles[:, np.array(vehicles, int)])),
-            Tracks(STEP, _smooth(self._walkers[:, np.array(walkers, int)])),
+            Tracks(STEP, _smooth(vehicles_at[:, np.array(vehicles, int)])),
+            Tracks(STEP, _smooth(walkers_at[:, np.array(walkers, int)])),
             self.left_out(),
+            self._follower.positions()
+            if self._follower is not None and self._follower.arrived
+            else None,
         )
 
 

@@ -33,9 +33,9 @@ HARDEST_BRAKING, EMERGENCY_BRAKING = 3.2, 5.5
 # Smaller gaps count as this one [m].
 _NO_GAP = 0.05
 # Distance kept from the stop line [m].
-_BEFORE_LINE = 0.5
+BEFORE_LINE = 0.5
 # Greatest distance that drivers look ahead [m].
-_SIGHT = 120.0
+SIGHT = 120.0
 # The gap for which drivers brake as in an emergency [m].
 _LEAST_GAP = 0.5
 
@@ -67,6 +67,7 @@ VEHICLE = np.dtype(
         ("a", float),  # Car-following model, with b and headway.
         ("b", float),
         ("headway", float),
+        ("guided", bool),  # Whether it is the ego car, which `Follower` moves.
         ("large", bool),  # Whether it sweeps more than its lane in turns.
         ("path", int, NUM_PIECES),  # Pieces, -1 for none.
         ("s", float),  # The front bumper's place on the current piece [m].
@@ -367,6 +368,8 @@ def accelerations(
     pieces = streets.pieces
     for i in range(len(cars)):
         car = cars[i]
+        if car.guided:
+            continue
         lane, s, v = car.path[CURRENT], car.s, car.v
         v0 = min(car.top, car.factor * speed_on(streets, lane, s))
         wanted = free_acceleration(car, v0)
@@ -377,7 +380,7 @@ def accelerations(
             if gap_2 < gap:
                 gap, speed = gap_2, speed_2
         column, begin, line = CURRENT, pieces[lane].length - s, np.inf
-        while begin < _SIGHT:
+        while begin < SIGHT:
             is_way = pieces[car.path[column]].is_way
             if not is_way and (column > CURRENT or not car.granted):
                 line = begin
@@ -393,9 +396,9 @@ def accelerations(
                 gap, speed = find_ahead(occupants, piece, -begin, i)
             begin += pieces[piece].length
         # The driver brakes as for a vehicle behind the stop line.
-        loss = interaction(car, line + STANDSTILL_GAP - _BEFORE_LINE, v)
+        loss = interaction(car, line + STANDSTILL_GAP - BEFORE_LINE, v)
         needed = v**2 / (2.0 * max(line, _NO_GAP))
-        if gap < _SIGHT:
+        if gap < SIGHT:
             loss = max(loss, interaction(car, gap, v - speed))
             # The vehicle ahead may brake hard.
             stop = gap - _LEAST_GAP
@@ -416,7 +419,8 @@ def change_lanes(
         car = cars[i]
         lane = car.path[CURRENT]
         if (
-            (k + i) % _THINKS != 0
+            car.guided
+            or (k + i) % _THINKS != 0
             or pieces[lane].is_way
             or car.granted
             or car.left_lane >= 0
@@ -521,6 +525,8 @@ def advance(
     pieces = streets.pieces
     for i in range(len(cars)):
         car = cars[i]
+        if car.guided:
+            continue
         v = max(0.0, car.v + accelerations[i] * dt)
         s = car.s + 0.5 * (car.v + v) * dt
         while True:

@@ -1,0 +1,325 @@
+"""The ego car as one of the vehicles, along a path of its own."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from cns_drake.motion.path_geometry import REACH
+from cns_drake.motion.speed_profile import KNOT_PERIOD
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.streets import EgoBox, Streets
+from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
+from cns_drake.traffic.vehicles import (
+    BEFORE_LINE,
+    CURRENT,
+    SIGHT,
+    VEHICLE,
+    Occupants,
+    find_ahead,
+    free_acceleration,
+    interaction,
+)
+
+# Distance of the places at which the car's lane is known [m].
+_STEP = 1.0
+# The car's lane is at most this far away [m], in its direction within 45 deg.
+_REACHES, _ALIGNED = 3.0, 0.7
+# Cost of a metre on no lane, as that of a lane's square distance [m^2], and of
+# a change of lane, and to no lane or back.
+_NO_LANE, _SIDEWAYS, _AWAY = 4.0, 8.0, 20.0
+# The car is in both lanes for this distance before a change [m].
+_CHANGES = 12.0
+# Parameters of the Intelligent Driver Model, and the part of the drive's
+# greatest acceleration that it uses.
+_ACCELERATION, _DECELERATION, _HEADWAY, _PART = 1.5, 1.8, 1.3, 0.95
+# The bounds of speed are looked up at least this far ahead [m].
+_AHEAD = 0.05
+
+
+class _Run(NamedTuple):
+    """A part of the way on one piece.
+
+    Attributes:
+        piece: its number, -1 on no lane.
+        first, last: where the front bumper enters and leaves it [m].
+        s: place on the piece where it enters [m].
+    """
+
+    piece: int
+    first: float
+    last: float
+    s: float
+
+
+def find_runs(graph: LaneGraph, points: np.ndarray, step: float) -> list[_Run]:
+    """Returns the pieces along a way, those that fit best as a whole.
+
+    Args:
+        graph: the lanes.
+        points: (N, 2) places on the way [m].
+        step: their distance [m].
+    """
+    lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
+    tree = shapely.STRtree(lines)
+    rows, found = tree.query(shapely.points(points), "dwithin", _REACHES)
+    near, columns = np.unique(found, return_inverse=True)
+    here, on = shapely.points(points[rows]), np.array(lines)[found]
+    places = shapely.line_locate_point(on, here)
+    along = np.subtract(
+        *(
+            shapely.get_coordinates(
+                shapely.line_interpolate_point(on, np.maximum(places + d, 0.0))
+            )
+            for d in (0.5, -0.5)
+        )
+    )
+    ahead = np.gradient(points, axis=0)[rows]
+    size = np.linalg.norm(along, axis=1) * np.linalg.norm(ahead, axis=1)
+    fits = np.sum(along * ahead, axis=1) > _ALIGNED * size
+    off = len(near)
+    misfit = np.full((len(points), off + 1), np.inf)
+    misfit[:, off] = _NO_LANE
+    distance = shapely.distance(on, here)
+    misfit[rows[fits], columns[fits]] = distance[fits] ** 2
+    place = np.zeros(misfit.shape)
+    place[rows, columns] = places
+    change = np.full((off + 1, off + 1), np.inf)
+    change[off], change[:, off] = _AWAY, _AWAY
+    for row, number in enumerate(near):
+        piece = graph.pieces[number]
+        for others, cost in (
+            (piece.after, 0.0),
+            ((piece.left, piece.right), _SIDEWAYS),
+        ):
+            change[row, :off][np.isin(near, others)] = cost
+    np.fill_diagonal(change, 0.0)
+    # The cheapest sequence of pieces, by dynamic programming.
+    cost, before = misfit[0], np.zeros(misfit.shape, int)
+    for row in range(1, len(points)):
+        costs = cost[:, None] + change
+        before[row] = costs.argmin(axis=0)
+        cost = costs.min(axis=0) + misfit[row]
+    best = np.zeros(len(points), int)
+    best[-1] = cost.argmin()
+    for row in range(len(points) - 1, 0, -1):
+        best[row - 1] = before[row, best[row]]
+    starts = np.flatnonzero(np.diff(best, prepend=-1))
+    pieces = np.append(near, -1)[best[starts]].tolist()
+    firsts, s = step * starts.astype(float), place[starts, best[starts]]
+    for k, (before_it, piece) in enumerate(pairwise(pieces), 1):
+        if before_it >= 0 and piece in graph.pieces[before_it].after:
+            # The boundary is between two of the points.
+            firsts[k], s[k] = firsts[k] - s[k], 0.0
+    lasts = [*firsts[1:].tolist(), step * len(points)]
+    return [
+        _Run(*run)
+        for run in zip(pieces, firsts.tolist(), lasts, s.tolist(), strict=True)
+    ]
+
+
+class Follower:
+    """The ego car in a simulation of traffic.
+
+    It follows its path by the Intelligent Driver Model, asks for its ways as
+    the others do, and keeps the bounds of its drive.
+
+    Attributes:
+        u: its place on the path at each step so far [m].
+        arrived: whether it stands at the end of the path.
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        runs: list[_Run],
+        box: EgoBox,
+        start: int,
+        dt: float,
+    ):
+        """Puts the car at the beginning of its path.
+
+        Args:
+            trajectory: the path, and the bounds of its drive.
+            runs: the pieces along its front bumper's way; see `front_points`.
+            box: the car's size.
+            start: number of the step at which the drive begins.
+            dt: the step [s].
+        """
+        self._path, self._profile = trajectory.path, trajectory.speed_profile
+        self._square = self._profile.speed**2
+        self._runs, self._box, self._dt = runs, box, dt
+        self._start = start
+        # The drive begins with a rest, as any other.
+        self._leaves = start + round(REACH * KNOT_PERIOD / dt)
+        self._run = 0
+        self._held: _Run | None = None
+        self.u = [0.0]
+        self.arrived = False
+
+    def record(self, streets: Streets) -> np.ndarray:
+        """Returns the (1,) record `VEHICLE` of the car at its first place."""
+        car = np.zeros(1, VEHICLE)
+        bound = _PART * self._profile.acceleration
+        for name, value in (
+            ("length", self._box.front - self._box.rear),
+            ("top", self._profile.speed.max()),
+            ("factor", 1.0),
+            ("a", min(_ACCELERATION, bound)),
+            ("b", min(_DECELERATION, bound)),
+            ("headway", _HEADWAY),
+            ("guided", True),
+            ("held", -1),
+            ("since", np.inf),
+            ("change_length", 1.0),
+        ):
+            car[name] = value
+        self._place(streets, car[0])
+        return car
+
+    def step(
+        self,
+        streets: Streets,
+        cars: np.ndarray,
+        occupants: Occupants,
+        k: int,
+    ) -> None:
+        """Moves the car on, the last one of N records `VEHICLE`."""
+        car, dt, u = cars[-1], self._dt, self.u[-1]
+        if k < self._leaves or self.arrived:
+            self.u.append(u)
+            return
+        wanted = free_acceleration(car, car["top"])
+        gap, speed, line = self._ahead(streets, car, occupants, len(cars) - 1)
+        loss = interaction(
+            car, line + STANDSTILL_GAP - BEFORE_LINE, float(car["v"])
+        )
+        if gap < SIGHT:
+            loss = max(loss, interaction(car, gap, car["v"] - speed))
+        bound = _PART * self._profile.acceleration
+        v = max(0.0, car["v"] + max(wanted - loss, -bound) * dt)
+        ahead = u + max(car["v"] * dt, _AHEAD)
+        v = min(v, np.interp(ahead, self._profile.u, self._square) ** 0.5)
+        u += 0.5 * (car["v"] + v) * dt
+        if u > self._path.end - 2 * _AHEAD and v < 0.1:
+            u, v, self.arrived = self._path.end, 0.0, True
+        self.u.append(u)
+        car["v"] = v
+        self._place(streets, car)
+
+    def _ahead(
+        self, streets: Streets, car: np.void, occupants: Occupants, who: int
+    ) -> tuple[float, float, float]:
+        """Returns the gap to the car ahead [m], its speed, and the stop line.
+
+        The distance of the stop line is inf where the car may go on [m].
+        """
+        front = self.u[-1] + self._box.front
+        gap, speed = np.inf, 0.0
+        if car["left_lane"] >= 0:
+            after = self._runs[self._run + 1]
+            gap, speed = find_ahead(
+                occupants, after.piece, after.s - after.first + front, who
+            )
+        for run in self._runs[self._run :]:
+            if run.piece < 0 or run.first - front > SIGHT:
+                break
+            is_next = run.first > front and run is not self._held
+            if is_next and streets.pieces[run.piece]["is_way"]:
+                return gap, speed, run.first - front
+            other = find_ahead(
+                occupants, run.piece, run.s + front - run.first, who
+            )
+            if other[0] < gap:
+                gap, speed = other
+        return gap, speed, np.inf
+
+    def _place(self, streets: Streets, car: np.void) -> None:
+        """Notes the pieces on which the car is now."""
+        front, runs = self.u[-1] + self._box.front, self._runs
+        while self._run < len(runs) - 1 and front >= runs[self._run].last:
+            self._run += 1
+        run = runs[self._run]
+        piece = run.piece
+        path = car["path"]
+        path[:] = -1
+        is_way = piece >= 0 and bool(streets.pieces[piece]["is_way"])
+        after = runs[self._run + 1] if self._run < len(runs) - 1 else None
+        car["left_lane"] = -1
+        if car["granted"] and self._held is None:
+            self._held = after
+        if self._held is not None and front >= self._held.last:
+            car["granted"] = False
+            if front - car["length"] >= self._held.last:
+                car["held"], self._held = -1, None
+        if piece < 0:
+            return
+        path[CURRENT] = piece
+        car["s"] = run.s + front - run.first
+        column, before = CURRENT, run
+        for other in runs[: self._run][::-1]:
+            column -= 1
+            if column < 0 or other.piece < 0:
+                break
+            if not _leads(streets, other.piece, before.piece):
+                break
+            path[column], before = other.piece, other
+        way = piece
+        if not is_way:
+            if after is None or after.piece < 0:
+                return
+            way = after.piece
+            if not streets.pieces[way]["is_way"]:
+                if run.last - front < _CHANGES:
+                    car["left_lane"] = way
+                return
+            path[CURRENT + 1] = way
+        first = streets.pieces[way]["after_first"]
+        path[CURRENT + 1 + (not is_way)] = streets.after[first]
+
+    def poses(self, steps: np.ndarray) -> np.ndarray:
+        """Returns (N, 3) x, y [m], yaw of the box's middle at (N,) steps."""
+        u = np.interp(steps, np.arange(len(self.u)), self.u)
+        jet = self._path.evaluate(u)
+        return self._box.middles(jet.p[:, :2], jet.yaw)
+
+    def positions(self) -> np.ndarray:
+        """Returns places on the path at each `KNOT_PERIOD` of the drive [m]."""
+        every = round(KNOT_PERIOD / self._dt)
+        u = np.array(self.u[self._start :: every])
+        return u[: np.count_nonzero(u < self._path.end) + REACH + 1]
+
+
+def _leads(streets: Streets, piece: int, other: int) -> bool:
+    """Returns whether one piece leads to another."""
+    row = streets.pieces[piece]
+    first = row["after_first"]
+    return other in streets.after[first : first + row["after_count"]]
+
+
+def front_points(trajectory: Trajectory, box: EgoBox) -> np.ndarray:
+    """Returns the (N, 2) way of a car's front bumper, `_STEP` apart [m].
+
+    It begins where the path does, and goes on straight beyond its end.
+    """
+    path = trajectory.path
+    u = _STEP * np.arange(int((path.end + box.front) / _STEP) + 1)
+    jet = path.evaluate(u)
+    beyond = np.maximum(u - path.end, 0.0)[:, None]
+    return jet.p[:, :2] + beyond * jet.dp[:, :2]
+
+
+def make_follower(
+    graph: LaneGraph,
+    trajectory: Trajectory,
+    box: EgoBox,
+    start: int,
+    dt: float,
+) -> Follower:
+    """Returns the ego car among the vehicles of a graph; see `Follower`."""
+    runs = find_runs(graph, front_points(trajectory, box), _STEP)
+    return Follower(trajectory, runs, box, start, dt)

@@ -1,0 +1,168 @@
+"""The ego car among the vehicles: closed forms, and a whole drive."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cns_drake.motion.speed_profile import KNOT_PERIOD
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.roads.lane_path import LanePath, Speeds
+from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.scenario import DriverConfig, TrafficConfig
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.simulation.loaded_drive import plan_scenario_traffic
+from cns_drake.traffic.follower import make_follower
+from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.traffic.streets import EgoBox, make_streets
+from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
+from cns_drake.traffic.vehicles import (
+    CURRENT,
+    VEHICLE,
+    find_occupants,
+    make_occupants,
+)
+
+BOX = EgoBox(-1.05, 3.75, 1.03)
+DT = 0.1
+ANGLE = 0.6
+AHEAD = np.array([np.cos(ANGLE), np.sin(ANGLE), 0.0])
+
+
+def line(first, last):
+    """Returns points from one distance to another along a heading [m]."""
+    s = np.arange(first, last + 0.1, 0.5)
+    return (s[:, None] - 10.0) * AHEAD + [3.0, -4.0, 1.0]
+
+
+class Street:
+    """A lane of 300 m, a way of 30 m, a lane of 300 m, and a car on them."""
+
+    def __init__(self):
+        graph = LaneGraph(
+            (
+                Piece(line(0, 300), 14.0, False, (1,), junction=0),
+                Piece(line(300, 330), 14.0, True, (2,), junction=0),
+                Piece(line(330, 630), 14.0, False, (1,), junction=0),
+            ),
+            phases=(1,),
+        )
+        path = LanePath(line(10, 620)[::4], 2.0, np.full(306, 14.0))
+        self.trajectory = Trajectory(path, Speeds())
+        self.follower = make_follower(graph, self.trajectory, BOX, 0, DT)
+        far = np.tile((1e4, 0.0), (2, 1))
+        self.streets = make_streets(graph, BOX, far, np.zeros(2), DT)
+        self.cars = np.zeros(2, VEHICLE)
+        self.cars["path"], self.cars["held"] = -1, -1
+        self.cars["left_lane"] = -1
+        self.cars[1] = self.follower.record(self.streets)[0]
+        self.occupants = make_occupants(3, 2)
+
+    def put(self, s, v):
+        """Puts the other vehicle, of 4 m, to a place of the first lane."""
+        self.cars[0]["path"][CURRENT] = 0
+        self.cars[0]["s"], self.cars[0]["v"] = s, v
+        self.cars[0]["length"] = 4.0
+
+    def step(self):
+        find_occupants(self.occupants, self.streets, self.cars, 0)
+        self.follower.step(
+            self.streets, self.cars, self.occupants, len(self.follower.u)
+        )
+
+    def drive(self):
+        """Returns places at each step, until the car has arrived."""
+        while not self.follower.arrived:
+            self.step()
+        for _ in range(20):
+            self.step()
+        return np.array(self.follower.u)
+
+
+def test_keeps_the_equilibrium_gap():
+    """Behind a leader at constant speed: (s0 + v T) / sqrt(1 - (v/v0)^4)."""
+    street = Street()
+    s, v = 35.0, 5.0
+    while s < 290.0:
+        street.put(s, v)
+        street.step()
+        s += v * DT
+    ego = street.cars[1]
+    ratio = v / float(ego["top"])
+    expected = (STANDSTILL_GAP + v * ego["headway"]) / np.sqrt(1 - ratio**4)
+    assert s - 4.0 - ego["s"] == pytest.approx(expected, rel=0.02)
+    assert ego["v"] == pytest.approx(v, rel=0.01)
+
+
+def test_stops_before_the_line_until_it_may_go():
+    street = Street()
+    for _ in range(900):
+        street.step()
+    assert street.cars[1]["v"] == pytest.approx(0.0, abs=0.05)
+    assert 298.0 < street.cars[1]["s"] < 300.0
+    assert street.cars[1]["path"][CURRENT + 1] == 1
+    street.cars[1]["granted"], street.cars[1]["held"] = True, 1
+    street.drive()
+    # It has left its way.
+    assert street.cars[1]["held"] == -1
+    assert not street.cars[1]["granted"]
+
+
+def test_alone_it_drives_as_it_may():
+    """Its drive starts and ends at rest, within the plain one's bounds."""
+    street = Street()
+    street.cars[1]["granted"], street.cars[1]["held"] = True, 1
+    street.drive()
+    plain = street.trajectory
+    positions = street.follower.positions()
+    drive = plain.with_positions(positions)
+    assert plain.duration <= drive.duration < 1.15 * plain.duration
+    u, rate, change = drive.path_parameter(np.arange(0, drive.duration, 0.01))
+    assert u[0] == pytest.approx(0.0, abs=1e-12)
+    assert positions[-1] == drive.path.end
+    assert rate[0] == pytest.approx(0.0, abs=1e-9)
+    assert rate.max() <= Speeds().cruise
+    assert np.abs(change).max() <= Speeds().longitudinal_acceleration
+    # An acceleration changes within two knots.
+    jerk = np.abs(np.diff(change)).max() / 0.01
+    assert jerk < 2 * Speeds().longitudinal_acceleration / KNOT_PERIOD
+
+
+@cache
+def followed(follows=True):
+    scenario = load_scenario("riverside_01").model_copy(
+        update={
+            "traffic": TrafficConfig(vehicles=40, walkers=10),
+            "driver": DriverConfig(follows=follows),
+        }
+    )
+    trajectory = plan_drive(scenario)
+    plan = plan_scenario_traffic(scenario, trajectory)
+    return scenario, trajectory, plan
+
+
+def test_a_drive_among_others():
+    scenario, plain, plan = followed()
+    drive = plan_drive(scenario, plan.positions)
+    times = np.arange(0.0, drive.duration, 0.05)
+    speed = np.linalg.norm(drive.path_motion(times).v, axis=1)
+    assert (speed < 0.5).mean() > 0.03
+    assert drive.length == plain.length
+    assert count_frames(scenario, drive) > count_frames(scenario, plain)
+    bound = scenario.speeds.longitudinal_acceleration
+    assert np.abs(drive.path_parameter(times)[2]).max() < 1.1 * bound
+    again = plan_scenario_traffic(scenario, drive)
+    np.testing.assert_array_equal(again.positions, plan.positions)
+    np.testing.assert_array_equal(again.vehicles.values, plan.vehicles.values)
+    # Nobody meets the car.
+    R, p = drive.poses(times)
+    yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    middle = BOX.middles(p[:, :2], yaw)[:, :2]
+    xy = plan.vehicles.at(times)[0][..., :2]
+    nearest = np.linalg.norm(xy - middle[:, None], axis=2).min()
+    assert 1.8 < nearest < 15.0
+
+
+def test_without_it_the_drive_stays_as_it_is():
+    *_, plan = followed(False)
+    assert plan.positions is None
