@@ -67,7 +67,7 @@ class Street:
     def step(self):
         find_occupants(self.occupants, self.streets, self.cars, 0)
         self.follower.step(
-            self.streets, self.cars, self.occupants, len(self.follower.u)
+            self.streets, self.cars, self.occupants, len(self.follower.u) - 1
         )
 
     def drive(self):
