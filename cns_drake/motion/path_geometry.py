@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from pydrake.math import BsplineBasis
 from pydrake.trajectories import BsplineTrajectory
 
+from cns_drake.base.elementary import arctan2
+
 # Quintic: four continuous derivatives, as the accelerations of steered
 # wheels need.
 ORDER = 6
@@ -154,7 +156,7 @@ class SmoothPath:
         # Headings at the knots, free of jumps, from which to count turns.
         knots = np.arange(len(points)) * spacing
         tangents = self._spline.evaluate(knots)[1]
-        self._knot_yaw = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0]))
+        self._knot_yaw = np.unwrap(arctan2(tangents[:, 1], tangents[:, 0]))
 
     def evaluate(self, u: ArrayLike) -> PathJet:
         """Returns the path and its derivatives at (N,) parameters u."""
@@ -184,18 +186,19 @@ class SmoothPath:
         r = np.sqrt(h)
         dr = dh / (2 * r)
         ddr = (ddh / 2 - dr**2) / r
-        climb = np.arctan2(z1, r)
+        climb = arctan2(z1, r)
         dclimb = (z2 * r - z1 * dr) / s**2
         ddclimb = (z3 * r - z1 * ddr) / s**2 - 2 * dclimb * ds / s
 
         # Yaw is about the world's z; the vehicle's z is tilted by the climb.
-        c, dc = np.cos(climb), -np.sin(climb) * dclimb
-        ddc = -np.cos(climb) * dclimb**2 - np.sin(climb) * ddclimb
+        c, sine = r / s, z1 / s
+        dc = -sine * dclimb
+        ddc = -c * dclimb**2 - sine * ddclimb
         return PathJet(
             p=p,
             dp=d1,
             ddp=d2,
-            yaw=self._count_turns(u, np.arctan2(y1, x1)),
+            yaw=self._count_turns(u, arctan2(y1, x1)),
             dyaw=dyaw,
             ddyaw=ddyaw,
             climb=climb,

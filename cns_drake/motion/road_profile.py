@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
@@ -54,7 +55,7 @@ class RoadProfile:
             roughness: the class.
             seed: seed of the layers.
         """
-        self._level = ROUGHNESS[roughness] * _N0**2 * np.log(2) / _OVER_LAYERS
+        self._level = ROUGHNESS[roughness] * _N0**2 * math.log(2) / _OVER_LAYERS
         self._seed = seed
 
     def heights(self, p_WQset: np.ndarray) -> np.ndarray:
@@ -69,8 +70,9 @@ class RoadProfile:
             variance = share * self._level * spacing / (2.0 * _TRANSVERSE)
             nodes = rng.normal(0.0, np.sqrt(variance), (_NODES, _NODES))
             angle, *shift = rng.uniform(0.0, 1.0, 3)
-            c, s = np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)
-            places = np.array([[c, -s], [s, c]]) @ p_WQset.T / spacing
+            c, s = math.cos(2 * np.pi * angle), math.sin(2 * np.pi * angle)
+            x, y = p_WQset.T / spacing
+            places = np.stack([c * x - s * y, s * x + c * y])
             places += np.array(shift)[:, None] * _NODES
             heights += map_coordinates(
                 nodes, places % _NODES, mode="grid-wrap", prefilter=False

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 from pathlib import Path
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydrake.math import inv
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint
 
+from cns_drake.base.elementary import product, rotated
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.motion.road_profile import RoadProfile
@@ -157,7 +160,7 @@ class Suspension:
         springs = np.column_stack(
             [np.ones(count), y, center_x - x, -np.eye(count)]
         )
-        self._mass = np.diag(
+        self._mass = np.array(
             [
                 masses.body,
                 masses.roll_inertia + masses.body * height**2,
@@ -165,21 +168,22 @@ class Suspension:
                 *masses.wheels,
             ]
         )
-        stiffness = springs.T * each(rates.spring_rate) @ springs
-        stiffness += tyres.T * each(rates.tyre_rate) @ tyres
+        stiffness = product(springs.T * each(rates.spring_rate), springs)
+        stiffness += product(tyres.T * each(rates.tyre_rate), tyres)
         for axle, rate in (
             (front, rates.roll_bar_rate.front),
             (~front, rates.roll_bar_rate.rear),
         ):
             # The bar is twisted by the difference of the body's and the axle's
             # roll.
-            twist = np.sign(y[axle]) @ springs[axle] / np.abs(y[axle]).sum()
+            twist = (np.sign(y[axle, None]) * springs[axle]).sum(axis=0)
+            twist /= np.abs(y[axle]).sum()
             stiffness += rate * np.outer(twist, twist)
         # The weight of a tilted body tilts it further.
         overhang = masses.body * _GRAVITY * height
         stiffness -= np.diag([0.0, overhang, overhang, *np.zeros(count)])
         self._stiffness = stiffness
-        self._damping = springs.T * each(rates.damping_rate) @ springs
+        self._damping = product(springs.T * each(rates.damping_rate), springs)
         # The effect on the coordinates of the heights of the road below the
         # wheels, and of the specific force in B less its value at rest.
         self._loads = np.zeros((size, count + 3))
@@ -191,7 +195,7 @@ class Suspension:
 
     def at_rest(self, inputs: np.ndarray) -> np.ndarray:
         """Returns the coordinates under (W + 3,) constant inputs."""
-        return np.linalg.solve(self._stiffness, self._loads @ inputs)
+        return rotated(inv(self._stiffness), rotated(self._loads, inputs))
 
     def respond(
         self, inputs: np.ndarray, step: float
@@ -210,34 +214,49 @@ class Suspension:
             Heave [m], roll and pitch [rad], (N, 3), and their first and
             second derivatives.
         """
-        size = len(self._mass)
-        to_rates = np.linalg.solve(
-            self._mass,
-            np.hstack([-self._stiffness, -self._damping, self._loads]),
+        size, count = self._loads.shape
+        to_rates = np.hstack([-self._stiffness, -self._damping, self._loads])
+        to_rates /= self._mass[:, None]
+        # The motion within a step is that of a linear system whose state also
+        # has the inputs and their slopes (Franklin, Powell and Workman, Digital
+        # Control of Dynamic Systems, the triangle hold).
+        whole = np.zeros((2 * (size + count), 2 * (size + count)))
+        whole[:size, size : 2 * size] = step * np.eye(size)
+        whole[size : 2 * size, : 2 * size + count] = step * to_rates
+        whole[2 * size : -count, -count:] = np.eye(count)
+        flow, by_input, by_slope = np.split(
+            _exponential(whole)[: 2 * size],
+            [2 * size, 2 * size + count],
+            axis=1,
         )
-        A = np.vstack([np.eye(size, 2 * size, size), to_rates[:, : 2 * size]])
-        B = np.vstack([np.zeros_like(self._loads), to_rates[:, 2 * size :]])
-        body = slice(NUM_COORDINATES)
-        rates = slice(size, size + NUM_COORDINATES)
-        C = np.vstack(
-            [np.eye(2 * size)[body], np.eye(2 * size)[rates], A[rates]]
-        )
-        D = np.zeros((len(C), B.shape[1]))
-        D[-NUM_COORDINATES:] = B[rates]
-        # Slow to import, and needed only by drives with a ride.
-        from scipy.signal import cont2discrete
-
-        A, B, C, D, _ = cont2discrete((A, B, C, D), step, method="foh")
-        driven = inputs @ B.T
-        states = np.empty((len(inputs), 2 * size))
-        # Not at_rest(): the states of this hold are not the coordinates.
-        state = np.linalg.solve(np.eye(2 * size) - A, driven[0])
+        driven = product(inputs[:-1], (by_input - by_slope).T)
+        driven += product(inputs[1:], by_slope.T)
+        states = np.zeros((len(inputs), 2 * size))
+        states[0, :size] = self.at_rest(inputs[0])
         for k, drive in enumerate(driven):
-            states[k] = state
-            state = A @ state + drive
-        answers = states @ C.T + inputs @ D.T
-        q, dq, ddq = np.split(answers, 3, axis=1)
-        return q, dq, ddq
+            states[k + 1] = (flow * states[k]).sum(axis=1) + drive
+        body = slice(NUM_COORDINATES)
+        all_values = np.hstack([states, inputs])
+        return (
+            states[:, body],
+            states[:, size:][:, body],
+            product(all_values, to_rates[body].T),
+        )
+
+
+def _exponential(matrix: np.ndarray) -> np.ndarray:
+    """Returns exp(matrix): a Taylor series, squared again and again."""
+    _, exponent = math.frexp(np.abs(matrix).sum(axis=1).max())
+    squarings = max(exponent + 1, 0)
+    part = matrix / 2.0**squarings
+    term = result = np.eye(len(matrix))
+    # The norm of the part is at most 1/2: what is left out is below rounding.
+    for k in range(1, 16):
+        term = product(term, part) / k
+        result = result + term
+    for _ in range(squarings):
+        result = product(result, result)
+    return result
 
 
 def ride_on_springs(
@@ -261,13 +280,13 @@ def ride_on_springs(
     step = min(_STEP, _STRIDE / speeds.max())
     frame = trajectory.path_motion(np.arange(0.0, end, step))
     # The profile at every wheel and every time.
-    p_FQ_Wset = frame.R[:, :2, :2] @ masses.p_BWset.T
+    p_FQ_Wset = product(frame.R[:, :2, :2], masses.p_BWset.T)
     p_WQset = frame.p[:, :2, None] + p_FQ_Wset
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))
     x, z = masses.center
     a_WG = frame.acceleration_at(np.array([x, 0.0, z]))
-    force_F = np.einsum(
-        "nji,nj->ni", frame.R, a_WG - np.array([0.0, 0.0, -_GRAVITY])
+    force_F = rotated(
+        frame.R.transpose(0, 2, 1), a_WG - np.array([0.0, 0.0, -_GRAVITY])
     )
     inputs = np.column_stack(
         [

@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base.elementary import cos, product, rotated, sin
 from cns_drake.motion.path_geometry import (
     PathIntegral,
     PathJet,
@@ -58,7 +59,7 @@ class FrameMotion(NamedTuple):
         p, w, v, alpha, a = (rotated(self.R, vector) for vector in motion[1:])
         rotating = cross(self.alpha, p) + cross(self.w, cross(self.w, p))
         return FrameMotion(
-            R=_product(self.R, motion.R),
+            R=product(self.R, motion.R),
             p=self.p + p,
             w=self.w + w,
             v=self.v + v + cross(self.w, p),
@@ -73,21 +74,6 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     For a few vectors it takes a fraction of the time of `numpy.cross`.
     """
     return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
-
-
-def rotated(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Returns (N, 3) vectors after (N, 3, 3) rotations.
-
-    They are added in a fixed order: `numpy.einsum` and libraries of matrices
-    round by the processor, and by N.
-    """
-    x, y, z = (R[:, :, k] * vectors[:, k, None] for k in range(3))
-    return x + y + z
-
-
-def _product(R: np.ndarray, S: np.ndarray) -> np.ndarray:
-    columns = [rotated(R, S[:, :, k]) for k in range(3)]
-    return np.stack(columns, axis=2)
 
 
 # Heave, roll and pitch.
@@ -155,7 +141,9 @@ class BodyRide:
             v[:-1],
             q[:-1],
         ]
-        powers = step ** np.arange(5, -1, -1)[:, None, None]
+        powers = np.reshape(
+            [float(step) ** k for k in range(5, -1, -1)], (6, 1, 1)
+        )
         spline = PPoly(np.array(coefficients) / powers, times)
         self._splines = [spline, spline.derivative(), spline.derivative(2)]
 
@@ -175,7 +163,7 @@ def ride_motion(moments: RideMoments) -> FrameMotion:
     _, droll, dpitch = moments.dq.T
     _, ddroll, ddpitch = moments.ddq.T
     zero = np.zeros_like(heave)
-    (cr, sr), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (roll, pitch))
+    (cr, sr), (cp, sp) = ((cos(a), sin(a)) for a in (roll, pitch))
     R_FB = np.array(
         [
             [cp, sp * sr, sp * cr],
@@ -313,7 +301,7 @@ class Trajectory:
         if self._ride is None:
             return R_WF, jet.p
         ride = ride_motion(self._ride.at(t))
-        return _product(R_WF, ride.R), jet.p + rotated(R_WF, ride.p)
+        return product(R_WF, ride.R), jet.p + rotated(R_WF, ride.p)
 
     def spatial_velocity(self, t: float) -> SpatialVelocity:
         """Returns V_WB, expressed in the world [rad/s, m/s]."""
@@ -374,7 +362,7 @@ def _path_motion(
     ddclimb = jet.ddclimb * rate**2 + jet.dclimb * acceleration
     # The pitch axis, to the left, turns with the vehicle.
     zero = np.zeros_like(jet.yaw)
-    left = np.stack([-np.sin(jet.yaw), np.cos(jet.yaw), zero], axis=1)
+    left = np.stack([-sin(jet.yaw), cos(jet.yaw), zero], axis=1)
     turning = (yaw_rate * pitch_rate)[:, None] * cross(_UP, left)
     rate, acceleration = rate[:, None], acceleration[:, None]
     return FrameMotion(

@@ -12,6 +12,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.drives.drive import ImuSamples
+from cns_drake.base.elementary import product, rotated
 from cns_drake.motion.trajectory import Trajectory
 
 # Samples computed at a time, and greatest distance of a wanted time from a
@@ -123,10 +124,11 @@ class VehicleImu(LeafSystem):
         """Returns samples at (N,) times with the errors from `first` on."""
         # Before the start the vehicle rests, as after the end.
         motion = self._trajectory.body_motion(np.maximum(times, 0.0))
-        R_WI = motion.R @ self._X_BI.rotation().matrix()
+        R_WI = product(motion.R, self._X_BI.rotation().matrix())
+        R_IW = R_WI.transpose(0, 2, 1)
         a_WI = motion.acceleration_at(self._X_BI.translation())
-        force = np.einsum("nji,nj->ni", R_WI, a_WI - self._gravity_W)
-        turn = np.einsum("nji,nj->ni", R_WI, motion.w)
+        force = rotated(R_IW, a_WI - self._gravity_W)
+        turn = rotated(R_IW, motion.w)
         measured = self._add_errors(first, np.hstack([force, turn]))
         return ImuSamples(
             first,

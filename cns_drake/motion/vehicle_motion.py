@@ -24,6 +24,7 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
+from cns_drake.base.elementary import arctan2, product, rotated
 from cns_drake.motion.path_geometry import PathIntegral, PathJet
 from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
 
@@ -82,7 +83,7 @@ class WheelMotion:
         dsteer = (a * db - b * da) / squared
         ddsteer = (a * ddb - b * dda - dsteer * dsquared) / squared
         return JointMotion(
-            position=np.arctan2(b, a),
+            position=arctan2(b, a),
             rate=dsteer * rate,
             acceleration=ddsteer * rate**2 + dsteer * acceleration,
         )
@@ -340,8 +341,8 @@ class Sweep(NamedTuple):
     def of_frame(self, X_PS: RigidTransform) -> Sweep:
         """Returns the poses of a frame S that is fixed in P."""
         return Sweep(
-            self.R_WPset @ X_PS.rotation().matrix(),
-            self.p_WPset + self.R_WPset @ X_PS.translation(),
+            product(self.R_WPset, X_PS.rotation().matrix()),
+            self.p_WPset + rotated(self.R_WPset, X_PS.translation()),
         )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.compiled import compiled
+from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives
 from cns_drake.ray_casting.moving_groups import Placed
@@ -345,13 +346,13 @@ def _decompose_motion(group: RayGroup) -> np.ndarray:
     # The columns of both maps are rotated and stretched axes of L.
     scale = np.linalg.norm(group.X_FL[:3, :3], axis=0)
     R_OL = group.X_OL[:, :3] / scale
-    p_FL_L = (group.X_FL[:3, :3] / scale).T @ group.X_FL[:3, 3]
-    quaternion = Rotation.from_matrix(R_OO @ R_OL).as_quat()
+    p_FL_L = rotated((group.X_FL[:3, :3] / scale).T, group.X_FL[:3, 3])
+    quaternion = Rotation.from_matrix(product(R_OO, R_OL)).as_quat()
     steps = np.zeros((num_steps, 16))
     steps[:, 0:3] = scale
     steps[:, 6:9] = p_FL_L
     steps[:, 9:13] = quaternion[:, [3, 0, 1, 2]]
-    steps[:, 13:16] = group.X_OL[:, 3] - R_OL @ p_FL_L + way_F
+    steps[:, 13:16] = group.X_OL[:, 3] - rotated(R_OL, p_FL_L) + way_F
     return np.ascontiguousarray(steps, np.float32)
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+import math
 from typing import NamedTuple
 
 import numpy as np
 from pydrake.geometry import FrameId
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, inv
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base.elementary import product, rotated
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import (
     EllipsoidSurface,
@@ -52,7 +54,7 @@ class Motion(NamedTuple):
         Raises:
             ValueError: F turns too fast.
         """
-        angle = float(np.linalg.norm(self.w)) * self.duration
+        angle = math.hypot(*self.w) * self.duration
         steps = 1 + max(1, int(np.ceil(angle / _LARGEST_STEP_RAD)))
         if steps > _MOST_STEPS:
             raise ValueError(
@@ -130,11 +132,10 @@ class RayGroup:
             return np.broadcast_to(self.X_OL, (len(times), 3, 4))
         R_OL0, way_F = self.motion.at(times)
         # L in axes of O about F's origin, which moves in a straight line.
-        p_FL = self.X_OL[:, :3] @ np.linalg.solve(
-            self.X_FL[:3, :3], self.X_FL[:3, 3]
-        )
-        X_OL = R_OL0 @ self.X_OL
-        X_OL[:, :, 3] = self.X_OL[:, 3] - p_FL + way_F + R_OL0 @ p_FL
+        p_LF = rotated(inv(self.X_FL[:3, :3]), self.X_FL[:3, 3])
+        p_FL = rotated(self.X_OL[:, :3], p_LF)
+        X_OL = product(R_OL0, self.X_OL)
+        X_OL[:, :, 3] = self.X_OL[:, 3] - p_FL + way_F + rotated(R_OL0, p_FL)
         return X_OL
 
     def holds_the_same(self, other: RayGroup) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import itertools
+import math
 
 import numpy as np
 from shapely import GEOSException, make_valid, set_precision, unary_union
@@ -61,8 +62,8 @@ def corner_setback(
     # Towards a straight angle the corner, and with it the distance, vanishes.
     if angle > np.radians(150.0):
         return kerb_radius
-    edge = (other_half_width + half_width * np.cos(angle)) / np.sin(angle)
-    return max(kerb_radius, edge + kerb_radius / np.tan(angle / 2))
+    edge = (other_half_width + half_width * math.cos(angle)) / math.sin(angle)
+    return max(kerb_radius, edge + kerb_radius / math.tan(angle / 2))
 
 
 def road_strip(road: Road) -> BaseGeometry:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.base.angles import wrapped
+from cns_drake.base.elementary import arctan2, cos, power, sin, tan
 
 # A fillet may overrun its segment by this much, so that two arcs can meet in
 # one point although corners are written down in centimetres [m].
@@ -29,9 +31,11 @@ class _Piece:
         # The length of an arc's chord follows from sin(x)/x, and it points to
         # the mean heading. This form also holds for a line.
         half = self.curvature * s / 2
-        chord = s * np.sinc(half / np.pi)
-        x = self.start[0] + chord * np.cos(self.heading + half)
-        y = self.start[1] + chord * np.sin(self.heading + half)
+        # As in `numpy.sinc`.
+        angle = np.pi * np.where(half == 0.0, 1e-20, half / np.pi)
+        chord = s * (sin(angle) / angle)
+        x = self.start[0] + chord * cos(self.heading + half)
+        y = self.start[1] + chord * sin(self.heading + half)
         return np.stack([x, y, heading], axis=1)
 
 
@@ -55,10 +59,10 @@ class Centreline:
         lengths = np.hypot(edges[:, 0], edges[:, 1])
         if np.any(lengths < 1e-6):
             raise ValueError("two consecutive points coincide")
-        headings = np.arctan2(edges[:, 1], edges[:, 0])
+        headings = arctan2(edges[:, 1], edges[:, 0])
         turns = wrapped(np.diff(headings))
         tangents = np.concatenate(
-            [[0.0], radii * np.abs(np.tan(turns / 2)), [0.0]]
+            [[0.0], radii * np.abs(tan(turns / 2)), [0.0]]
         )
         spare = lengths - tangents[:-1] - tangents[1:]
         for segment in np.flatnonzero(spare < -_FIT_TOLERANCE):
@@ -72,14 +76,14 @@ class Centreline:
         for k, straight in enumerate(np.maximum(spare, 0.0)):
             self._append(position, heading, 0.0, straight)
             if k < len(turns):
-                direction = np.array([np.cos(headings[k]), np.sin(headings[k])])
+                direction = _direction(headings[k])
                 position = points[k + 1] - tangents[k + 1] * direction
                 if tangents[k + 1] > 0:
                     curvature = np.sign(turns[k]) / radii[k]
                     length = abs(turns[k]) * radii[k]
                     self._append(position, headings[k], curvature, length)
                 heading = headings[k + 1]
-                direction = np.array([np.cos(heading), np.sin(heading)])
+                direction = _direction(heading)
                 position = points[k + 1] + tangents[k + 1] * direction
         self._ends = np.cumsum([piece.length for piece in self._pieces])
 
@@ -148,8 +152,8 @@ def blend(
         (N, 2) points [m], both ends included.
     """
     p_start, p_end = np.asarray(p_start, float), np.asarray(p_end, float)
-    d_start = np.array([np.cos(heading_start), np.sin(heading_start)])
-    d_end = np.array([np.cos(heading_end), np.sin(heading_end)])
+    d_start = _direction(heading_start)
+    d_end = _direction(heading_end)
     sine = d_start[0] * d_end[1] - d_start[1] * d_end[0]
     gap = p_end - p_start
     if abs(sine) > 0.2:
@@ -157,8 +161,8 @@ def blend(
         behind = (d_start[0] * gap[1] - d_start[1] * gap[0]) / sine
         tangent = min(ahead, behind)
         if tangent > 0.5:
-            cosine = float(d_start @ d_end)
-            widest = tangent / np.tan(np.arctan2(abs(sine), cosine) / 2)
+            cosine = d_start[0] * d_end[0] + d_start[1] * d_end[1]
+            widest = tangent / math.tan(math.atan2(abs(sine), cosine) / 2)
             corner = p_start + ahead * d_start
             radius = min(widest, max_radius)
             curve = Centreline([p_start, corner, p_end], [radius])
@@ -166,9 +170,14 @@ def blend(
             return curve.evaluate(stations)[:, :2]
     distance = float(np.hypot(*gap))
     u = sample_stations(0.0, 1.0, spacing / max(distance, spacing))[:, None]
+    cube = power(u, 3)
     return (
-        (2 * u**3 - 3 * u**2 + 1) * p_start
-        + (u**3 - 2 * u**2 + u) * distance * d_start
-        + (3 * u**2 - 2 * u**3) * p_end
-        + (u**3 - u**2) * distance * d_end
+        (2 * cube - 3 * u**2 + 1) * p_start
+        + (cube - 2 * u**2 + u) * distance * d_start
+        + (3 * u**2 - 2 * cube) * p_end
+        + (cube - u**2) * distance * d_end
     )
+
+
+def _direction(heading: float) -> np.ndarray:
+    return np.array([math.cos(heading), math.sin(heading)])

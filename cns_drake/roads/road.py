@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 
+from cns_drake.base.elementary import cos, sin
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.centreline import Centreline, sample_stations
@@ -243,8 +244,8 @@ class Road:
         """
         stations = np.asarray(stations, dtype=float)
         x, y, heading = self._curve.evaluate(stations).T
-        x = x - offset * np.sin(heading)
-        y = y + offset * np.cos(heading)
+        x = x - offset * sin(heading)
+        y = y + offset * cos(heading)
         return np.stack([x, y, self._height(stations), heading], axis=1)
 
     def height(self, stations: ArrayLike) -> np.ndarray:

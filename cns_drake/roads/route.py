@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+import math
 from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
+from cns_drake.base.elementary import power
 from cns_drake.base.errors import InputError
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
@@ -265,7 +267,8 @@ def _turn_round(
         centres = np.arange(farthest, nearest, -_TURNING_STEP)
     loop = find_loop(lanes_at, centres, network.lane_area())
     x, y, heading = lanes_at(loop.begin)[0]
-    ahead = (loop.points - (x, y)) @ (np.cos(heading), np.sin(heading))
+    ahead = (loop.points[:, 0] - x) * math.cos(heading)
+    ahead += (loop.points[:, 1] - y) * math.sin(heading)
     z = road.height(_stations(road, leg, loop.begin + ahead))
     points = np.column_stack([loop.points, z])[1:-1]
     return points, loop.begin
@@ -297,7 +300,7 @@ def _moved_right(
 
 def _smooth_step(u: np.ndarray) -> np.ndarray:
     """Returns the quintic from 0 to 1 with two derivatives zero at its ends."""
-    return u**3 * (10 - 15 * u + 6 * u**2)
+    return power(u, 3) * (10 - 15 * u + 6 * u**2)
 
 
 def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import shapely
 from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.elementary import cos, sin
 from cns_drake.roads.centreline import Centreline, sample_stations
 
 # From the car in worlds/vehicle.sdf: its wheelbase, the distance from the
@@ -23,7 +25,7 @@ _STEERING_LIMIT = 0.7
 _REAR, _FRONT, _HALF_WIDTH = 1.0, 3.72, 1.03
 
 # Tightest radius of the middle of the rear axle [m].
-TIGHTEST_RADIUS = float(_WHEELBASE / np.tan(_STEERING_LIMIT) + _HALF_TRACK)
+TIGHTEST_RADIUS = float(_WHEELBASE / math.tan(_STEERING_LIMIT) + _HALF_TRACK)
 # Radius of planned loops, whose curve is smoothed to the inside of its points
 # [m].
 LOOP_RADIUS = 4.4
@@ -57,8 +59,8 @@ def loop_corners(
     Returns:
         (N, 2) corners [m].
     """
-    swing_in = np.arccos(min(1.0, (radius + aside_in) / (2 * radius)))
-    swing_out = np.arccos(min(1.0, (radius + aside_out) / (2 * radius)))
+    swing_in = math.acos(min(1.0, (radius + aside_in) / (2 * radius)))
+    swing_out = math.acos(min(1.0, (radius + aside_out) / (2 * radius)))
     turn = (heading_out - heading_in) % (2 * np.pi)
     round_ = turn + swing_in + swing_out
     parts = 3
@@ -66,21 +68,20 @@ def loop_corners(
     # Corners of the loop are outside it.
     first = heading_in - swing_in - np.pi / 2 + share / 2
     angles = first + share * np.arange(parts)
-    reach = radius / np.cos(share / 2)
+    reach = radius / math.cos(share / 2)
     corners = [
-        np.asarray(centre)
-        + reach * np.column_stack([np.cos(angles), np.sin(angles)])
+        np.asarray(centre) + reach * np.column_stack([cos(angles), sin(angles)])
     ]
     for swing, heading, aside, sign in (
         (swing_in, heading_in, aside_in, -1.0),
         (swing_out, heading_out, aside_out, 1.0),
     ):
         if swing > 1e-6:
-            along = np.array([np.cos(heading), np.sin(heading)])
+            along = np.array([math.cos(heading), math.sin(heading)])
             right = np.array([along[1], -along[0]])
             # The bend begins 2 r sin(a) before the centre, and its corner
             # lies r tan(a / 2) on from there.
-            before = 2 * np.sin(swing) - np.tan(swing / 2)
+            before = 2 * math.sin(swing) - math.tan(swing / 2)
             corner = (
                 np.asarray(centre)
                 + sign * before * radius * along
@@ -132,7 +133,7 @@ def find_loop(
         if area.covers(swept):
             return Loop(begin, points)
         # From the middle of the loop to either side.
-        left = np.array([-np.sin(heading), np.cos(heading)])
+        left = np.array([-math.sin(heading), math.cos(heading)])
         along = np.array([left[1], -left[0]])
         middle = np.array([x, y]) + _ahead(width) * along + width / 2 * left
         sideways = (shapely.get_coordinates(swept) - middle) @ left
@@ -157,7 +158,7 @@ def _ahead(width: float) -> float:
 def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
     """Returns the (N, 2) points of a loop into the lane beside it [m]."""
     radius = max(LOOP_RADIUS, width / 2)
-    along = np.array([np.cos(heading), np.sin(heading)])
+    along = np.array([math.cos(heading), math.sin(heading)])
     left = np.array([-along[1], along[0]])
     centre = start + _ahead(width) * along + width / 2 * left
     corners = loop_corners(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from cns_drake.base.angles import wrapped
 from cns_drake.base.csv_files import read_rows
+from cns_drake.base.elementary import arctan2, cos, sin, tan
 from cns_drake.base.errors import InputError
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import LanePath, check_length, sample_lane_path
@@ -96,7 +98,7 @@ def make_waypoint_path(
     names = [names[k] for k in kept.tolist()]
     edges = np.diff(waypoints[:, :2], axis=0)
     lengths = np.hypot(edges[:, 0], edges[:, 1])
-    headings = np.arctan2(edges[:, 1], edges[:, 0])
+    headings = arctan2(edges[:, 1], edges[:, 0])
     turns = np.pi - (np.pi - np.diff(headings)) % (2 * np.pi)
     is_loop = np.abs(turns) > np.radians(_SHARPEST_TURN_DEG)
     for k in np.flatnonzero(is_loop):
@@ -118,7 +120,7 @@ def make_waypoint_path(
         )
     usable = np.minimum(lengths / 2, free)
     room = np.minimum(usable[:-1], usable[1:])
-    tangents = np.tan(np.where(is_loop, 0.0, np.abs(turns)) / 2)
+    tangents = tan(np.where(is_loop, 0.0, np.abs(turns)) / 2)
     radii = np.minimum(_CORNER_RADIUS, room / np.maximum(tangents, 1e-9))
     corners, corner_radii = [waypoints[:1]], []
     for at, loops in enumerate(is_loop):
@@ -144,14 +146,14 @@ def _rounded(
     curve = Centreline(corners[:, :2], radii)
     check_length(curve.length, source)
     edges = np.diff(corners[:, :2], axis=0)
-    headings = np.arctan2(edges[:, 1], edges[:, 0])
+    headings = arctan2(edges[:, 1], edges[:, 0])
     turns = np.abs(wrapped(np.diff(headings)))
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
     # The place where the curve passes each corner: the middle of its arc.
     from scipy.interpolate import PchipInterpolator
 
-    saved = 2 * radii * np.tan(turns / 2) - radii * turns
+    saved = 2 * radii * tan(turns / 2) - radii * turns
     shortened = np.concatenate([[0.0], np.cumsum(saved)])
     lengths = np.hypot(edges[:, 0], edges[:, 1])
     at_corners = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -164,9 +166,9 @@ def _rounded(
 
 def _loop_length(turns: np.ndarray) -> np.ndarray:
     """Returns the length that (N,) loops need before and behind them [m]."""
-    aside = np.cos(turns / 2)
+    aside = cos(turns / 2)
     return LOOP_RADIUS * (
-        np.abs(np.sin(turns / 2)) + np.sqrt(4 - (1 + aside) ** 2)
+        np.abs(sin(turns / 2)) + np.sqrt(4 - (1 + aside) ** 2)
     )
 
 
@@ -183,9 +185,9 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
         return _loop(place * mirror, -heading, -turn) * mirror
     outwards = heading - (np.pi - turn) / 2
     centre = place - LOOP_RADIUS * np.array(
-        [np.cos(outwards), np.sin(outwards)]
+        [math.cos(outwards), math.sin(outwards)]
     )
-    aside = LOOP_RADIUS * np.cos(turn / 2)
+    aside = LOOP_RADIUS * math.cos(turn / 2)
     return loop_corners(
         centre, heading, heading + turn, LOOP_RADIUS, aside, aside
     )

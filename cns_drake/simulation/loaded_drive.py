@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.elementary import arctan2
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.trajectory import Trajectory
@@ -223,7 +224,7 @@ def plan_scenario_traffic(
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
-        return p_WB[:, :2], np.unwrap(np.arctan2(R_WB[:, 1, 0], R_WB[:, 0, 0]))
+        return p_WB[:, :2], np.unwrap(arctan2(R_WB[:, 1, 0], R_WB[:, 0, 0]))
 
     if wanted.fcd is not None:
         trace = Path(wanted.fcd)

@@ -13,6 +13,7 @@ import zlib
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.elementary import cos, sin
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
@@ -307,7 +308,7 @@ def _vehicle_rows(
     one: TracedObject, kind: VehicleKind, heights: _Heights
 ) -> np.ndarray:
     """Returns the (M, 5) coordinates of a vehicle; see `TrafficPlan`."""
-    ahead = np.column_stack([np.cos(one.yaw), np.sin(one.yaw)])
+    ahead = np.column_stack([cos(one.yaw), sin(one.yaw)])
     xy = one.xy - kind.size[0] / 2 * ahead
     # An upward slope turns about -y.
     return np.column_stack([xy, heights.at(xy), one.yaw, -one.slope])

@@ -123,7 +123,7 @@ def kept_clear(
     )
     for way in walkways:
         points = way.points[:, :2]
-        right = np.gradient(points, axis=0) @ [(0.0, -1.0), (1.0, 0.0)]
+        right = np.gradient(points, axis=0)[:, ::-1] * (1.0, -1.0)
         right /= np.linalg.norm(right, axis=1)[:, None]
         across = np.linspace(-way.half_width, way.half_width, _ACROSS)
         places = points[:, None] + across[:, None] * right[:, None]

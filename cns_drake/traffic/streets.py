@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from cns_drake.base.compiled import compiled
+from cns_drake.base.elementary import arctan2, cos, sin
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 
@@ -97,13 +98,13 @@ class EgoBox(NamedTuple):
 
     def middles(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns (N, 3) x, y [m], yaw of its middle at (N, 2), (N,) poses."""
-        ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
+        ahead = np.column_stack([cos(yaw), sin(yaw)])
         middle = (self.rear + self.front) / 2
         return np.column_stack([xy + middle * ahead, yaw])
 
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns (N, 4, 2) corners at (N, 2) places and (N,) headings."""
-        c, s = np.cos(yaw), np.sin(yaw)
+        c, s = cos(yaw), sin(yaw)
         outline = (
             (self.rear, -self.half_width),
             (self.front, -self.half_width),
@@ -161,7 +162,7 @@ def _speeds(piece: Piece) -> np.ndarray:
         a, b, c = xy[: -2 * reach], xy[reach:-reach], xy[2 * reach :]
         u, w = b - a, c - b
         turn = np.abs(
-            np.arctan2(
+            arctan2(
                 u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0], np.sum(u * w, axis=1)
             )
         )

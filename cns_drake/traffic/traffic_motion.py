@@ -13,6 +13,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base.elementary import cos, product, sin
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
@@ -48,16 +49,14 @@ class BodyStates(NamedTuple):
     @property
     def up_W(self) -> np.ndarray:
         """The (N, 3) upward axes."""
-        (cy, sy), (cp, sp) = (
-            (np.cos(a), np.sin(a)) for a in (self.yaw, self.pitch)
-        )
+        (cy, sy), (cp, sp) = ((cos(a), sin(a)) for a in (self.yaw, self.pitch))
         return np.stack([cy * sp, sy * sp, cp], axis=-1)
 
     @property
     def quat_xyzw(self) -> np.ndarray:
         """The (N, 4) orientations as unit quaternions."""
         (cy, sy), (cp, sp) = (
-            (np.cos(a / 2), np.sin(a / 2)) for a in (self.yaw, self.pitch)
+            (cos(a / 2), sin(a / 2)) for a in (self.yaw, self.pitch)
         )
         return np.stack([-sy * sp, cy * sp, sy * cp, cy * cp], axis=-1)
 
@@ -74,7 +73,7 @@ def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
     both = np.concatenate([vehicles[:, :4], walkers[:, :4]])
     rates = np.concatenate([vehicle_rates[:, :4], walker_rates[:, :4]])
     speed = np.hypot(walker_rates[:, 0], walker_rates[:, 1])
-    swing = np.sin(walkers[:, 4]) * np.minimum(speed / _FULL_SWING, 1.0)
+    swing = sin(walkers[:, 4]) * np.minimum(speed / _FULL_SWING, 1.0)
     return BodyStates(
         p_WB=both[:, :3],
         v_WB=rates[:, :3],
@@ -107,16 +106,16 @@ class LimbTable:
         body, p = self.body, self._joint.T
         # A forward swing turns about -y.
         pitch = states.pitch[body] - self._swing * states.swing[body]
-        cy, sy = np.cos(states.yaw)[body], np.sin(states.yaw)[body]
+        cy, sy = cos(states.yaw)[body], sin(states.yaw)[body]
         X_WLs = np.zeros((len(body), 4, 4))
         X_WLs[:, 3, 3] = 1.0
         p_WB = np.where(states.present[:, None], states.p_WB, _AWAY)[body]
-        cp, sp = np.cos(states.pitch)[body], np.sin(states.pitch)[body]
+        cp, sp = cos(states.pitch)[body], sin(states.pitch)[body]
         X_WLs[:, 0, 3] = cy * cp * p[0] - sy * p[1] + cy * sp * p[2]
         X_WLs[:, 1, 3] = sy * cp * p[0] + cy * p[1] + sy * sp * p[2]
         X_WLs[:, 2, 3] = cp * p[2] - sp * p[0]
         X_WLs[:, :3, 3] += p_WB
-        cp, sp = np.cos(pitch), np.sin(pitch)
+        cp, sp = cos(pitch), sin(pitch)
         X_WLs[:, 0, 0], X_WLs[:, 0, 1], X_WLs[:, 0, 2] = cy * cp, -sy, cy * sp
         X_WLs[:, 1, 0], X_WLs[:, 1, 1], X_WLs[:, 1, 2] = sy * cp, cy, sy * sp
         X_WLs[:, 2, 0], X_WLs[:, 2, 2] = -sp, cp
@@ -269,7 +268,7 @@ class TrafficMotion(LeafSystem):
         later = later._replace(present=now.present)
         X_0, X_1 = map(self._limbs.poses, (now, later))
         R_0, R_1 = X_0[:, :3, :3].copy(), X_1[:, :3, :3].copy()
-        turned = Rotation.from_matrix(R_1 @ R_0.transpose(0, 2, 1))
+        turned = Rotation.from_matrix(product(R_1, R_0.transpose(0, 2, 1)))
         w = turned.as_rotvec() / self._turn
         v = (X_1 - X_0)[:, :3, 3] / self._turn
         output.set_value(list(map(SpatialVelocity, w, v)))

@@ -9,12 +9,12 @@ other vehicle has to brake hard.
 from __future__ import annotations
 
 from collections.abc import Sequence
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.base.elementary import arcsin, arctan2
 from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.streets import Streets, is_ego_far, places_on, speed_on
 from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP, VehicleKind
@@ -209,10 +209,7 @@ def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
         place - cars["rear_axle"] * ahead
         for place, ahead in zip(rear, (x, y, z), strict=True)
     ]
-    # NumPy's own functions of angles round by the kind of processor.
-    yaw = np.vectorize(math.atan2, otypes=[float])(y, x)
-    pitch = -np.vectorize(math.asin, otypes=[float])(z)
-    return np.stack([*middle, yaw, pitch], axis=-1)
+    return np.stack([*middle, arctan2(y, x), -arcsin(z)], axis=-1)
 
 
 def _places(

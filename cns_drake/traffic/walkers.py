@@ -8,6 +8,7 @@ from the edges of their walkway.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -323,7 +324,7 @@ def _place_walkers(
         xy = line[at, :2] + aside * np.array([y, -x])
         is_free = all(np.hypot(*(xy - row[2])) > 1.4 * _APART for row in rows)
         if is_free:
-            yaw = float(np.arctan2(y, x))
+            yaw = math.atan2(y, x)
             rows.append((2 * way + 1 - forward, at, xy, yaw, group))
         return is_free
 

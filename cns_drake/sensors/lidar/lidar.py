@@ -20,6 +20,7 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake.base.compiled import compiled
+from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting.moving_groups import (
     EVERYWHERE,
     NOTHING_KNOWN,
@@ -393,8 +394,8 @@ class Lidar(LeafSystem):
             R_WW0, way_P = motion.at(self._times)
             p_PS_W = X_WS.translation() - X_WP.translation()
             return (
-                X_WP.translation() + way_P + R_WW0 @ p_PS_W,
-                R_WW0 @ X_WS.rotation().matrix(),
+                X_WP.translation() + way_P + rotated(R_WW0, p_PS_W),
+                product(R_WW0, X_WS.rotation().matrix()),
             )
         # Copies are laid out like many poses: for Drake's views of its own
         # memory, numba would compile all that takes poses once more.

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cns_drake.base.elementary import cos, sin
+
 # One return, in the sensor frame. Fields have C alignment, for readers that map
 # structs onto the bytes.
 POINT_DTYPE = np.dtype(
@@ -266,9 +268,9 @@ class SpinningPattern(BeamPattern):
         elevation = np.asarray(self.elevations_rad)[None, :]
         d_Sset = np.stack(
             np.broadcast_arrays(
-                np.cos(elevation) * np.cos(azimuth),
-                np.cos(elevation) * np.sin(azimuth),
-                np.sin(elevation),
+                cos(elevation) * cos(azimuth),
+                cos(elevation) * sin(azimuth),
+                sin(elevation),
             ),
             axis=-1,
         ).reshape(-1, 3)
@@ -382,9 +384,9 @@ def make_flash_pattern(
     elevation, azimuth = np.meshgrid(elevation, azimuth, indexing="ij")
     d_Sset = np.stack(
         [
-            np.cos(elevation) * np.cos(azimuth),
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
+            cos(elevation) * cos(azimuth),
+            cos(elevation) * sin(azimuth),
+            sin(elevation),
         ],
         axis=-1,
     )

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.base.elementary import exp, log
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.returns.light import Light, join, select
 from cns_drake.sensors.returns.link_budget import (
@@ -147,7 +148,7 @@ def _single(light: Light, receiver: Receiver) -> _Pulses:
     budget, extinction = receiver.budget, receiver.extinction
     energy = light.energy
     if extinction > 0.0:
-        energy = energy * np.exp(-2.0 * extinction * light.distance)
+        energy = energy * exp(-2.0 * extinction * light.distance)
     return _Pulses(
         light.beam,
         np.zeros_like(light.beam),
@@ -206,7 +207,7 @@ def _drops(
     # Drops are arrivals of a Poisson process, in units of their mean number.
     # The first one of most beams is beyond the farthest end of any.
     beam = np.arange(num_beams)
-    none = uniform(key, beam, _FIRST_DROP_DRAW) > 1.0 - np.exp(-counts[-1])
+    none = uniform(key, beam, _FIRST_DROP_DRAW) > 1.0 - math.exp(-counts[-1])
     end = np.full(num_beams, receiver.max_range)
     # A surface that sends no light back counts as the nearest.
     near = np.where(surfaces.snr > 0.0, surfaces.distance, 0.0)
@@ -218,7 +219,7 @@ def _drops(
     found = [select(surfaces, np.zeros(0, np.int64))]
     for k in range(_MOST_DROPS):
         draw = _FIRST_DROP_DRAW + 2 * k
-        arrived = arrived - np.log(1.0 - uniform(key, beam, draw))
+        arrived = arrived - log(1.0 - uniform(key, beam, draw))
         is_near = arrived < mean
         beam, arrived, mean = beam[is_near], arrived[is_near], mean[is_near]
         if not len(beam):
@@ -380,6 +381,7 @@ def _intensity(retro_from: float, energy: np.ndarray) -> np.ndarray:
     It is a whole number: linear up to a reflectivity of 1, logarithmic above.
     """
     rest = _FULL_INTENSITY - retro_from
-    part = np.log(np.maximum(energy, 1.0)) / math.log(_FULL_RETRO)
-    above = np.minimum(retro_from + rest * part, _FULL_INTENSITY)
-    return np.rint(np.where(energy <= 1.0, retro_from * energy, above))
+    intensity, is_above = retro_from * energy, energy > 1.0
+    part = log(energy[is_above]) / math.log(_FULL_RETRO)
+    intensity[is_above] = np.minimum(retro_from + rest * part, _FULL_INTENSITY)
+    return np.rint(intensity)

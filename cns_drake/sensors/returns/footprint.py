@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.base.elementary import cos, log, sin
 from cns_drake.sensors.returns.light import BeamHits, dot, select
 from cns_drake.sensors.returns.random_numbers import uniform
 
@@ -89,13 +90,13 @@ def find_sides(
     # Random places of the sides.
     draw = _SIDE_DRAW + 2 * number
     rest = 1.0 - uniform(key, beam[row], draw)
-    radius = divergence * np.sqrt(-0.5 * np.log(rest))
+    radius = divergence * np.sqrt(-0.5 * log(rest))
     turn = uniform(key, beam[row], draw + 1) - 0.5
     angle = 2.0 * np.pi * share * turn
     d_Wset = (
         d
-        + (radius * np.cos(angle))[:, None] * toward
-        + (radius * np.sin(angle))[:, None] * np.cross(d, toward)
+        + (radius * cos(angle))[:, None] * toward
+        + (radius * sin(angle))[:, None] * np.cross(d, toward)
     )
     d_Wset /= np.sqrt(dot(d_Wset, d_Wset))[:, None]
     is_nearer = hits.ranges[row] <= hits.ranges[neighbour]

@@ -12,7 +12,7 @@ from cns_drake.ray_casting.ray_casting_scene import RayHits
 from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
 
 # The sheeting of signs and plates works up to this angle of incidence.
-_RETRO_COSINE = np.cos(np.deg2rad(60.0))
+_RETRO_COSINE = 0.5
 
 # A named tuple of arrays with as many rows each.
 _Table = TypeVar("_Table", bound=Any)

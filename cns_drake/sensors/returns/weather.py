@@ -24,20 +24,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base.elementary import exp, log
 from cns_drake.sensors.returns.link_budget import (
     LinkBudget,
     detection_probability,
     target_snr,
 )
 
+
+def _geometric(first: float, last: float, count: int) -> np.ndarray:
+    return exp(np.linspace(*log([first, last]), count))
+
+
 # Diameters of drops; smaller ones are not detectable [mm].
-_DIAMETERS_MM = np.geomspace(0.05, 12.0, 120)
+_DIAMETERS_MM = _geometric(0.05, 12.0, 120)
 _WATER_INDEX = 1.328
 # The extinction of a flake is twice its area. The back-scatter of a Lambertian
 # target is rho / pi times its area: rho = 2 pi / 25 sr.
 _FLAKE_REFLECTIVITY = 2.0 * np.pi / 25.0
 # Distances at which scattering is tabulated [m].
-_DISTANCES = np.geomspace(0.3, 60.0, 96)
+_DISTANCES = _geometric(0.3, 60.0, 96)
 # The aperture of a unit: the radius of a beam at its start [m].
 _APERTURE = 0.004
 # The receiver sees none of the beam before the first distance, and all of it
@@ -102,13 +108,13 @@ class Weather:
         if self.rain > 0.0:
             slope = 4.1 * self.rain**-0.21
             fresnel = ((_WATER_INDEX - 1.0) / (_WATER_INDEX + 1.0)) ** 2
-            kinds.append((8000.0 * np.exp(-slope * diameters_mm), fresnel))
+            kinds.append((8000.0 * exp(-slope * diameters_mm), fresnel))
         if self.snowfall > 0.0:
             slope = 2.29 * self.snowfall**-0.45
             number = 2500.0 * self.snowfall**-0.94
             kinds.append(
                 (
-                    number * np.exp(-slope * diameters_mm),
+                    number * exp(-slope * diameters_mm),
                     _FLAKE_REFLECTIVITY,
                 )
             )
@@ -187,7 +193,7 @@ def tabulate_scattering(
     if weather.visibility is not None:
         # A Lambertian target of reflectivity 1 has a coefficient of 1 / pi.
         fog_energies = np.pi * 0.046 / weather.visibility * resolution * overlap
-        fog_rate = overlap * np.exp(-2.0 * alpha * distances) / distances**2
+        fog_rate = overlap * exp(-2.0 * alpha * distances) / distances**2
     fog_counts = _integral(distances, fog_rate)
     return Scattering(
         distances,

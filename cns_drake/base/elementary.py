@@ -1,0 +1,35 @@
+"""Elementary functions and products with the same bits on every processor.
+
+NumPy's functions round by the widest instructions that a processor has, and
+libraries of matrices add in an order of their own. The functions here are those
+of C, at a tenth of a microsecond for each value, and products are added in
+order.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+sin = np.vectorize(math.sin, otypes=[float])
+cos = np.vectorize(math.cos, otypes=[float])
+tan = np.vectorize(math.tan, otypes=[float])
+arcsin = np.vectorize(math.asin, otypes=[float])
+arctan2 = np.vectorize(math.atan2, otypes=[float])
+exp = np.vectorize(math.exp, otypes=[float])
+log = np.vectorize(math.log, otypes=[float])
+power = np.vectorize(math.pow, otypes=[float])
+
+
+def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """Returns A @ B of matrices (..., M, K) and (..., K, N)."""
+    result = A[..., :1] * B[..., :1, :]
+    for k in range(1, A.shape[-1]):
+        result = result + A[..., k : k + 1] * B[..., k : k + 1, :]
+    return result
+
+
+def rotated(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Returns (..., 3) vectors after (..., 3, 3) rotations."""
+    return product(R, vectors[..., None])[..., 0]
