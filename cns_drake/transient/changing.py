@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import math
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -100,7 +101,7 @@ def _move_furniture(around: Surroundings, share: float) -> None:
         for _ in range(_TRIES):
             angle, turn = rng.uniform(-1, 1, 2) * (np.pi, _TURN)
             by = rng.uniform(_NEAREST, _FARTHEST)
-            offset = by * np.array([np.cos(angle), np.sin(angle)])
+            offset = by * np.array([math.cos(angle), math.sin(angle)])
             rise = around.ground.rise(middle, middle + offset)
             if abs(rise) < _KERB and obstacles.is_free(
                 shapely.affinity.translate(foot, *offset), (thing.name,)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely import Polygon
 
+from cns_drake.base.elementary import product
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.structures import Model, part_triangles
 from cns_drake.transient.scene_editing import Surroundings
@@ -66,7 +69,7 @@ class Bay:
         lengths = np.linalg.norm(sides, axis=1)
         along = sides[int(lengths.argmax())]
         self.middle = corners.mean(axis=0)
-        self.yaw = float(np.arctan2(along[1], along[0]))
+        self.yaw = math.atan2(along[1], along[0])
         self.front = self.back = float(lengths.max()) / 2
         self.left = self.right = float(lengths.min()) / 2
 
@@ -78,11 +81,13 @@ class Bay:
         """
         reach = np.array([self.front, self.back, self.left, self.right])
         front, back, left, right = reach + beyond
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
         corners = np.array(
             [(front, left), (-back, left), (-back, -right), (front, -right)]
         )
-        return Polygon(corners @ np.array([[c, s], [-s, c]]) + self.middle)
+        return Polygon(
+            product(corners, np.array([[c, s], [-s, c]])) + self.middle
+        )
 
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
         """Grows towards surroundings, and half the way towards other cars.
@@ -121,7 +126,7 @@ class Bay:
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
         across, turned = rng.uniform(size=2), rng.uniform() < 0.5
-        c, s = np.cos(skew), abs(np.sin(skew))
+        c, s = math.cos(skew), abs(math.sin(skew))
         half = np.array(
             [
                 half_size[0] * c + half_size[1] * s,
@@ -132,8 +137,9 @@ class Bay:
         high = np.array([self.front, self.left]) - half
         if (low > high).any():
             return None
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
-        offset = np.array([[c, -s], [s, c]]) @ (low + across * (high - low))
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        x, y = low + across * (high - low)
+        offset = np.array([c * x - s * y, s * x + c * y])
         yaw = self.yaw + skew + np.pi * turned
         return self.middle + offset, float(yaw)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
@@ -102,9 +104,9 @@ def _front(
     middles = (corners[:-1] + corners[1:]) / 2
     k = int(np.argmin(shapely.distance(shapely.points(middles), drive)))
     along = corners[k + 1] - corners[k]
-    length = float(np.linalg.norm(along))
+    length = math.hypot(*along)
     away = middles[k] - corners[:-1].mean(axis=0)
-    yaw = float(np.arctan2(away[1], away[0])) - np.pi / 2
+    yaw = math.atan2(away[1], away[0]) - np.pi / 2
     return RigidTransform(RollPitchYaw(0, 0, yaw), [*middles[k], 0.0]), length
 
 
@@ -184,12 +186,12 @@ class _Stretch:
         self.name = name
         chord = points[-1] - points[0]
         self.middle = (points[0] + points[-1]) / 2
-        self.length = float(np.linalg.norm(chord))
-        self.yaw = float(np.arctan2(outward[1], outward[0])) - np.pi / 2
+        self.length = math.hypot(*chord)
+        self.yaw = math.atan2(outward[1], outward[0]) - np.pi / 2
 
     def place(self, x: float, y: float) -> np.ndarray:
         """Returns the (2,) place x along the kerb and y away from it [m]."""
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
         return self.middle + np.array([c * x - s * y, s * x + c * y])
 
     def rectangle(
@@ -325,7 +327,7 @@ class _Site:
         """
         ground, yaw = self._around.ground, self._stretch.yaw + turn
         middle = self._stretch.place(x, y)
-        along = np.array([np.cos(yaw), np.sin(yaw)]) * length / 2
+        along = np.array([math.cos(yaw), math.sin(yaw)]) * length / 2
         ends = np.array([middle, middle - along, middle + along])
         z = ground.heights(ends, of_road=y < 0.0)
         at = float(z[0])
@@ -338,7 +340,7 @@ class _Site:
             return
         pitch = 0.0
         if length > 0.0 and np.isfinite(z).all():
-            pitch = -float(np.arctan2(z[2] - z[1], length))
+            pitch = -math.atan2(z[2] - z[1], length)
         self._around.editing.add(
             f"{self._stretch.name}_{suffix}",
             semantic_class,

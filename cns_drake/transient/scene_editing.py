@@ -27,6 +27,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.elementary import product
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.city.geometry.structures import (
@@ -219,7 +220,7 @@ class SceneEditing:
             look: colour and reflectivity.
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
-        mesh = memory_mesh((vertices - p) @ R, triangles)
+        mesh = memory_mesh(product(vertices - p, R), triangles)
         name = f"{part.geometry.structure}/{name}"
         self._register(name, part.X_WG, mesh, *_properties(look))
 

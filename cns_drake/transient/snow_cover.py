@@ -7,6 +7,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 import shapely
 
+from cns_drake.base.elementary import sin
 from cns_drake.city.geometry.upper_sides import (
     from_above,
     turned_up,
@@ -198,8 +199,8 @@ def _lay_banks(
         beside = ground.heights(xy + _OUTSIDE * out, of_road=False)
         beside = np.where(np.isfinite(beside), beside, road)
         waves = (
-            np.sin(2 * np.pi * (xy / _WAVES[0]) + phases[:2]).sum(axis=1)
-            + np.sin(2 * np.pi * (xy / _WAVES[1]) + phases[2:]).sum(axis=1)
+            sin(2 * np.pi * (xy / _WAVES[0]) + phases[:2]).sum(axis=1)
+            + sin(2 * np.pi * (xy / _WAVES[1]) + phases[2:]).sum(axis=1)
         ) / 4
         most = min(_HIGHEST * depth, _MOST_HEIGHT + depth)
         crest = beside + depth + (most - depth) * (0.6 + 0.4 * waves)

@@ -16,6 +16,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
+from cns_drake.base.elementary import product
 from cns_drake.city.geometry.polygons import polygons_of
 from cns_drake.city.geometry.upper_sides import (
     UpperSides,
@@ -85,7 +86,7 @@ class StructurePart:
             assert isinstance(surface, HalfSpaceSurface)
             p_GPs = np.zeros((0, 3))
         R, p = self.X_WG.rotation().matrix(), self.X_WG.translation()
-        return p_GPs @ R.T + p
+        return product(p_GPs, R.T) + p
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,79 @@
+"""Recordings have the same bytes on every processor."""
+
+import os
+import subprocess
+import sys
+
+from helpers.small_city import ROADS
+from helpers.small_map import write_small_map
+from helpers.tiny_drive import tiny_scenario, write_scenario
+from mcap.reader import make_reader
+import numpy as np
+import pytest
+
+from cns_drake.simulation.simulation import simulate
+
+pytestmark = pytest.mark.slow
+
+FRAMES = 6
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("processors")
+    town = write_small_map(folder / "town")
+    (town / "roads.yaml").write_text(ROADS)
+    return tiny_scenario(
+        folder,
+        world=None,
+        map=str(town),
+        stage="04",
+        frames=FRAMES,
+        ride={"roughness": "C", "seed": 4},
+        imu={"rate": 200},
+        odometry={"rate": 100},
+        traffic={"vehicles": 10, "walkers": 20, "seed": 2},
+        weather={"visibility": 150.0, "rain": 20.0, "snowfall": 5.0},
+        lidars={
+            "lidar": {
+                "preset": "vlp-16",
+                "columns": 256,
+                "motion_distortion": True,
+                "returns": "calibrated",
+            }
+        },
+    )
+
+
+def messages(folder):
+    found = {}
+    with (folder / f"{folder.name}_0.mcap").open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            found.setdefault(channel.topic, []).append(message.data)
+    return found
+
+
+def test_messages_are_those_of_another_processor(scenario, tmp_path):
+    file = write_scenario(scenario, tmp_path)
+    extensions = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    environment = os.environ | {
+        # NumPy has nothing but what every processor has.
+        "NPY_DISABLE_CPU_FEATURES": " ".join(extensions),
+        # The oldest kind of processor that has matrix products of its own.
+        "OPENBLAS_CORETYPE": "Prescott",
+        # Numba keeps code for each kind of processor apart.
+        "NUMBA_CPU_NAME": "generic",
+    }
+    command = [sys.executable, "-m", "cns_drake", "simulate", str(file)]
+    subprocess.run(
+        [*command, "--output", str(tmp_path / "other")],
+        env=environment,
+        check=True,
+        capture_output=True,
+    )
+    own = messages(simulate(scenario, tmp_path / "own").folder)
+    other = messages(tmp_path / "other" / scenario.name)
+    assert len(own["/imu/data"]) > 10 * FRAMES - 10
+    assert len(own["/odometry"]) > 5 * FRAMES - 5
+    assert {topic for topic in own if own[topic] != other[topic]} == set()
+    assert own.keys() == other.keys() >= {"/tf", "/lidar/points", "/objects"}
