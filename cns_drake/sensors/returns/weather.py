@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.elementary import exp, log
+from cns_drake.base.elementary import exp
 from cns_drake.sensors.returns.link_budget import (
     LinkBudget,
     detection_probability,
@@ -33,7 +33,7 @@ from cns_drake.sensors.returns.link_budget import (
 
 
 def _geometric(first: float, last: float, count: int) -> np.ndarray:
-    return exp(np.linspace(*log([first, last]), count))
+    return exp(np.linspace(math.log(first), math.log(last), count))
 
 
 # Diameters of drops; smaller ones are not detectable [mm].
