@@ -46,11 +46,15 @@ class LanePath:
         points: (N, 3) positions in the world, first and last included [m].
         spacing: distance between neighbours along the path [m].
         speed_limits: (N,) the limits there, infinite without one [m/s].
+        beside: (N, 2) distances to the middle of the lane to the left and to
+            the right, in the same direction; 0 where there is none [m]. None
+            along waypoints.
     """
 
     points: np.ndarray
     spacing: float
     speed_limits: np.ndarray
+    beside: np.ndarray | None = None
 
     @property
     def length(self) -> float:
@@ -78,7 +82,11 @@ def check_length(length: float, source: object) -> None:
 
 
 def sample_lane_path(
-    points: np.ndarray, speed_limits: np.ndarray, spacing: float, source: object
+    points: np.ndarray,
+    speed_limits: np.ndarray,
+    spacing: float,
+    source: object,
+    beside: np.ndarray | None = None,
 ) -> LanePath:
     """Returns evenly spaced points along a polyline.
 
@@ -89,6 +97,7 @@ def sample_lane_path(
         spacing: the distance of the points, rounded so that it divides the
             length of the polyline [m].
         source: the beginning of an error's message.
+        beside: (N, 2) distances of the lanes beside each corner [m].
 
     Raises:
         InputError: the polyline is too short or too long for a drive.
@@ -102,8 +111,11 @@ def sample_lane_path(
     xyz = [np.interp(wanted, travelled, axis) for axis in points.T]
     # A limit holds from its first point on; between two points the lower one.
     after = np.searchsorted(travelled, wanted).clip(1, len(points) - 1)
+    if beside is not None:
+        beside = np.minimum(beside[after - 1], beside[after])
     return LanePath(
         points=np.stack(xyz, axis=1),
         spacing=float(wanted[1] - wanted[0]),
         speed_limits=np.minimum(speed_limits[after - 1], speed_limits[after]),
+        beside=beside,
     )

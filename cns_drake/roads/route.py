@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 from cns_drake.base.elementary import power
 from cns_drake.base.errors import InputError
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
-from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import Direction, LaneRef, Road
 from cns_drake.roads.u_turn import find_loop
 
@@ -20,7 +20,7 @@ from cns_drake.roads.u_turn import find_loop
 _DENSE_SPACING = 0.25
 # Length of a lane change where the road has room for it, and least length for a
 # lane change [m].
-_LANE_CHANGE_LENGTH = 50.0
+LANE_CHANGE_LENGTH = 50.0
 MIN_LANE_CHANGE_LENGTH = 20.0
 # Length in which a car moves aside [m], and least distance of the middle of its
 # rear axle from kerbs and medians, since its front swings out [m].
@@ -114,6 +114,7 @@ def make_lane_path(
     """
     pieces: list[np.ndarray] = []
     limits: list[np.ndarray] = []
+    beside: list[np.ndarray] = []
     begin: float | None = None
     for k, leg in enumerate(route.root):
         after = route.root[k + 1] if k + 1 < len(route.root) else None
@@ -121,10 +122,19 @@ def make_lane_path(
             _check_ends(network, leg, k == 0, after)
             limit = network.roads[leg.road].speed_limit
             length = network.roads[leg.road].length
+            lanes = _lanes_beside(network.roads[leg.road], leg)
             if k > 0 and begin is None:
-                way = _way(network, route.root[k - 1], leg)
-                pieces.append(way)
-                limits.append(np.full(len(way), min(limit, limits[-1][0])))
+                before = route.root[k - 1]
+                way = _way(network, before, leg)
+                points = way.points[1:-1]
+                pieces.append(points)
+                limits.append(np.full(len(points), min(limit, limits[-1][0])))
+                common = np.zeros(2)
+                if way.turn == "straight":
+                    common = np.minimum(
+                        lanes, _lanes_beside(network.roads[before.road], before)
+                    )
+                beside.append(np.tile(common, (len(points), 1)))
             first = leg.start or 0.0 if begin is None else begin
             if after is not None and leads_back(leg, after):
                 loop, last = _turn_round(network, leg, after, first, aside)
@@ -134,6 +144,8 @@ def make_lane_path(
                 begin = None
             points = _leg_points(network, leg, first, last, aside)
             pieces += [points, loop]
+            beside.append(np.tile(lanes, (len(points), 1)))
+            beside.append(np.zeros((len(loop), 2)))
             limits.append(np.full(len(points) + len(loop), limit))
         except ValueError as error:
             raise InputError(
@@ -144,7 +156,19 @@ def make_lane_path(
         np.concatenate(limits),
         spacing,
         f"{source}: route",
+        np.concatenate(beside),
     )
+
+
+def _lanes_beside(road: Road, leg: RouteLeg) -> np.ndarray:
+    """Returns the (2,) distances to the lanes to the left and right [m].
+
+    A leg that changes lanes counts as one without others.
+    """
+    if not isinstance(leg.lane, int):
+        return np.zeros(2)
+    others = [leg.lane > 1, leg.lane < road.lanes[leg.direction]]
+    return np.array(others) * road.lane_width
 
 
 def leads_back(leg: RouteLeg, after: RouteLeg) -> bool:
@@ -292,13 +316,13 @@ def _moved_right(
     outer = road.half_width - CAR_ROOM
     inner = road.median / 2 + CAR_ROOM if road.median else -outer
     from_end = np.minimum(travelled, road.length - travelled)
-    share = _smooth_step(np.clip(from_end / _ASIDE_LENGTH, 0.0, 1.0))
+    share = smooth_step(np.clip(from_end / _ASIDE_LENGTH, 0.0, 1.0))
     from_middle = right * offset
     wanted = np.clip(from_middle + aside, inner, outer)
     return right * (from_middle + share * (wanted - from_middle))
 
 
-def _smooth_step(u: np.ndarray) -> np.ndarray:
+def smooth_step(u: np.ndarray) -> np.ndarray:
     """Returns the quintic from 0 to 1 with two derivatives zero at its ends."""
     return power(u, 3) * (10 - 15 * u + 6 * u**2)
 
@@ -317,13 +341,13 @@ def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
             f"{available:.1f} m are too short for a lane change, which needs "
             f"{MIN_LANE_CHANGE_LENGTH:.0f} m"
         )
-    length = min(available, _LANE_CHANGE_LENGTH)
+    length = min(available, LANE_CHANGE_LENGTH)
     middle = (travelled[0] + travelled[-1]) / 2
-    return _smooth_step(np.clip((travelled - middle) / length + 0.5, 0.0, 1.0))
+    return smooth_step(np.clip((travelled - middle) / length + 0.5, 0.0, 1.0))
 
 
-def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> np.ndarray:
-    """Returns the (N, 3) points between two legs, without the lane ends.
+def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> Connection:
+    """Returns the way between two legs.
 
     Raises:
         ValueError: there is no legal way.
@@ -340,7 +364,7 @@ def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> np.ndarray:
             f"from lane {way.incoming.lane} of {previous.road} to lane "
             f"{way.outgoing.lane}: {rule}"
         )
-    return way.points[1:-1]
+    return way
 
 
 # Strength with which roads that were driven before are avoided.

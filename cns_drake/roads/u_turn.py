@@ -22,7 +22,7 @@ _HALF_TRACK = 0.79
 _STEERING_LIMIT = 0.7
 # Its length behind the rear axle and ahead of it, and half its width with
 # mirrors [m].
-_REAR, _FRONT, _HALF_WIDTH = 1.0, 3.72, 1.03
+REAR, FRONT, HALF_WIDTH = 1.0, 3.72, 1.03
 
 # Tightest radius of the middle of the rear axle [m].
 TIGHTEST_RADIUS = float(_WHEELBASE / math.tan(_STEERING_LIMIT) + _HALF_TRACK)
@@ -184,10 +184,10 @@ def swept_area(points: ArrayLike) -> BaseGeometry:
     corners = [
         points + x * along + y * left
         for x, y in (
-            (-_REAR, -_HALF_WIDTH),
-            (_FRONT, -_HALF_WIDTH),
-            (_FRONT, _HALF_WIDTH),
-            (-_REAR, _HALF_WIDTH),
+            (-REAR, -HALF_WIDTH),
+            (FRONT, -HALF_WIDTH),
+            (FRONT, HALF_WIDTH),
+            (-REAR, HALF_WIDTH),
         )
     ]
     outlines = [Polygon(outline) for outline in np.stack(corners, axis=1)]

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from pydrake.geometry import FrameId
+from pydrake.math import RigidTransform
+import shapely
+from shapely import STRtree
 
 from cns_drake.base.errors import InputError
 from cns_drake.motion.suspension import (
@@ -12,15 +18,33 @@ from cns_drake.motion.suspension import (
     ride_on_springs,
 )
 from cns_drake.motion.trajectory import Trajectory
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.schedule import frames_within
+from cns_drake.roads.driver_offsets import FINE_SPACING, depart, kerbs
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
+from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.scene.world import load_world
+
+# Heights above the path at which things are looked for: below the top of a
+# kerb, and up to the roof [m].
+_HEIGHTS = np.array([(0.0, 0.0, z) for z in (0.1, 0.3, 0.7, 1.2, 1.6)])
+# Directions of sight, how far it reaches [m], and greatest vertical part of the
+# normal of an obstacle.
+_AROUND = np.array(
+    [
+        (math.cos(angle), math.sin(angle), 0.0)
+        for angle in np.radians(np.arange(0, 360, 10)).tolist()
+    ]
+)
+_SIGHT = 5.0
+_STEEP = 0.7
 
 
 def plan_drive(
@@ -43,9 +67,11 @@ def plan_drive(
 
         trajectory = plan_drive(load_scenario("downtown_01"))
     """
+    driver, network = scenario.driver, None
+    spacing = FINE_SPACING if driver.departs else POINT_SPACING
     if scenario.waypoints is not None:
         path = load_waypoint_path(
-            scenario.waypoints, POINT_SPACING, u_turns=scenario.u_turns
+            scenario.waypoints, spacing, u_turns=scenario.u_turns
         )
         source = scenario.waypoints
         cure = "place waypoints farther apart, or leave some out"
@@ -55,12 +81,25 @@ def plan_drive(
         path = make_lane_path(
             network,
             scenario.route,
-            POINT_SPACING,
+            spacing,
             scenario.source,
             aside=scenario.aside,
         )
         source = f"{scenario.source}: route"
         cure = "give the junction a greater kerb_radius"
+    if driver.departs:
+        path = depart(
+            path,
+            POINT_SPACING,
+            _things_beside(scenario, path.points)
+            if network is None
+            else kerbs(network),
+            source,
+            wander=driver.wander,
+            wander_length=driver.wander_length,
+            lane_changes=driver.lane_changes,
+            rng=driver.rng(scenario.name),
+        )
     trajectory = Trajectory(path, scenario.speeds)
     if positions is not None:
         trajectory = trajectory.with_positions(positions)
@@ -73,6 +112,48 @@ def plan_drive(
         load_suspension_rates(suspension_file()),
     )
     return ride_on_springs(trajectory, suspension, profile)
+
+
+def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
+    """Returns what stands beside a path in the world, seen from above.
+
+    Rays in all directions, from near the ground to the height of the car, find
+    kerbs and walls. An edge at which the ground only falls is not found.
+
+    Args:
+        scenario: names the world.
+        points: (N, 3) of the path, close together [m].
+
+    Raises:
+        InputError: the world cannot be loaded.
+    """
+    world = load_world(world_file(scenario), without=scenario.without)
+    context = world.plant.CreateDefaultContext()
+    inspector = world.scene_graph.model_inspector()
+    bodies = {
+        frame: world.plant.GetBodyFromFrameId(frame)
+        for frame in inspector.GetAllFrameIds()
+        if frame != world.scene_graph.world_frame_id()
+    }
+
+    def X_WF(frame: FrameId) -> RigidTransform:
+        if frame not in bodies:
+            return RigidTransform()
+        return bodies[frame].EvalPoseInWorld(context)
+
+    scene = RayCastingScene(
+        read_perception_geometry(inspector), world.anchored_frames(), X_WF
+    )
+    p_WR = (points + _HEIGHTS[:, None]).reshape(-1, 3)
+    d_W = np.repeat(_AROUND, len(p_WR), axis=0)
+    hits = scene.cast_rays(p_WR, d_W, _SIGHT, with_normals=True)
+    # The ground is no obstacle.
+    steep = np.isfinite(hits.ranges) & (np.abs(hits.normals_W[:, 2]) < _STEEP)
+    p_WQ = np.tile(p_WR, (len(_AROUND), 1))[steep]
+    p_WQ += hits.ranges[steep, None] * d_W[steep]
+    # One for each centimetre is enough.
+    xy = np.unique(np.round(p_WQ[:, :2], 2), axis=0)
+    return STRtree(np.asarray(shapely.points(xy)))
 
 
 def _check_steering(trajectory: Trajectory, source: str, cure: str) -> None:

@@ -7,6 +7,7 @@ import operator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import (
     BaseModel,
     Field,
@@ -120,10 +121,20 @@ class DriverConfig(Section):
     follows: bool = False
     seed: int | None = Field(default=None, ge=0)
 
+    @property
+    def departs(self) -> bool:
+        """Whether the car leaves its line."""
+        return self.wander > 0 or self.lane_changes > 0
+
+    def rng(self, name: str) -> np.random.Generator:
+        """Returns what decides; without a seed, by the drive's name."""
+        seed = [*name.encode()] if self.seed is None else [self.seed]
+        return np.random.default_rng(seed)
+
 
 # Pairs of drives of Boreas and of MulRan KAIST differ by 0.5 m in a lane, and
 # are in different lanes on 10 to 17 % of the way.
-REAL_DRIVER = DriverConfig(wander=0.35, lane_changes=2.0, follows=True)
+REAL_DRIVER = DriverConfig(wander=0.35, lane_changes=6.0, follows=True)
 
 
 class TrafficConfig(Section):

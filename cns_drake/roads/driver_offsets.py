@@ -1,0 +1,283 @@
+"""How a driver departs from the line that a route or waypoints give.
+
+Two drives of people along one route differ by half a metre that stays alike for
+some 50 m, and by lanes. The offset along the way is a process of Ornstein and
+Uhlenbeck, smoothed so that a driver can steer it, with changes of lane on top.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+import shapely
+from shapely import STRtree
+
+from cns_drake.roads.lane_path import LanePath, sample_lane_path
+from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.route import smooth_step
+from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR
+
+# Spacing of the path that `depart` needs [m].
+FINE_SPACING = 0.5
+# Least and greatest length of an episode in another lane [m].
+SHORTEST_EPISODE, LONGEST_EPISODE = 15.0, 270.0
+# Length of the way from one lane to the other [m].
+_RAMP = 80.0
+# Farthest that the car wanders: a lane of 3.5 m leaves it as much [m].
+_FARTHEST = 0.8
+# Least distance of the car to kerbs and other obstacles, and what the smoothed
+# path may lose of it [m].
+_CLEARANCE, _SLACK = 0.3, 0.1
+# Offsets that are tried, every so many metres of the path [m].
+_OFFSETS = np.linspace(-_FARTHEST, _FARTHEST, 33)
+_CHECKED = 4
+# Half of the length over which the wander is smoothed [m].
+_REACH = 20.0
+# Their error then is below 1e-9 for all lengths of scenarios.
+_ITERATIONS = 40
+
+
+def kerbs(network: RoadNetwork) -> STRtree:
+    """Returns the edges of the lanes: kerbs, medians, and bays of parked cars.
+
+    They are pieces of a few metres.
+    """
+    outline = np.asarray(shapely.get_parts(network.lane_area().boundary))
+    corners, line = shapely.get_coordinates(outline, return_index=True)
+    pairs = np.stack([corners[:-1], corners[1:]], axis=1)
+    return STRtree(shapely.linestrings(pairs[line[:-1] == line[1:]]))
+
+
+def depart(
+    path: LanePath,
+    spacing: float,
+    obstacles: STRtree,
+    source: object,
+    *,
+    wander: float,
+    wander_length: float,
+    lane_changes: float,
+    rng: np.random.Generator,
+) -> LanePath:
+    """Returns the path of a driver who wanders and changes lanes.
+
+    Where the line has obstacles nearby, the car stays on it. Elsewhere, it
+    keeps 0.3 m from all of them, mirrors included.
+
+    Args:
+        path: the line, with points every `FINE_SPACING`.
+        spacing: distance of the points of the result [m].
+        obstacles: kerbs, walls and the like, seen from above.
+        source: the beginning of an error's message.
+        wander: standard deviation of the offset in the lane [m].
+        wander_length: distance after which its correlation is 1/e [m].
+        lane_changes: rate of changes to another lane and back [1/km].
+        rng: decides.
+
+    Raises:
+        InputError: the path is too short or too long for a drive.
+    """
+    lane_rng, wander_rng = rng.spawn(2)
+    points = path.points
+    if lane_changes:
+        points = _change_lanes(path, obstacles, lane_changes, lane_rng)
+    if wander:
+        _, left = _directions(points)
+        low, high = _room(points, obstacles)
+        offset = _wander(low, high, wander, wander_length, wander_rng)
+        points = _moved(points, left, offset)
+    return sample_lane_path(points, path.speed_limits, spacing, source)
+
+
+def _directions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the (N, 2) directions ahead and to the left at (N, 3) points."""
+    along = np.gradient(points[:, :2], axis=0)
+    along /= np.sqrt(along[:, :1] ** 2 + along[:, 1:] ** 2)
+    return along, np.column_stack([-along[:, 1], along[:, 0]])
+
+
+def _moved(
+    points: np.ndarray, left: np.ndarray, offset: np.ndarray
+) -> np.ndarray:
+    xy = points[:, :2] + offset[:, None] * left
+    return np.column_stack([xy, points[:, 2]])
+
+
+def _is_free(
+    points: np.ndarray, offsets: np.ndarray, obstacles: STRtree
+) -> np.ndarray:
+    """Returns (N, K) whether a car has room at K offsets from N points."""
+    along, left = _directions(points)
+    middle = points[:, None, :2] + offsets[:, None] * left[:, None]
+    corners = [
+        middle + x * along[:, None] + y * left[:, None]
+        for x, y in (
+            (-REAR, -HALF_WIDTH),
+            (FRONT, -HALF_WIDTH),
+            (FRONT, HALF_WIDTH),
+            (-REAR, HALF_WIDTH),
+        )
+    ]
+    cars = np.asarray(shapely.polygons(np.stack(corners, axis=2))).ravel()
+    hit, _ = obstacles.query(cars, "dwithin", _CLEARANCE + _SLACK)
+    free = np.ones(len(cars), dtype=bool)
+    free[hit] = False
+    return free.reshape(middle.shape[:2])
+
+
+def _change_lanes(
+    path: LanePath, obstacles: STRtree, rate: float, rng: np.random.Generator
+) -> np.ndarray:
+    """Returns the (N, 3) points of the path with changes of lane.
+
+    An episode reaches from the middle of the way out to the middle of the way
+    back. Its length is drawn evenly in the logarithm, and cut off where the
+    other lane ends. A short one goes only a part of the way over, as round an
+    obstacle.
+    """
+    assert path.beside is not None  # Lanes belong to routes alone.
+    s = path.spacing * np.arange(len(path.points))
+    _, left = _directions(path.points)
+    points = path.points
+    half = _RAMP / 2
+    ratio = math.log(LONGEST_EPISODE / SHORTEST_EPISODE)
+    done = 0.0
+    while True:
+        done += 1000.0 / rate * float(rng.standard_exponential())
+        length = SHORTEST_EPISODE * math.exp(ratio * float(rng.random()))
+        first_side = int(rng.integers(2))
+        if done > s[-1]:
+            return points
+        for side in (first_side, 1 - first_side):
+            run = _stretch(path.beside[:, side], int(done / path.spacing))
+            begin = max(done, s[run.start] + half)
+            end = min(begin + length, s[run.stop - 1] - half)
+            if end - begin < SHORTEST_EPISODE:
+                continue
+            share = smooth_step(
+                np.clip((s - begin) / _RAMP + 0.5, 0.0, 1.0)
+            ) - smooth_step(np.clip((s - end) / _RAMP + 0.5, 0.0, 1.0))
+            sign = 1.0 if side == 0 else -1.0
+            moved = _moved(points, left, sign * share * path.beside[:, side])
+            if _is_free(moved[run][::_CHECKED], np.zeros(1), obstacles).all():
+                points = moved
+                done = end + half
+                break
+
+
+def _stretch(beside: np.ndarray, place: int) -> slice:
+    """Returns the stretch about a place with one distance of a lane.
+
+    It is of one point where there is no lane.
+    """
+    if not beside[place]:
+        return slice(place, place + 1)
+    differs = np.flatnonzero(beside != beside[place])
+    after = int(np.searchsorted(differs, place))
+    return slice(
+        int(differs[after - 1]) + 1 if after else 0,
+        int(differs[after]) if after < len(differs) else len(beside),
+    )
+
+
+def _room(
+    points: np.ndarray, obstacles: STRtree
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the (N,) least and greatest offsets to the left of a path [m].
+
+    Each holds for the whole length over which offsets are smoothed. They are
+    those of the room nearest to the path; both are 0 where there is none.
+    """
+    free = _is_free(points[::_CHECKED], _OFFSETS, obstacles)
+    low, high = np.zeros((2, len(free)))
+    nearest = np.argsort(np.abs(_OFFSETS), kind="stable")
+    for k, row in enumerate(free):
+        if row.any():
+            start = nearest[row[nearest].argmax()]
+            blocked = np.flatnonzero(~row)
+            after = np.searchsorted(blocked, start)
+            ends = np.concatenate([[-1], blocked, [len(row)]])
+            low[k] = _OFFSETS[ends[after] + 1]
+            high[k] = _OFFSETS[ends[after + 1] - 1]
+    size = 2 * (math.ceil(_REACH / FINE_SPACING / _CHECKED) + 1) + 1
+    low = maximum_filter1d(low, size, mode="nearest")
+    high = minimum_filter1d(high, size, mode="nearest")
+    is_narrow = low > high
+    low[is_narrow], high[is_narrow] = 0.0, 0.0
+    num = len(points)
+    return low.repeat(_CHECKED)[:num], high.repeat(_CHECKED)[:num]
+
+
+def _wander(
+    low: np.ndarray,
+    high: np.ndarray,
+    spread: float,
+    length: float,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Returns (N,) offsets between bounds that `_room` gives [m].
+
+    The driver's mean line keeps two standard deviations from both bounds, or
+    lies in their middle.
+    """
+    weights = _kernel()
+    reach = len(weights) // 2
+    decay, gain = _process(weights, length)
+    noise = rng.standard_normal(len(low) + 2 * reach)
+    value = float(noise[0])
+    values = [value]
+    fresh = math.sqrt(1.0 - decay**2)
+    for one in noise[1:].tolist():
+        value = decay * value + fresh * one
+        values.append(value)
+    low, high = (np.pad(bound, reach, mode="edge") for bound in (low, high))
+    least, most = low + 2 * spread, high - 2 * spread
+    mean = np.where(
+        least <= most,
+        np.clip(0.0, least, np.maximum(least, most)),
+        (low + high) / 2,
+    )
+    wanted = np.clip(mean + spread * gain * np.array(values), low, high)
+    num = len(low) - 2 * reach
+    # One by one: a dot product rounds differently on other processors.
+    offset = np.zeros(num)
+    for k, weight in enumerate(weights.tolist()):
+        offset += weight * wanted[k : k + num]
+    return offset
+
+
+def _kernel() -> np.ndarray:
+    """Returns the weights of the smoothing, with two smooth derivatives."""
+    half = round(_REACH / FINE_SPACING)
+    u = np.arange(-half, half + 1) / (half + 1)
+    weights = (1.0 - u * u) ** 3
+    return weights / weights.sum()
+
+
+def _process(weights: np.ndarray, length: float) -> tuple[float, float]:
+    """Returns decay a step and gain of a process before it is smoothed.
+
+    An Ornstein-Uhlenbeck process of length a has the covariance exp(-d / a);
+    smoothed by weights w_i at x_i, it has sum_ij w_i w_j
+    exp(-|d + x_i - x_j| / a). Gain and a are such that the smoothed process
+    has a standard deviation of 1, and a correlation of 1/e at the length.
+    """
+    num = len(weights)
+    pairs = [
+        float(sum(np.multiply(weights[k:], weights[: num - k]).tolist()))
+        for k in range(num)
+    ]
+
+    def covariance(distance: float, a: float) -> float:
+        return sum(
+            pairs[abs(k)] * math.exp(-abs(distance + FINE_SPACING * k) / a)
+            for k in range(1 - num, num)
+        )
+
+    a = length
+    for _ in range(_ITERATIONS):
+        variance = covariance(0.0, a)
+        a *= -math.log(covariance(length, a) / variance)
+    return math.exp(-FINE_SPACING / a), 1.0 / math.sqrt(variance)
