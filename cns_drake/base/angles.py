@@ -1,7 +1,5 @@
 """Angles in the plane."""
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 import numpy as np

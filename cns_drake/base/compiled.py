@@ -1,7 +1,5 @@
 """Compilation of the few loops that NumPy cannot express."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import contextlib
 import fcntl

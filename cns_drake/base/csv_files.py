@@ -1,7 +1,5 @@
 """Reading CSV files."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import csv
 from pathlib import Path

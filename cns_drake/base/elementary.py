@@ -6,8 +6,6 @@ of C, at a tenth of a microsecond for each value, and products are added in
 order.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Writing files that appear under their names only when they are whole."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import contextlib
 import fcntl

@@ -1,7 +1,5 @@
 """Ctrl-C and SIGTERM: when they may interrupt, and how they end a process."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import contextlib
 import os

@@ -1,7 +1,5 @@
 """Reading JSON within bounds, and only with text that can be written."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re

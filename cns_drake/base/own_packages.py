@@ -4,8 +4,6 @@ Many projects have a folder `evaluation`. The simulator needs ours for studies
 only, and refuses another package in its place.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 import os
 

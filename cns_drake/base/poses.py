@@ -1,7 +1,5 @@
 """Rigid poses as homogeneous 4 x 4 matrices, many at a time."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

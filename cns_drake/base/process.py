@@ -1,7 +1,5 @@
 """What a process may use: processors, and Python's search for garbage."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import contextlib
 import gc

@@ -1,7 +1,5 @@
 """Progress bars on stderr; each takes one line in any terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import contextlib
 import time

@@ -1,7 +1,5 @@
 """Output of the command line: results, progress, and one-line errors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 import contextlib
 import json

@@ -1,7 +1,5 @@
 """The version of the release, which recordings and reports carry."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 import contextlib
 import importlib.metadata

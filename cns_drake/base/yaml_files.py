@@ -1,7 +1,5 @@
 """Reading YAML strictly and within bounds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

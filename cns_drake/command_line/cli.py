@@ -4,8 +4,6 @@ Each command imports its slow modules itself, so that `--help` and `list` answer
 at once. Interrupts wait during imports.
 """
 
-from __future__ import annotations
-
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
 from cns_drake.command_line.laddering import ladder, levels

@@ -1,7 +1,5 @@
 """Commands on recordings: export to other layouts, repair of damaged ones."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

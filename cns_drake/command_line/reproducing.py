@@ -1,7 +1,5 @@
 """The command `cns-drake reproduce`."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

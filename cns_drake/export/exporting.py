@@ -5,8 +5,6 @@ describes its files, marks it as ours. A drive's own folder grows under a
 `.part` name and gets its final one when all of it is there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import os
 from pathlib import Path

@@ -2,8 +2,6 @@
 
 Frames: world W, vehicle B on the ground, LiDAR S, IMU I."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import json

@@ -1,7 +1,5 @@
 """A recording with marks on points that another stage lacks."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping
 from functools import cached_property

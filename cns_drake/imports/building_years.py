@@ -3,8 +3,6 @@
 Dates as OpenStreetMap has them:
 https://wiki.openstreetmap.org/wiki/Key:start_date"""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import datetime
 from datetime import date

@@ -2,8 +2,6 @@
 
 Solids may have the roofs that OpenStreetMap describes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An imported city, independent of its file format."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field

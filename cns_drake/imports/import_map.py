@@ -1,7 +1,5 @@
 """Makes a map folder, with stages and drives, from an imported city."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

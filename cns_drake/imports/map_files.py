@@ -1,7 +1,5 @@
 """The files of an imported city."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import os

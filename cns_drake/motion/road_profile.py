@@ -1,7 +1,5 @@
 """Roughness of roads: random heights of a class of ISO 8608."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

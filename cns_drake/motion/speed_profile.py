@@ -1,7 +1,5 @@
 """Speed along a path: bounded speed, continuous acceleration."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A car on four springs, and its ride over a rough road."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 from pathlib import Path

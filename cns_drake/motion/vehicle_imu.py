@@ -1,7 +1,5 @@
 """An IMU on a vehicle whose motion is prescribed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 

@@ -1,7 +1,5 @@
 """The static structures of a stage, and their differences to another stage."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Drawing a city by day, a route and scans into a Meshcat scene."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

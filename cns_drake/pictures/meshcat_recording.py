@@ -1,7 +1,5 @@
 """Following a drive, to show it as a web page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

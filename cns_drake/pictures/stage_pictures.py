@@ -1,7 +1,5 @@
 """Pictures of a map: a view of its stages, and its drives from above."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Writes a Meshcat scene as one small HTML file, commands in order."""
 
-from __future__ import annotations
-
 import base64
 from html import escape
 from pathlib import Path

@@ -6,8 +6,6 @@ Formats and values of the C interface: Embree 4 manual,
 https://github.com/RenderKit/embree, headers `rtcore_*.h`.
 """
 
-from __future__ import annotations
-
 import ctypes
 from functools import lru_cache
 import importlib

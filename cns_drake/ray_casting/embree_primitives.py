@@ -1,7 +1,5 @@
 """Surfaces as buffers of Embree's primitives."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 import math
 from typing import NamedTuple

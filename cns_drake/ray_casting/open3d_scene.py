@@ -4,8 +4,6 @@ About a third as fast as `embree_scene`, and curved shapes are polyhedra:
 Open3D has triangles only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import functools
 import sys

@@ -1,7 +1,5 @@
 """Recording the sensors of a Diagram as ROS 2 messages."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import math
 from typing import Any

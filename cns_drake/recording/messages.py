@@ -3,8 +3,6 @@
 Poses go in as Drake types; stamps are whole nanoseconds, so that no rounding
 happens here. Quaternions leave in ROS order (x, y, z, w)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import functools
 import struct

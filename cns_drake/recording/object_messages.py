@@ -1,7 +1,5 @@
 """ROS 2 messages of moving objects: detections, boxes, velocities."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 

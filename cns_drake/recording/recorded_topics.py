@@ -1,7 +1,5 @@
 """Topics of a recording, and the frames of its sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from pydrake.math import RigidTransform

@@ -1,7 +1,5 @@
 """The folder of a recording: its files, and whether it is finished."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

@@ -5,8 +5,6 @@ it declares. The reader of this module starts at the beginning without any
 index. It checks every size against the file and a limit before it reserves
 memory, checks every checksum, and finds the next intact chunk behind damage."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
 import contextlib

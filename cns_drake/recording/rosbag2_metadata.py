@@ -4,8 +4,6 @@ Metadata version 8 is the newest that ROS 2 Humble reads. Conventions are
 those of rosbag2's own MCAP files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

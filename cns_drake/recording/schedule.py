@@ -1,7 +1,5 @@
 """Times of a recording's frames and messages; each stream has its own rate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """The recorder's ports of sensors, and their messages."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Areas of a road network: carriageway, sidewalks, medians, bays, lanes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import itertools

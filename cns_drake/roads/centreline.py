@@ -1,7 +1,5 @@
 """Plane curves of straight lines and arcs: the centrelines of roads."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 

@@ -5,8 +5,6 @@ some 50 m, and by lanes. The offset along the way is a process of Ornstein and
 Uhlenbeck, smoothed so that a driver can steer it, with changes of lane on top.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The line that a vehicle follows, and bounds of its speed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Roads and junctions of a town, with their lanes and areas."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

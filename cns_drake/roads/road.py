@@ -1,7 +1,5 @@
 """Roads with their centrelines and lanes, and the junctions that they join."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

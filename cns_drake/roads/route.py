@@ -1,7 +1,5 @@
 """Lane-level routes over a road network, and the paths that they describe."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 import math
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Areas of streets, and heights of their surface."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

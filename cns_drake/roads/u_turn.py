@@ -1,7 +1,5 @@
 """U-turns: the tightest loop that a car's steering allows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Drives along waypoints, for worlds without a road network."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 from pathlib import Path

@@ -5,8 +5,6 @@ row of `sequences.csv` therefore has a checksum of its input files, and is
 measured anew when they have changed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 import csv
 from dataclasses import astuple, dataclass, fields

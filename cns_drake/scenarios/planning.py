@@ -1,7 +1,5 @@
 """Plans the drive of a scenario."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

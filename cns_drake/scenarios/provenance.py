@@ -1,7 +1,5 @@
 """The inputs and libraries of a recording, besides its scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Scenario files, and the files that a scenario names."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 import os
 from pathlib import Path

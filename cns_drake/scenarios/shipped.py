@@ -1,7 +1,5 @@
 """The places of the shipped worlds, which a wheel contains as one archive."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 from pathlib import Path

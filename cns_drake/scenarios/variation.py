@@ -9,8 +9,6 @@ at random. Other draws of the city, random routes and other LiDARs multiply the
 family. Every member is a scenario.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import product
 import os

@@ -1,7 +1,5 @@
 """Drake's messages about a file that it cannot read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import contextlib
 import logging

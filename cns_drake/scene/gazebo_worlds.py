@@ -6,8 +6,6 @@ start: nothing in such a world moves here. Models and files that the worlds
 refer to are looked for in the folders that Gazebo searches.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 import math

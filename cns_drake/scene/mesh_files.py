@@ -1,7 +1,5 @@
 """Surfaces of meshes, from files or from memory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import functools
 from itertools import pairwise

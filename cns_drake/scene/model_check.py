@@ -4,8 +4,6 @@ For text that is not a number or a valid size, libsdformat uses a part of it or
 1, or Drake ends the program. Long names end the process.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The geometry of one role in a SceneGraph, as seen by a LiDAR."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 import itertools

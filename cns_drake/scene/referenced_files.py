@@ -1,7 +1,5 @@
 """Finds the files that a model refers to, and notices their changes."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from pathlib import Path

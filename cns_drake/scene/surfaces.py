@@ -1,7 +1,5 @@
 """Surfaces that rays can meet, each in its geometry frame G, as triangles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

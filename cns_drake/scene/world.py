@@ -1,7 +1,5 @@
 """Loading an SDF world, and the vehicle in it, into a SceneGraph."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path

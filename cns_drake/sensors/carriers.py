@@ -1,7 +1,5 @@
 """The place of a sensor on its carrier, and the carrier's motion."""
 
-from __future__ import annotations
-
 import math
 
 from pydrake.math import RigidTransform, RollPitchYaw

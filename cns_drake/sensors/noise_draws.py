@@ -1,7 +1,5 @@
 """Random numbers that depend only on a seed and their place."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

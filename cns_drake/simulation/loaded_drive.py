@@ -1,7 +1,5 @@
 """A scenario with all that its simulation needs: plan, stage, traffic."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

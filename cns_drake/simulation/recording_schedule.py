@@ -1,7 +1,5 @@
 """Topics of a drive, and the times at which its sensors are recorded."""
 
-from __future__ import annotations
-
 import math
 
 from cns_drake.recording.recorded_topics import OBJECT_TOPICS, recording_topics

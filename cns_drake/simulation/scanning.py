@@ -1,7 +1,5 @@
 """A single scan of any SDF world from any pose."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Recording the sensors of any diagram."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Running a scenario from its first frame to its last."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 import math

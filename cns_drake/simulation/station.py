@@ -1,7 +1,5 @@
 """The Diagram: the one place where systems are wired."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

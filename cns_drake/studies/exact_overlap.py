@@ -11,8 +11,6 @@ The place's sensor sees the world as it was then: at its stage, with its
 traffic.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 

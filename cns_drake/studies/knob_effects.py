@@ -5,8 +5,6 @@ are absent at the earlier stage, and those that are lower there. Each is taken
 back in turn, and the drives are simulated anew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ A drive queries a database with the same route through the same city, with one
 cause of change between the two at a time. Nothing is recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 import itertools

@@ -6,8 +6,6 @@ Conditions and sensor of the later visit change the drive of the query, but
 never its route.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math

@@ -4,8 +4,6 @@ Level 0 is the world without a change; levels 1 to 4 have all causes together.
 Their drives are frozen: `worlds/levels.csv` holds their fingerprints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import math

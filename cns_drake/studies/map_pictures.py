@@ -1,7 +1,5 @@
 """The pictures of a map: its drives, and how its streets change."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

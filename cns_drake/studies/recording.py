@@ -1,7 +1,5 @@
 """Recordings as jobs, side by side, one process each."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 import contextlib

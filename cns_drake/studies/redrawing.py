@@ -4,8 +4,6 @@ Roads and plan stay, and only the plan's seed changes: buildings, plants, cars
 and furniture are drawn anew. Each such city is a map folder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 import os

@@ -1,7 +1,5 @@
 """The experiments on maps, from simulation to report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

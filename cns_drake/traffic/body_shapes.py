@@ -1,7 +1,5 @@
 """Bodies of vehicles and walkers, made of simple shapes and meshes."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

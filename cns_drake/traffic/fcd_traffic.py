@@ -3,8 +3,6 @@
 Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

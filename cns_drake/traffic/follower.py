@@ -1,7 +1,5 @@
 """The ego car as one of the vehicles, along a path of its own."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Files of lanes and walkways, for maps without a `roads.yaml`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import json
 from pathlib import Path

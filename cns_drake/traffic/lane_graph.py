@@ -1,7 +1,5 @@
 """Lanes of vehicles, the ways between them, crossings and walkways."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Makes a lane graph for traffic from the lanes of an imported map."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 

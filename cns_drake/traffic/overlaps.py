@@ -1,7 +1,5 @@
 """Finds overlapping boxes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.base.compiled import compiled

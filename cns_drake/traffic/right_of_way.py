@@ -5,8 +5,6 @@ use or about to be used, there is room for it behind the way, and its signal is
 green. Vehicles never stop on a way, so that none waits for ever.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

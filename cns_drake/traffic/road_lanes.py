@@ -1,7 +1,5 @@
 """Makes lanes and walkways for traffic from a road network."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 import itertools

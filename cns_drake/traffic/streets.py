@@ -1,7 +1,5 @@
 """Lanes, and the ego car's way over them, as arrays for loops over time."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Adding traffic to a diagram."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A system that moves vehicles and walkers along their planned tracks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Kinds of vehicles in traffic: sizes, shares and driving parameters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ driver changes lane if that gains more acceleration than it costs others, and no
 other vehicle has to brake hard.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ Helbing, Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51
 from the edges of their walkway.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 from typing import Any, NamedTuple

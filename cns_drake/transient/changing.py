@@ -1,7 +1,5 @@
 """Applies all passing changes to a world."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 import math
 

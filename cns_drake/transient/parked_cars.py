@@ -1,7 +1,5 @@
 """Parked cars that have left, stand elsewhere in their bay, or are others."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Puts up scaffolds and roadworks along a drive."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Edits a loaded world, and records the cause of each change."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Snow on surfaces that face the sky, and banks along kerbs."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components

@@ -1,7 +1,5 @@
 """The structures of a loaded world, and the ground below them."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass

@@ -13,8 +13,6 @@ As LT-SLAM does it (Kim and Kim, "LT-mapper", ICRA 2022), made robust:
 5. Heights start at the target's ground, like the grid of the TCR.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Literal
 

@@ -6,8 +6,6 @@ two pairs (RANSAC) fixes the four numbers that two upright worlds can differ
 by: a turn about the vertical and a move.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Finds the loops between two drives, or of a drive with itself."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -7,8 +7,6 @@ by Cauchy's kernel, whose width shrinks step by step to its final value
 are believed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ limit shrinks from stage to stage: far guesses are drawn in, and later pairs are
 not disturbed by changes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

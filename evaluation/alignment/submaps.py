@@ -1,7 +1,5 @@
 """A drive cut into overlapping small maps, for alignment."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -16,8 +16,6 @@ times, p_i and q_i their positions:
   which divides by the 100 m and calls the mean the translation error [%].
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Single point clouds: map files, and scans with a file each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import contextlib
 import math

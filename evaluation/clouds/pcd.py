@@ -1,7 +1,5 @@
 """Point clouds in PCL's PCD format, version 0.7 and its predecessors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Point clouds in PLY files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

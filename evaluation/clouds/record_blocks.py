@@ -4,8 +4,6 @@ A memory-mapped file would end the process without a message (SIGBUS) if another
 program shortened it meanwhile.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import itertools
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Options that several commands share, such as those of the protocol."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum

@@ -1,7 +1,5 @@
 """Readers of recorded drives and of point clouds, one for each format."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from cns_drake.base.drives.drive import (

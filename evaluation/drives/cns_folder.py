@@ -12,8 +12,6 @@ velocity, specific force. A drive that cns-drake exported also has a
 `scenario.yaml`.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from pathlib import Path
 from typing import Any

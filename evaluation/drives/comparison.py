@@ -4,8 +4,6 @@ Two drives along one route differ by their drivers. These are the quantities in
 which real drives are compared with simulated ones.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 import math
 

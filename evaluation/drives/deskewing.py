@@ -1,7 +1,5 @@
 """Undoing the distortion of scans that a moving LiDAR takes."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline

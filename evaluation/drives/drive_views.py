@@ -1,7 +1,5 @@
 """Drives that show another drive otherwise: moved, or with scans kept."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Mapping
 

@@ -7,8 +7,6 @@
 Poses are those of the LiDAR itself, one for each scan.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -22,8 +22,6 @@ and, as cns-drake exports a drive,
     sequences/NN/structures.json     what the instances are
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import itertools
 from pathlib import Path

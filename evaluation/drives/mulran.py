@@ -7,8 +7,6 @@ X_UB is the pose of the vehicle's base in the UTM grid, at 100 Hz; the base
 is on the ground. Times are whole nanoseconds.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -6,8 +6,6 @@
   frame of the sensor.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.base import points as clouds

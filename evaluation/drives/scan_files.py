@@ -1,7 +1,5 @@
 """Drives that are stored as one file for each scan."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Mapping
 from pathlib import Path

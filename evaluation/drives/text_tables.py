@@ -1,7 +1,5 @@
 """Tables of numbers as text, in which every row begins with a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation

@@ -7,8 +7,6 @@ few kilometres instead of thousands. A float32 resolves them to under a
 millimetre; easting and northing would have steps of 0.25 m.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

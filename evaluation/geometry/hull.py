@@ -1,7 +1,5 @@
 """Points in the convex hull of others, for flat clouds as well."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 

@@ -8,8 +8,6 @@ point are within r, then the k nearest of another one at distance d are within r
 before the search.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.base.compiled import compiled

@@ -1,7 +1,5 @@
 """Fast orders of many whole numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 _LARGEST_NUMBER = 2**62

@@ -1,7 +1,5 @@
 """Maps a drive while its scans are read for another purpose."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scans reduced to small pictures from above."""
 
-from __future__ import annotations
-
 import numpy as np
 
 # Side of a cell [m]; 256 of them across, so that a byte counts them.

@@ -6,8 +6,6 @@ starts at z = -2.5 m, so that ground at z = 0 is in the middle of a 5 m voxel. A
 voxel is represented by the centroid of its points.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

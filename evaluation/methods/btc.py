@@ -21,8 +21,6 @@ is a lean of keypoints on ground that leans sideways, which lowers scores there;
 Planes are found by `btc_planes`, keypoints and triangles by `btc_triangles`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal

@@ -10,8 +10,6 @@ Milford (arXiv 2409.03998), which uses one map of occupied cells; layers, poles
 and kerbs, and bits instead of a Fourier transform, are our ideas.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 import itertools

@@ -12,8 +12,6 @@ have lower ones than queries: a place is then aligned with none when it is kept,
 and a query with all places but with no other query.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial

@@ -1,7 +1,5 @@
 """The interface of place-recognition methods, and their registry."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib

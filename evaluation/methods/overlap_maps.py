@@ -5,8 +5,6 @@ in units of 2^-14, positions in half cells. Counts are therefore the same on
 every processor.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -25,8 +25,6 @@ heights). Deliberate differences:
 - Two scans without a column in common have no score.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math

@@ -4,8 +4,6 @@ The findings are the paper's own. By the aims the shipped cities were fitted and
 judged: TCR_sym and SOLiD's AUC were fitted to the paper; the rest was held out.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 import csv

@@ -1,7 +1,5 @@
 """Costs of a method: time to describe and to query, and memory for a place."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import pickle

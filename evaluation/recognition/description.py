@@ -1,7 +1,5 @@
 """Descriptions of a drive's places and queries, by methods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias

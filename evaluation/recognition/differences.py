@@ -1,7 +1,5 @@
 """Differences of AUC between methods on the same queries, and their doubt."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 

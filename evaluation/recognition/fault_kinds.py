@@ -1,7 +1,5 @@
 """Reasons for a wrong best place, from the scans of both drives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

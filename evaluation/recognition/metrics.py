@@ -19,8 +19,6 @@ In both modes R@N is the part of the queries with a match that have a match
 among their N best places.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

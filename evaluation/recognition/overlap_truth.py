@@ -9,8 +9,6 @@ The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import csv
 import math

@@ -1,7 +1,5 @@
 """The precision-recall curve, and the areas of many weighted ones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The measure is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
 methods have the same order on both sets, -1 if the opposite one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math

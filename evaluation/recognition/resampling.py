@@ -1,7 +1,5 @@
 """Confidence intervals by bootstrap over queries."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 

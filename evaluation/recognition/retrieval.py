@@ -4,8 +4,6 @@ Distances between query and database are between the positions of the sensor,
 in three dimensions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Scores between folders of single scans, for comparison with other code."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The scores of a method: their checks, the gate, and the order of places."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import contextlib
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of numbers: precision over recall, AUC over change."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The common part of all figures: colours, sizes and files."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

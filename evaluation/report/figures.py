@@ -5,8 +5,6 @@ depth buffer, and edges darkened where the depth steps (eye-dome lighting:
 Boucheny 2009), which shows shape without normals.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 import itertools

@@ -1,7 +1,5 @@
 """The results of a ladder: their numbers, tables, words and figure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 import math

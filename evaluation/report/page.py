@@ -3,8 +3,6 @@
 The page needs neither a network nor other files.
 """
 
-from __future__ import annotations
-
 import base64
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Drives and pairs, in the form that the page's script reads."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

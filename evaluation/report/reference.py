@@ -1,7 +1,5 @@
 """The reference of a report: published numbers, and claims to judge."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

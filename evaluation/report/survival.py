@@ -1,7 +1,5 @@
 """The survival of each method under structural change: tables and figure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The figures of a study and its report, from the results of its jobs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The methods that a study runs: those of the package, and the user's own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path

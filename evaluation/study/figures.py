@@ -1,7 +1,5 @@
 """The figures of a study: how they are drawn, file names, what they show."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder

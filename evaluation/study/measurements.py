@@ -1,7 +1,5 @@
 """Measurements between two surveyed recordings."""
 
-from __future__ import annotations
-
 import numpy as np
 from threadpoolctl import threadpool_limits
 

@@ -5,8 +5,6 @@ the values. Arrays follow it as NumPy stores them, with all bits. Dataclasses
 are made of their fields, without running their code.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import io

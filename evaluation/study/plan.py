@@ -1,7 +1,5 @@
 """The whole benchmark: its jobs, and the report of a folder of recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Each method has two results, without the gate and with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias

@@ -5,8 +5,6 @@ before or after the drive is recorded. The job therefore has the source of the
 drive, not the drive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 import io

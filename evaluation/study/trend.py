@@ -4,8 +4,6 @@ One query drive is compared with many databases, from cities that changed more
 or less. Each pair gives a TCR_sym and, for each method, an AUC.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 import math
 from pathlib import Path

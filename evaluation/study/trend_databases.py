@@ -3,8 +3,6 @@
 Each database is a separate job.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math

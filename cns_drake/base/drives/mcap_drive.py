@@ -1,7 +1,5 @@
 """Drives recorded as MCAP by cns-drake (or by others on the same topics)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path

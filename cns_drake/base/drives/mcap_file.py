@@ -8,8 +8,6 @@ file, so that opening a file of gigabytes reads a few kilobytes.
 The package checks only the checksums of chunks, and trusts the sizes that a
 chunk claims. Here damaged or hostile records are refused."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor

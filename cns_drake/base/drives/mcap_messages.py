@@ -1,7 +1,5 @@
 """Decodes messages of a recording, and refuses oversized or contrary ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 import struct

@@ -5,8 +5,6 @@ uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is PointXYZIRT of Velodyne's
 ROS 2 driver; `autoware` is PointXYZIRCAEDT. These layouts have no field for
 labels and instances, which come in another message."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any, Literal, get_args
 

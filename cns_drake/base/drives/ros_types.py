@@ -5,8 +5,6 @@ here: vision_msgs in version 4, which is Humble's, and foxglove_msgs after
 Foxglove's schemas. A recording contains the text of its types.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore

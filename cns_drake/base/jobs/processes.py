@@ -7,8 +7,6 @@ does not reach the other jobs. On Linux the processes are forked from one of
 seconds. On other systems the libraries do not support forks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 import contextlib
 import gc

@@ -4,8 +4,6 @@ A step leaves files and nothing else. An interrupted study goes on where it was
 when the same steps are run again, on any machine.
 """
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass

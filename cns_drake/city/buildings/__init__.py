@@ -7,8 +7,6 @@ of the same name, draws the other parameters and builds it; `sample` does both:
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 import re

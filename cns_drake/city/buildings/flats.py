@@ -1,7 +1,5 @@
 """Flats around a court, around a stair, in a garden."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Halls under one wide roof: barns, sports halls, sheds at the water."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -13,8 +13,6 @@ meshes of one model as OBJ files, and `model.yaml`:
       rgb: [0.8, 0.74, 0.64]
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from functools import cache
 from pathlib import Path

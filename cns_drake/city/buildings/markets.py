@@ -1,7 +1,5 @@
 """Shops of one storey: a strip, a row of kiosks, a supermarket."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.city.facades import bays, details, house_walls, massing, roofs

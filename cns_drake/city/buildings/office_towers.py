@@ -1,7 +1,5 @@
 """Towers of offices, one of them under construction."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import itertools
 

@@ -1,7 +1,5 @@
 """Roofs on posts: gas stations, and pavilions in parks."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

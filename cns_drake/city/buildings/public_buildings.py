@@ -1,7 +1,5 @@
 """Buildings for everybody: schools and chapels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings

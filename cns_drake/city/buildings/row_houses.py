@@ -1,7 +1,5 @@
 """Houses in a row: single, as a terrace, above a shop."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import math

@@ -1,7 +1,5 @@
 """Blocks along a street: shops below, flats or offices above."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Towers that step back: setbacks, podiums, a hotel behind its forecourt."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

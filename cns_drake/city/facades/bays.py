@@ -4,8 +4,6 @@ A bay fills a stretch x0..x1 of a wall with relief; a layout repeats bays
 along the walls of a storey. All heights are above the storey's floor [m].
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from cns_drake.city.facades.walls import Arch, Layout, Patch, Relief

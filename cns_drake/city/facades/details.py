@@ -4,8 +4,6 @@ A detail is placed on a wall by a `WallFrame`, in whose coordinates x runs
 along the wall, y outwards and z up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Sequence
 import math
 

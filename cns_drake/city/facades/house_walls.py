@@ -1,7 +1,5 @@
 """The walls of a wing: windows and doors where no other wing hides them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 import itertools
 

@@ -4,8 +4,6 @@ Outlines are (N, 2) corners, counter-clockwise, the front edge first; every
 solid is closed from the sides that can be seen and wound outwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 import itertools
 import math

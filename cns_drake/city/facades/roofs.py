@@ -5,8 +5,6 @@ points, `across` rising. The roof lies along x, its line in y, unless
 `along_y` turns it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Stacks storeys into a building: ground floor, storeys, crown, roof."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math

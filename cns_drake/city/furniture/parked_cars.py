@@ -4,8 +4,6 @@ Vehicle frame: x forward, y left, z up; the origin is on the ground below the
 middle of the vehicle.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

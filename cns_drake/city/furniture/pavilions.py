@@ -1,7 +1,5 @@
 """Things of squares, parks and yards: fences, monuments, pavilions, swings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

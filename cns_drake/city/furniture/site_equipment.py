@@ -1,7 +1,5 @@
 """Objects on construction sites and at roadworks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.city.geometry.structures import (

@@ -3,8 +3,6 @@
 The front of each faces +x; arms reach along it, over the road.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

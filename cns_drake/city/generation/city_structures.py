@@ -1,7 +1,5 @@
 """From a road network and a plan to all structures of a city."""
 
-from __future__ import annotations
-
 from collections.abc import (
     Callable,
     Container,

@@ -1,7 +1,5 @@
 """Writes a city's stages, meshes and table of structures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 import csv
 import io

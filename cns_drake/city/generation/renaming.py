@@ -1,7 +1,5 @@
 """Brings the names in `stages.yaml` up to a plan that has grown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase

@@ -4,8 +4,6 @@ A user who has drawn `roads.yaml` gets a plan of districts, two stages and two
 drives, as files to change at will.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Polygons of the ground: triangles, tiles, surfaces, walls, taken places."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 import math
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """Structures: the named things a city is made of, and their parts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math

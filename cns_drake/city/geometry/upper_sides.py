@@ -1,7 +1,5 @@
 """The sides of triangles that look upwards, and their height at any place."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 

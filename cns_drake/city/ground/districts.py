@@ -1,7 +1,5 @@
 """Divides the ground between the streets among a plan's districts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import shapely

@@ -5,8 +5,6 @@ that meets every sidewalk at its height. Buildings and terraces hold level
 pads in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The surfaces of streets: carriageway, kerbs, sidewalks, medians, paint."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import itertools

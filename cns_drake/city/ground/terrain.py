@@ -1,7 +1,5 @@
 """The ground of districts: lawns with relief, paving, water behind quays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 import math

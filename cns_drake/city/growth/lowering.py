@@ -4,8 +4,6 @@ The part below the height stays as it is, to the millimetre: the street shows
 the same front. Above it the building gets a new roof.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 Plants are younger, buildings lower or under construction, or their lots are in
 another use."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 import math

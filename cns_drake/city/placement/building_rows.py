@@ -1,7 +1,5 @@
 """Buildings at given places and in rows along the streets."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 import math
 

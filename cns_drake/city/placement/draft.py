@@ -1,7 +1,5 @@
 """A city in the making: the structures placed so far."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Lines along streets, and lots cut off along them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Every kind of small object that a city can place, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

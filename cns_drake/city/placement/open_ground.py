@@ -1,7 +1,5 @@
 """Objects on a district's own ground: trees, hedges, cars, benches."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import itertools
 import math

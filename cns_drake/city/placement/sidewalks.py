@@ -1,7 +1,5 @@
 """Objects along the streets: lights, signs, lamps, trees, parked cars."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import math
 

@@ -1,7 +1,5 @@
 """Stages of a city: how much younger than the whole city each one is."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Trees and low greenery."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 import string

@@ -5,8 +5,6 @@ objects; in a drive (.jsonl) a first line of that type is followed by a
 feature a line, each with vertices of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Structures of the objects of a CityJSON file."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 import re

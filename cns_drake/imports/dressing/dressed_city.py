@@ -1,7 +1,5 @@
 """All buildings of an imported city, dressed."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace

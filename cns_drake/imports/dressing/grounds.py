@@ -1,7 +1,5 @@
 """The ground of a dressed city: kerbs, sidewalks, streets, paving, marks."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Small things along streets: those of the file, and others at random."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace

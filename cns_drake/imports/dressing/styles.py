@@ -1,7 +1,5 @@
 """The look of a building: from its tags, or else at random."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum

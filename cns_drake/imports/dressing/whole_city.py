@@ -1,7 +1,5 @@
 """Dresses a whole imported city, and records the origin of each part."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

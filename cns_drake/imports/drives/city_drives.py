@@ -1,7 +1,5 @@
 """Drives in the lanes of a city's streets, or else through its free space."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The room for a car between the buildings of an imported city."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The first drive is about the longest of the shortest ways. The second one shares
 its middle, and leaves it by an arm at either end. A `WayGraph` defines the
 pieces of a way: cells between buildings, or lanes of streets."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

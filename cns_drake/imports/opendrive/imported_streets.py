@@ -4,8 +4,6 @@ The lanes of a junction often lack the shoulders of the roads that lead to it:
 in the file the kerb of the road then steps aside. Kerbs that are built swing
 over, along tapers."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise

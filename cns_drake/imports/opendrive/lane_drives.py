@@ -1,7 +1,5 @@
 """Drives and traffic in the lanes of an imported road network."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

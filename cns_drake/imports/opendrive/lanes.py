@@ -2,8 +2,6 @@
 
 Borders are sampled closely enough for LiDAR."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -6,8 +6,6 @@ middle from left to right. A line on the border of two lanes lies half on each
 of them. Where one of them is no carriageway, the import moves the line off the
 stones of the kerb, below which half of it would lie."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 

@@ -3,8 +3,6 @@
 The course is made of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE 1.7,
 chapter 8, https://www.asam.net/standards/detail/opendrive"""
 
-from __future__ import annotations
-
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 import math

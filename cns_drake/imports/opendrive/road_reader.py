@@ -4,8 +4,6 @@ The import joins lanes where they meet and does not use the links of roads,
 lanes and junctions. A link to something that is not in the file is still
 reported as a fault."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 import math

@@ -1,7 +1,5 @@
 """Signals and objects beside the roads of OpenDRIVE, and their structures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import math
 import zlib

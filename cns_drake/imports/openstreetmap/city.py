@@ -2,8 +2,6 @@
 
 OpenStreetMap has no heights above sea level: the ground is level."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from pathlib import Path

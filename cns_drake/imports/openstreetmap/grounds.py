@@ -3,8 +3,6 @@
 https://wiki.openstreetmap.org/wiki/Map_features
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 

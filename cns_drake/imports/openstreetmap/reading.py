@@ -1,7 +1,5 @@
 """Reads the parts of an OpenStreetMap file that make a city."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 import math

@@ -1,7 +1,5 @@
 """Streets of OpenStreetMap, their bridges and tunnels: surfaces and lanes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass

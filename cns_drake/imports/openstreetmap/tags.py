@@ -6,8 +6,6 @@ https://wiki.openstreetmap.org/wiki/Key:building:levels,
 https://wiki.openstreetmap.org/wiki/Key:lanes,
 https://wiki.openstreetmap.org/wiki/Key:maxspeed"""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 import re
 from typing import NamedTuple

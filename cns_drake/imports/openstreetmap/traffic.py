@@ -1,7 +1,5 @@
 """Lanes of OpenStreetMap's streets, joined at junctions, for traffic."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet

@@ -1,7 +1,5 @@
 """Walkways beside imported streets, and crossings between them."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise, product

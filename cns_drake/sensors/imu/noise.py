@@ -1,7 +1,5 @@
 """The errors of an IMU, as functions of the number of a sample."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

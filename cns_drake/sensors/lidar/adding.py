@@ -1,7 +1,5 @@
 """Adding a LiDAR to a diagram."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Any
 import warnings

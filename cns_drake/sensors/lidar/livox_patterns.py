@@ -5,8 +5,6 @@ beam is not published as a formula; each class states its assumptions.
 Directions depend only on the time, so that a frame is always the same.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
 

@@ -1,7 +1,5 @@
 """The measurement of true ranges: noise, losses, rounding."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 import math

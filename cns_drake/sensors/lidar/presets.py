@@ -1,7 +1,5 @@
 """Beam patterns of commercial units, from their data sheets."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, NamedTuple
 

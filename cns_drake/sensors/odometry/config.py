@@ -1,7 +1,5 @@
 """The description of odometry."""
 
-from __future__ import annotations
-
 from cns_drake.sensors.sensor_config import Section
 
 

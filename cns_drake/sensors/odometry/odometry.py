@@ -1,7 +1,5 @@
 """Ground-truth odometry of a body."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from pydrake.common.value import AbstractValue, Value

@@ -1,7 +1,5 @@
 """Echoes: what a unit reports of the returning light of each beam."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 from typing import NamedTuple

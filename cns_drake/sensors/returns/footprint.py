@@ -7,8 +7,6 @@ half. The surface that it meets gets that part of the light. The mean over beams
 is then that of the whole profile.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

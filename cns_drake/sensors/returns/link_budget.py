@@ -11,8 +11,6 @@ the two rows of its data sheet, the ranges at 80 % and 10 % reflectivity.
 alpha_0 covers all differences of the two rows from 1 / r^2.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 from statistics import NormalDist

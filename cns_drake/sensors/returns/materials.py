@@ -8,8 +8,6 @@ minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at 30 m) and EN 12899-1
 (class RA1, 70 cd/lx/m2), times pi.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

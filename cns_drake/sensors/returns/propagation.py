@@ -9,8 +9,6 @@ equations for both of its faces. Light scattered by dust on it comes back
 directly, and so does mirrored light if the beam meets the pane at right angles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ A number depends only on a key, a beam and the number of the draw. Neither other
 beams nor the order of work change it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.base.compiled import compiled

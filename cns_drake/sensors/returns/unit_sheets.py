@@ -4,8 +4,6 @@ If a sheet lacks a value, a similar unit's is used, and `unknown` names the
 field.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 

@@ -16,8 +16,6 @@ Fog is a medium: alpha = ln 20 / V by the meteorological visibility V, and a
 back-scatter coefficient of 0.046 / V [1/(m sr)] (Rasshofer et al., 2011).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
