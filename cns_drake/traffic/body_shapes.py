@@ -1,5 +1,6 @@
 """Bodies of vehicles and walkers, made of simple shapes and meshes."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -81,7 +82,7 @@ def _round(
     end: tuple[float, float, float],
     rgb: Rgb,
 ) -> BodyShape:
-    length = float(np.linalg.norm(np.subtract(end, start)))
+    length = math.dist(start, end)
     return BodyShape(name, kind, (radius, length), "", start, end, rgb)
 
 

@@ -5,6 +5,7 @@ use or about to be used, there is room for it behind the way, and its signal is
 green. Vehicles never stop on a way, so that none waits for ever.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,7 +69,7 @@ def make_permits(graph: LaneGraph) -> Permits:
     crossings["waits"] = np.inf
     crossings["opened"] = crossings["closed"] = -np.inf
     crossings["length"] = [
-        np.linalg.norm(one.line[1] - one.line[0]) for one in graph.crossings
+        math.dist(one.line[0], one.line[1]) for one in graph.crossings
     ]
     return Permits(np.zeros(len(crossings), int), crossings)
 
