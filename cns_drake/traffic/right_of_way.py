@@ -15,8 +15,8 @@ from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.streets import WAIT, Streets, is_ego_far
 from cns_drake.traffic.vehicles import CURRENT, Occupants, choose_way
 
-# Signals: duration of a green phase, and of red for all after it [s]. Nobody
-# waits at red for a direction in which nobody comes.
+# Signals: duration of a green phase, and of red for all after it [s]. Red holds
+# only while another direction has vehicles.
 _GREEN, _RED = 27.0, 4.0
 # Traffic ahead of the ego car, if it comes within this time, goes first and
 # does not wait for signals [s].
@@ -222,7 +222,7 @@ def _is_green(
     Args:
         streets: the lanes, and the ego car.
         car: a record `VEHICLE`, in a lane.
-        asked: (J, phases) the phases of each junction in which somebody comes.
+        asked: (J, phases) the phases of each junction that a vehicle comes in.
         k: number of the time.
         dt: the step [s].
     """

@@ -323,7 +323,7 @@ def test_walkers_pass_what_stands_on_sidewalks():
 
 
 def test_a_third_of_walkers_walks_in_groups(short):
-    """Of two who begin near each other, most still are a minute later."""
+    """Most of two who begin near each other still are a minute later."""
     walkers = short.walkers.values[..., :2]
     apart = np.linalg.norm(walkers[:, :, None] - walkers[:, None], axis=3)
     apart[:, np.arange(40), np.arange(40)] = np.inf
