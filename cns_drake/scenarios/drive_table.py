@@ -10,7 +10,7 @@ import csv
 from dataclasses import astuple, dataclass, fields
 import io
 from pathlib import Path
-from typing import Any
+from typing import get_type_hints
 import zlib
 
 from cns_drake.base.csv_files import read_records
@@ -25,9 +25,6 @@ from cns_drake.scenarios.scenario_files import (
     read_scenario_file,
     world_file,
 )
-
-# Types of columns, by the names that dataclasses give them.
-_TYPES: dict[Any, Callable] = {"str": str, "int": int, "float": float}
 
 
 @dataclass(frozen=True)
@@ -140,11 +137,11 @@ def _read(path: Path) -> list[DriveRow]:
 
     The rows of a bad table are measured anew.
     """
-    columns = fields(DriveRow)
+    types = get_type_hints(DriveRow)
     try:
         return [
-            DriveRow(**{f.name: _TYPES[f.type](row[f.name]) for f in columns})
-            for _, row in read_records(path, [f.name for f in columns])
+            DriveRow(**{name: one(row[name]) for name, one in types.items()})
+            for _, row in read_records(path, list(types))
         ]
     except (InputError, ValueError):
         return []

@@ -88,7 +88,7 @@ def test_simulate_and_overwrite(files, tmp_path, capfd):
     assert result.returncode == 0
     assert "3 frames" in result.stdout
     assert (tmp_path / "drive" / "metadata.yaml").is_file()
-    assert "real time" in result.stderr
+    assert "real time" in result.stdout
     again = run_here(capfd, *arguments)
     assert again.returncode == 2
     assert_one_line(again, "drive")

@@ -256,7 +256,7 @@ def test_an_interrupted_run_leaves_nothing_and_goes_on(
 @pytest.mark.parametrize(
     ("file", "old", "new", "fault"),
     [
-        ("city.yaml", "seed: 3", "sead: 3", "{town}/city.yaml: seed: "),
+        ("city.yaml", "seed: 3", "sead: 3", "{town}/city.yaml: sead: "),
         ("city.yaml", "office: 1", "ofice: 1", "{town}: seed 4: city.yaml: "),
         ("city.yaml", "[30, -21]", "[30, 9]", "{town}: seed 4: city.yaml: "),
         ("roads.yaml", "west, end", "vest, end", "{town}: seed 4: roads.yaml"),

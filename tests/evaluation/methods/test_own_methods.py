@@ -31,7 +31,11 @@ def test_the_method_in_the_documents(capsys, towns, tmp_path, monkeypatch):
     assert status == 0
     values = json.loads(out)
     assert values["method"] == "heights"
-    assert values["parameters"] == {"sensor_height": 1.6, "rings": 30}
+    assert values["parameters"] == {
+        "sensor_height": 1.6,
+        "place": None,
+        "rings": 30,
+    }
     assert values["recall_at_1"] > 0.8
     assert_refused(capsys, [*both, "--set", "rings=x"], "heights: rings")
 
