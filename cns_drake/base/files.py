@@ -200,7 +200,7 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
     Raises:
         InputError: if the lock cannot be written.
     """
-    lock = path.with_name(f"{path.name}.lock")
+    lock = _lock_file(path)
     make_folder(path.parent)
     with contextlib.ExitStack() as stack:
         try:
@@ -213,11 +213,15 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
 
 def remove_lock(path: Path) -> None:
     """Removes the lock of a killed process, unless another one holds it."""
-    lock = path.with_name(f"{path.name}.lock")
+    lock = _lock_file(path)
     if lock.is_file():
         # What cannot be locked is in use, or no lock of ours.
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
             _lock(lock, stack, _refuse_to_wait)
+
+
+def _lock_file(path: Path) -> Path:
+    return path.with_name(f"{path.name}.lock")
 
 
 def _refuse_to_wait() -> None:
