@@ -1,7 +1,8 @@
-"""Reading JSON within bounds, and only with text that can be written."""
+"""Reading JSON within bounds, with text that can be written; its numbers."""
 
 import itertools
 import json
+import math
 import re
 from typing import Any
 
@@ -11,6 +12,11 @@ _STRING = re.compile(rb'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _NO_BRACKET = re.compile(rb"[^][{}]+")
 # Escapes of a zero, or of half a pair of surrogates.
 _SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
+
+
+def json_number(value: float) -> float | None:
+    """Returns a number as JSON can hold it: None for NaN."""
+    return None if math.isnan(value) else value
 
 
 def parse_json(data: bytes) -> Any:

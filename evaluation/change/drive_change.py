@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
@@ -89,9 +89,9 @@ class ChangeReport:
         values = {
             "source": self.source,
             "target": self.target,
-            "tcr_sym": _number(change.symmetric),
-            "tcr_source_to_target": _number(change.source_to_target.ratio),
-            "tcr_target_to_source": _number(change.target_to_source.ratio),
+            "tcr_sym": json_number(change.symmetric),
+            "tcr_source_to_target": json_number(change.source_to_target.ratio),
+            "tcr_target_to_source": json_number(change.target_to_source.ratio),
             "in_hull": change.num_in_hull,
             "unchanged": change.num_unchanged,
             "voxels": _both(
@@ -291,7 +291,7 @@ def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
 
 def _summary(change: TemporalChange) -> dict:
     values: dict[str, float | str | None] = {
-        "tcr_sym": _number(change.symmetric),
+        "tcr_sym": json_number(change.symmetric),
         "in_hull": change.num_in_hull,
         "unchanged": change.num_unchanged,
     }
@@ -302,10 +302,6 @@ def _summary(change: TemporalChange) -> dict:
 
 def _both(source: int, target: int) -> dict:
     return {"source": source, "target": target}
-
-
-def _number(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,15 @@ which real drives are compared with simulated ones.
 
 from dataclasses import asdict, dataclass
 import math
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import json_number
+from evaluation.drives.sampling import travelled
 
 # Distance between the stops at which two drives are compared [m].
 STOP_SPACING = 5.0
@@ -115,14 +118,13 @@ class DriveComparison:
     def to_json(self) -> dict:
         """Returns all numbers; NaN becomes None."""
 
-        def plain(value: object) -> object:
-            if isinstance(value, dict):
-                return {name: plain(one) for name, one in value.items()}
-            if isinstance(value, float) and math.isnan(value):
-                return None
-            return value
+        def plain(fields: list[tuple[str, Any]]) -> dict:
+            return {
+                name: json_number(one) if isinstance(one, float) else one
+                for name, one in fields
+            }
 
-        return {name: plain(value) for name, value in asdict(self).items()}
+        return asdict(self, dict_factory=plain)
 
 
 @dataclass(frozen=True)
@@ -210,9 +212,8 @@ def _way(drive: Drive) -> _Way:
         if math.dist(p, p_WS[kept[-1]]) >= _LEAST_STEP:
             kept.append(frame)
     corners = p_WS[kept]
-    steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    length = float(travelled[-1])
+    passed = travelled(corners)
+    length = float(passed[-1])
     if length < STOP_SPACING:
         raise InputError(
             f"{drive.name}: it moves {length:.1f} m in all; drives are "
@@ -221,13 +222,13 @@ def _way(drive: Drive) -> _Way:
     s = np.arange(0.0, length, _PATH_SPACING)
 
     def at(s: np.ndarray) -> np.ndarray:
-        columns = [np.interp(s, travelled, column) for column in corners.T]
+        columns = [np.interp(s, passed, column) for column in corners.T]
         return np.stack(columns, axis=1)
 
     ahead = at(s + _DIRECTION_REACH) - at(s - _DIRECTION_REACH)
     tangent = ahead[:, :2]
     norm = np.linalg.norm(tangent, axis=1, keepdims=True)
-    last = np.searchsorted(travelled, s, side="right") - 1
+    last = np.searchsorted(passed, s, side="right") - 1
     return _Way(
         length, np.array(kept)[last], at(s), tangent / np.maximum(norm, 1e-9)
     )

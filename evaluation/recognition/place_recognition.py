@@ -10,6 +10,7 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
@@ -87,13 +88,15 @@ class PlaceRecognition:
             "auc": metrics.auc,
             "auc_strict": metrics.auc_strict,
             "auc_interval_95": _interval(metrics.auc_interval),
-            "recall_at_1": _number(metrics.recall_at_1),
-            "r1": _number(metrics.recall_at_1),
+            "recall_at_1": json_number(metrics.recall_at_1),
+            "r1": json_number(metrics.recall_at_1),
             "recall_at_1_interval_95": _interval(metrics.recall_at_1_interval),
             "recall_at_n": [
-                _number(float(value)) for value in metrics.recall_at_n
+                json_number(float(value)) for value in metrics.recall_at_n
             ],
-            "recall_at_1_percent": _number(float(metrics.recall_at_1_percent)),
+            "recall_at_1_percent": json_number(
+                float(metrics.recall_at_1_percent)
+            ),
             "f1_max": metrics.f1_max,
             "f1_max_true_positives": (
                 0 if index is None else int(metrics.curve.true_positives[index])
@@ -106,13 +109,15 @@ class PlaceRecognition:
             "true_positives": metrics.num_right,
             "places": len(self.retrieval.database_frames),
             "recall_at_full_precision": metrics.curve.recall_at_full_precision,
-            "mean_reciprocal_rank": _number(self.outcomes.mean_reciprocal_rank),
-            "match_auroc": _number(self.outcomes.match_auroc),
+            "mean_reciprocal_rank": json_number(
+                self.outcomes.mean_reciprocal_rank
+            ),
+            "match_auroc": json_number(self.outcomes.match_auroc),
             "auc_over_radius": {
-                f"{radius:g}": _number(auc)
+                f"{radius:g}": json_number(auc)
                 for radius, auc in self.auc_over_radius().items()
             },
-            "pose": {key: _number(value) for key, value in pose.items()},
+            "pose": {key: json_number(value) for key, value in pose.items()},
             "parameters": self.parameters,
             "protocol": self.protocol.to_json(),
         }
@@ -212,11 +217,7 @@ def judge_retrieval(
 
 
 def _interval(interval: Interval) -> list[float | None]:
-    return [_number(interval.low), _number(interval.high)]
-
-
-def _number(value: float) -> float | None:
-    return None if math.isnan(value) else value
+    return [json_number(interval.low), json_number(interval.high)]
 
 
 @dataclass(frozen=True)

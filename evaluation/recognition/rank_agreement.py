@@ -6,7 +6,6 @@ methods have the same order on both sets, -1 if the opposite one.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-import math
 from pathlib import Path
 import warnings
 
@@ -15,6 +14,7 @@ from scipy.stats import kendalltau
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import json_number
 from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.resampling import (
@@ -55,8 +55,8 @@ class RankAgreement:
         """Returns all numbers; NaN becomes None."""
         low, high = self.interval.low, self.interval.high
         return {
-            "kendall_tau": _number(self.tau),
-            "interval_95": [_number(low), _number(high)],
+            "kendall_tau": json_number(self.tau),
+            "interval_95": [json_number(low), json_number(high)],
             "methods": {
                 method: {"first": float(one), "second": float(other)}
                 for method, one, other in zip(
@@ -168,7 +168,3 @@ def _tau(first: np.ndarray, second: np.ndarray) -> float:
         # SciPy warns if all values are equal; the result is then NaN.
         warnings.simplefilter("ignore")
         return float(kendalltau(first, second).statistic)
-
-
-def _number(value: float) -> float | None:
-    return None if math.isnan(value) else value

@@ -11,6 +11,7 @@ import zlib
 from matplotlib import image
 import numpy as np
 
+from evaluation.drives.sampling import sample_frames
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
@@ -102,13 +103,11 @@ def make_drive(
         pil_kwargs={"quality": _WEBP_QUALITY},
     )
     chosen = np.array(frames, dtype=np.int64)
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    passed = np.floor(np.concatenate([[0.0], np.cumsum(steps)]) / _ROUTE_STEP)
     return PageDrive(
         name=name,
         frames=chosen,
         X_WS=X_WS[chosen],
-        route=positions[np.flatnonzero(np.diff(passed, prepend=-1.0)), :2],
+        route=positions[sample_frames(positions, _ROUTE_STEP), :2],
         thumbnails=thumbnails,
         view=stream.getvalue(),
         extent=view.extent,
