@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.base.points import store
 from evaluation.clouds.record_blocks import check_size, read_binary, read_text
 
 _KINDS = {"F": "f", "I": "i", "U": "u"}
@@ -39,9 +38,7 @@ def read_pcd(path: Path, block: int) -> Iterator[np.ndarray]:
     if encoding == "ascii":
         # A point takes at least one byte, which bounds the buffer.
         check_size(path, offset + count, exactly=False)
-        return read_text(
-            path, offset, count, block, lambda rows: _to_points(rows, dtype)
-        )
+        return read_text(path, offset, count, block, dtype, "PCD")
     if encoding == "binary":
         check_size(path, offset + count * dtype.itemsize, exactly=True)
         return read_binary(path, dtype, offset, count, block)
@@ -109,23 +106,6 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
     return dtype, number
 
 
-def _to_points(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    """Returns points from rows of numbers."""
-    if len(values) == 0:
-        return np.empty(0, dtype)
-    names = dtype.names or ()
-    widths = [_width(dtype, name) for name in names]
-    if values.shape[1] != sum(widths):
-        raise ValueError(
-            f"PCD: {values.shape[1]} numbers in a row instead of {sum(widths)}"
-        )
-    points = np.empty(len(values), dtype=dtype)
-    columns = np.split(values, np.cumsum(widths)[:-1], axis=1)
-    for name, column in zip(names, columns, strict=True):
-        store(points, name, column.reshape(points[name].shape))
-    return points
-
-
 def _read_compressed(
     path: Path, offset: int, dtype: np.dtype, count: int, block: int
 ) -> Iterator[np.ndarray]:
@@ -168,11 +148,6 @@ def _interleaved(
         points[name] = column.reshape(count, *scalar.shape)[part]
         start = end
     return points
-
-
-def _width(dtype: np.dtype, name: str) -> int:
-    """Returns the number of values in a field."""
-    return int(np.prod(dtype[name].shape))
 
 
 @compiled

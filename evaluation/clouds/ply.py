@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.points import store
 from evaluation.clouds.record_blocks import check_size, read_binary, read_text
 
 _TYPES = {
@@ -51,14 +50,8 @@ def read_ply(path: Path, block: int) -> Iterator[np.ndarray]:
     if encoding == "ascii":
         # A vertex takes at least one byte.
         check_size(path, offset + count, exactly=False)
-        return read_text(
-            path,
-            offset,
-            count,
-            block,
-            lambda rows: _to_vertices(rows, dtype),
-            more=not alone,
-        )
+        more = not alone
+        return read_text(path, offset, count, block, dtype, "PLY", more)
     check_size(path, offset + count * dtype.itemsize, exactly=alone)
     return read_binary(path, dtype, offset, count, block)
 
@@ -112,18 +105,3 @@ def _describe_vertices(
         if name not in dict(fields) or dtype[name].kind != "f":
             raise ValueError(f"PLY header: no floating-point property {name}")
     return dtype, count
-
-
-def _to_vertices(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    """Returns vertices from rows of numbers."""
-    names = dtype.names or ()
-    vertices = np.empty(len(values), dtype=dtype)
-    if len(values) and values.shape[1] != len(names):
-        raise ValueError(
-            f"PLY: {values.shape[1]} numbers in a row instead of {len(names)}"
-        )
-    if len(values) == 0:
-        return vertices
-    for column, name in enumerate(names):
-        store(vertices, name, values[:, column])
-    return vertices

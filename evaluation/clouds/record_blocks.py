@@ -4,12 +4,15 @@ A memory-mapped file would end the process without a message (SIGBUS) if another
 program shortened it meanwhile.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import itertools
+import math
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+
+from cns_drake.base.points import store
 
 # Enough for rows of some tens of numbers with some tens of characters.
 _LONGEST_LINE_BYTES = 1 << 16
@@ -48,7 +51,8 @@ def read_text(
     offset: int,
     count: int,
     block: int,
-    convert: Callable[[np.ndarray], np.ndarray],
+    dtype: np.dtype,
+    kind: str,
     more: bool = False,
 ) -> Iterator[np.ndarray]:
     """Yields rows of numbers as records; like `read_binary`.
@@ -58,12 +62,13 @@ def read_text(
         offset: where the rows begin [bytes].
         count: how many there are.
         block: how many to yield at once.
-        convert: makes (N,) records of (N, K) float64.
+        dtype: type of a record.
+        kind: the kind of file, for errors.
         more: whether something else follows.
 
     Raises:
-        ValueError: if the file ends too early or goes on, or as `convert`
-            does.
+        ValueError: if the file ends too early or goes on, or a row has another
+            number of values than a record.
         OSError: if it cannot be read.
     """
     with open(path, "rb") as stream:
@@ -76,11 +81,12 @@ def read_text(
                 raise ValueError(
                     f"{start + len(texts)} instead of {count} rows of numbers"
                 )
-            yield convert(np.loadtxt(texts, np.float64, ndmin=2))
+            values = np.loadtxt(texts, np.float64, ndmin=2)
+            yield _to_records(values, dtype, kind)
         if not more and next(lines, None) is not None:
             raise ValueError(f"more than the {count} rows of the header")
     if count == 0:
-        yield convert(np.empty((0, 0)))
+        yield np.empty(0, dtype)
 
 
 def check_size(path: Path, needed: int, exactly: bool) -> None:
@@ -110,3 +116,19 @@ def _lines(stream: BinaryIO) -> Iterator[bytes]:
             raise ValueError("a line is too long for a row of numbers")
         if line.strip() and not line.lstrip().startswith(b"#"):
             yield line
+
+
+def _to_records(values: np.ndarray, dtype: np.dtype, kind: str) -> np.ndarray:
+    """Returns (N,) records of a type from rows of numbers (N, K)."""
+    names = dtype.names or ()
+    widths = [math.prod(dtype[name].shape) for name in names]
+    if values.shape[1] != sum(widths):
+        raise ValueError(
+            f"{kind}: {values.shape[1]} numbers in a row instead of"
+            f" {sum(widths)}"
+        )
+    records = np.empty(len(values), dtype)
+    columns = np.split(values, np.cumsum(widths)[:-1], axis=1)
+    for name, column in zip(names, columns, strict=True):
+        store(records, name, column.reshape(records[name].shape))
+    return records
