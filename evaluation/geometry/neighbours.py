@@ -1,14 +1,15 @@
 """The nearest neighbours of every point of a cloud within the cloud.
 
 This is faster than a tree query for each point, because nearby points share the
-search. The cloud is cut into groups of nearby points, and a group determines
-once which other groups can hold neighbours of its points. If the k nearest of a
-point are within r, then the k nearest of another one at distance d are within r
-+ d. Points in order of place therefore have a bound of their neighbourhood
-before the search.
+search. A k-d tree cuts the cloud into groups, and a group determines once which
+other groups can hold neighbours of its points. If the k nearest of a point are
+within r, then the k nearest of another one at distance d are within r + d.
+Points in order of place therefore have a bound of their neighbourhood before
+the search.
 """
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from cns_drake.base.compiled import compiled
 
@@ -42,9 +43,18 @@ def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
             f"{k} neighbours are wanted, but there are only {len(points)} "
             "points"
         )
-    cloud = np.ascontiguousarray(points.T, dtype=np.float64)
-    order, starts = _group(cloud, _GROUP_SIZE)
-    return _search(np.ascontiguousarray(cloud[:, order]), order, starts, k)
+    points = np.asarray(points, dtype=np.float64)
+    # The tree halves the points again and again: parts of equal size are leaves
+    # of it, or nearly so.
+    order = KDTree(points, leafsize=_GROUP_SIZE).indices.astype(np.int32)
+    num_groups = 2 ** int(np.log2(max(len(points) // _GROUP_SIZE, 1)))
+    starts = np.linspace(0, len(points), num_groups + 1).astype(np.int64)
+    cloud = np.ascontiguousarray(points[order].T)
+    boxes = [
+        least_or_greatest.reduceat(cloud, starts[:-1], axis=1)
+        for least_or_greatest in (np.minimum, np.maximum)
+    ]
+    return _search(cloud, order, starts, np.concatenate(boxes), k)
 
 
 @compiled
@@ -92,64 +102,20 @@ def _select(
 
 
 @compiled
-def _group(cloud: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cuts a cloud into groups, halving parts across their longest side.
-
-    Args:
-        cloud: (3, N).
-        size: least number of points in a group, if there are so many.
-
-    Returns:
-        (N,) int32 points, group after group; (G + 1,) where each group
-        starts, and the last one ends.
-    """
-    num_points = cloud.shape[1]
-    order = np.arange(num_points).astype(np.int32)
-    keys = np.empty(num_points)
-    starts = np.empty(num_points // size + 2, np.int64)
-    num_groups = 0
-    # Ends of the parts still to be cut; the nearest one is on top.
-    ends = np.empty(64, np.int64)
-    ends[0] = num_points
-    depth = 1
-    start = 0
-    while depth > 0:
-        end = ends[depth - 1]
-        if end - start < 2 * size:
-            starts[num_groups] = start
-            num_groups += 1
-            start = end
-            depth -= 1
-            continue
-        axis, longest = 0, -1.0
-        for candidate in range(3):
-            least, most = np.inf, -np.inf
-            for index in range(start, end):
-                value = cloud[candidate, order[index]]
-                least = min(least, value)
-                most = max(most, value)
-            if most - least > longest:
-                axis, longest = candidate, most - least
-        for index in range(start, end):
-            keys[index] = cloud[axis, order[index]]
-        half = (end - start) // 2
-        _select(keys, order, start, end, half)
-        ends[depth] = start + half
-        depth += 1
-    starts[num_groups] = num_points
-    return order, starts[: num_groups + 1]
-
-
-@compiled
 def _search(
-    cloud: np.ndarray, order: np.ndarray, starts: np.ndarray, k: int
+    cloud: np.ndarray,
+    order: np.ndarray,
+    starts: np.ndarray,
+    boxes: np.ndarray,
+    k: int,
 ) -> np.ndarray:
     """Finds the neighbours, group by group.
 
     Args:
         cloud: (3, N) in the order of the groups, N >= k.
         order: (N,) index of each point in the caller's cloud.
-        starts: (G + 1,) of the groups.
+        starts: (G + 1,) where each group starts, and the last one ends.
+        boxes: (6, G) least and greatest coordinates of the groups.
         k: how many.
 
     Returns:
@@ -159,7 +125,6 @@ def _search(
     x, y, z = cloud[0], cloud[1], cloud[2]
     num_points = len(x)
     num_groups = len(starts) - 1
-    boxes = _boxes(cloud, starts)
     result = np.empty((num_points, k), np.int32)
     # Distance of each point's k-th neighbour.
     radius = np.empty(num_points)
@@ -230,18 +195,6 @@ def _search(
                         num_others += 1
                 others, other_boxes = near_groups, near_boxes
     return result
-
-
-@compiled
-def _boxes(cloud: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Returns the bounding boxes of groups, (6, G): least and greatest."""
-    boxes = np.empty((6, len(starts) - 1))
-    for group in range(len(starts) - 1):
-        for axis in range(3):
-            values = cloud[axis, starts[group] : starts[group + 1]]
-            boxes[axis, group] = values.min()
-            boxes[3 + axis, group] = values.max()
-    return boxes
 
 
 @compiled
