@@ -43,6 +43,21 @@ def ladder(
             "Every one by default.",
         ),
     ] = None,
+    viewpoint: Annotated[
+        str,
+        typer.Option(
+            metavar="near|lane|reversed",
+            help="Where the database is driven on all rungs: 0.5 m beside the "
+            "queries, 5 m, or 5 m and facing backwards.",
+        ),
+    ] = "near",
+    pairs: Annotated[
+        bool,
+        typer.Option(
+            "--pairs",
+            help="Also cross the six causes that cost most two by two.",
+        ),
+    ] = False,
     seeds: Annotated[
         int,
         typer.Option(
@@ -71,35 +86,59 @@ def ladder(
             QUICK_PROTOCOL,
             climb_ladder,
         )
-        from cns_drake.studies.ladder_rungs import CAUSES, Extent
+        from cns_drake.studies.ladder_rungs import (
+            CAUSES,
+            EXTRAS,
+            NEAR,
+            VIEWPOINTS,
+            Extent,
+        )
         from cns_drake.studies.levels import LEVELS_EXTENT, LEVELS_PROTOCOL
-        from evaluation.recognition.protocol import PAPER_PROTOCOL
+        from evaluation.recognition.protocol import DEFAULT_PROTOCOL
         from evaluation.study.chosen_methods import choose_methods
 
-    if levels and (quick or cause or seeds > 1):
+    if viewpoint not in VIEWPOINTS:
+        known = ", ".join(VIEWPOINTS)
         raise InputError(
-            "--levels: the levels are frozen; leave out --quick, --cause and "
-            "--seeds"
+            f"--viewpoint: no viewpoint {viewpoint!r} (there are: {known})"
+        )
+    is_own = quick or cause or seeds > 1 or pairs or viewpoint != NEAR
+    if levels and is_own:
+        raise InputError(
+            "--levels: the levels are frozen; leave out --quick, --cause, "
+            "--seeds, --pairs and --viewpoint"
         )
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or ())
     causes = tuple(cause or CAUSES)
     for name in causes:
-        if name not in CAUSES:
-            known = ", ".join(CAUSES)
+        if name not in (*CAUSES, *EXTRAS):
+            known = ", ".join((*CAUSES, *EXTRAS))
             raise InputError(f"--cause: no cause {name!r} (there are: {known})")
-    extent, protocol = Extent(), PAPER_PROTOCOL
+    extent, protocol = Extent(), DEFAULT_PROTOCOL
     if quick:
         extent, protocol = QUICK_EXTENT, QUICK_PROTOCOL
         note(
             "--quick leaves out: levels 1 to 3 (but where a cause has no level "
             "4), every other query, more than 300 places of other cities"
         )
-    extent = replace(extent, causes=causes, seeds=range(1, seeds + 1))
+    extent = replace(
+        extent,
+        causes=causes,
+        seeds=range(1, seeds + 1),
+        viewpoint=viewpoint,
+    )
     if levels:
         extent, protocol = LEVELS_EXTENT, LEVELS_PROTOCOL
     path, text = climb_ladder(
-        maps, output, cluster, methods, extent, protocol, on_note=note
+        maps,
+        output,
+        cluster,
+        methods,
+        extent,
+        protocol,
+        with_pairs=pairs,
+        on_note=note,
     )
     typer.echo(path)
     typer.echo(text)

@@ -147,26 +147,38 @@ class TrafficConfig(Section):
         seed: seed of their kinds, starts and ways.
         fcd: a trace of SUMO (floating-car data) to play instead; then nothing
             else moves.
+        queues: whether vehicles stand in queues in all lanes instead, as in a
+            rush hour. None is there while the car is; nothing else moves.
     """
 
     vehicles: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
     walkers: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
     seed: int = Field(default=1, ge=0)
     fcd: str | None = field_off_by_default(None)
+    queues: bool = field_off_by_default(False)
 
     @model_validator(mode="after")
-    def _check_fcd(self) -> TrafficConfig:
+    def _check_alone(self) -> TrafficConfig:
         if self.fcd is not None and (self.vehicles or self.walkers):
             raise ValueError(
                 "fcd: the trace replaces other traffic; give no vehicles and "
                 "walkers"
+            )
+        if self.queues and (self.vehicles or self.walkers or self.fcd):
+            raise ValueError(
+                "queues: they replace other traffic; give no vehicles, walkers "
+                "and fcd"
             )
         return self
 
     @property
     def is_off(self) -> bool:
         """Whether there is no traffic."""
-        return self.fcd is None and self.vehicles == self.walkers == 0
+        return (
+            self.fcd is None
+            and self.vehicles == self.walkers == 0
+            and not self.queues
+        )
 
 
 class TransientConfig(Section):

@@ -33,7 +33,11 @@ from cns_drake.traffic.lane_graph import LaneGraph, Walkway, kept_clear
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_adding import traffic_structures
-from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
+from cns_drake.traffic.traffic_plan import (
+    TrafficPlan,
+    plan_queues,
+    plan_traffic,
+)
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.transient.changing import change_world
@@ -235,6 +239,14 @@ def plan_scenario_traffic(
             seed=wanted.seed,
             duration=(num_frames - 1) * scenario.frame_period,
             end=trajectory.duration,
+            ego=ego,
+            ego_box=EGO_BOX,
+        )
+    if wanted.queues:
+        return plan_queues(
+            graph,
+            seed=wanted.seed,
+            duration=trajectory.duration,
             ego=ego,
             ego_box=EGO_BOX,
         )

@@ -4,7 +4,9 @@ A drive queries a database with the same route through the same city, with one
 cause of change between the two at a time. Nothing is recorded.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 import itertools
 from pathlib import Path
@@ -22,17 +24,26 @@ from cns_drake.scenarios.scenario_files import load_scenario, map_folder
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.ladder_rungs import (
+    ALL,
+    APART,
+    NEAR,
+    NONE,
     Extent,
     Rung,
     plain_drives,
+    plan_pairs,
     plan_rungs,
 )
 from cns_drake.studies.redrawing import redraw_cities
 from cns_drake.studies.reproduction import recordable_map
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import (
+    DEFAULT_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.report.ladder import (
+    LadderRow,
     LadderRung,
     MeasuredRung,
     draw_ladder,
@@ -40,6 +51,9 @@ from evaluation.report.ladder import (
     ladder_rows,
     ladder_table,
     ladder_text,
+    pair_table,
+    pair_text,
+    strongest_causes,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
@@ -49,7 +63,9 @@ from evaluation.study.surveys import DescribeDrive
 # With --quick only the strongest level of each cause is measured, on every
 # other query.
 QUICK_EXTENT = Extent(levels=(4,), most_places=300)
-QUICK_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
+QUICK_PROTOCOL = replace(DEFAULT_PROTOCOL, query_spacing=20.0)
+# Number of causes that are crossed two by two.
+_CROSSED = 6
 
 # Expected seconds: to describe a drive, and for a rung.
 _DESCRIPTION_COST = 30.0
@@ -65,7 +81,9 @@ def climb_ladder(
     cluster: Cluster,
     methods: tuple[MethodChoice, ...],
     extent: Extent,
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
+    *,
+    with_pairs: bool = False,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> tuple[Path, str]:
     """Measures all rungs of maps; writes tables, figure and findings.
@@ -80,7 +98,10 @@ def climb_ladder(
         cluster: where the work is done.
         methods: the methods to measure.
         extent: the part of the ladder.
-        protocol: that of place recognition; its gate does not matter.
+        protocol: that of place recognition; its gate does not matter. Causes
+            change its queries.
+        with_pairs: also cross the six causes that cost most two by two, and
+            write `pairs.csv`.
         on_note: receives notes on things that a map lacks.
 
     Returns:
@@ -93,13 +114,13 @@ def climb_ladder(
     query_drives = _query_drives(maps or shipped_maps())
     make_folder(output)
     files = StudyFiles(output.absolute())
-    jobs: dict[str, Job] = {}
-    climbed: list[tuple[Scenario, Rung, Part]] = []
+    plans: dict[str, _Plan] = {}
+    planned: list[tuple[Scenario, Rung]] = []
     for drive in query_drives:
         rungs, notes = plan_rungs(drive, extent)
         for text in notes:
             on_note(f"{drive.source}: {text}")
-        plan = _Plan(drive, methods, protocol, files)
+        plan = _Plan(drive, extent.viewpoint, methods, protocol, files)
         most = max(rung.drives.num_distractors for rung in rungs)
         if most:
             on_note(f"{drive.name}: looking for {most} places elsewhere")
@@ -112,19 +133,47 @@ def climb_ladder(
                 cluster,
             )
         )
-        climbed += [(drive, rung, plan.add_rung(rung)) for rung in rungs]
+        plans[drive.name] = plan
+        planned += [(drive, rung) for rung in rungs]
+    measured = _measure(planned, plans, cluster, protocol)
+    rows = ladder_rows(measured)
+    pairs: list[LadderRow] = []
+    if with_pairs:
+        apart = {NONE, ALL, *APART}
+        causes = [one for one in strongest_causes(rows) if one not in apart]
+        crossed = causes[:_CROSSED]
+        on_note(f"crossing two by two: {', '.join(crossed)}")
+        planned = [
+            (drive, rung)
+            for drive in query_drives
+            for rung in plan_pairs(drive, crossed, extent)
+        ]
+        measured += _measure(planned, plans, cluster, protocol)
+        pairs = ladder_rows(measured)[len(rows) :]
+    return _write(measured, rows, pairs, output, protocol, extent)
+
+
+def _measure(
+    planned: Sequence[tuple[Scenario, Rung]],
+    plans: Mapping[str, _Plan],
+    cluster: Cluster,
+    protocol: RetrievalProtocol,
+) -> list[MeasuredRung]:
+    """Measures rungs, each with the drive of its queries."""
+    parts = [plans[drive.name].add_rung(rung) for drive, rung in planned]
+    jobs: dict[str, Job] = {}
+    for plan in plans.values():
         jobs |= plan.jobs
     run_jobs(jobs.values(), cluster)
-    measured = [
+    return [
         MeasuredRung(
             _labelled(drive, rung, protocol),
             rung.seed,
             rung.fingerprint(),
             part.read(),
         )
-        for drive, rung, part in climbed
+        for (drive, rung), part in zip(planned, parts, strict=True)
     ]
-    return _write(measured, output, protocol)
 
 
 def _query_drives(maps: Iterable[str]) -> list[Scenario]:
@@ -150,13 +199,15 @@ class _Plan:
     def __init__(
         self,
         query_scenario: Scenario,
+        viewpoint: str,
         methods: tuple[MethodChoice, ...],
         protocol: RetrievalProtocol,
         files: StudyFiles,
     ):
         self.jobs: dict[str, Job] = {}
         self._query = query_scenario
-        self._plain = plain_drives(query_scenario)
+        self._plain = plain_drives(query_scenario, viewpoint)
+        self._viewpoint = viewpoint
         self._methods = methods
         self._protocol = protocol
         self._files = files
@@ -170,8 +221,9 @@ class _Plan:
         needs: list[str] = []
         others = self._distractors if rung.drives.num_distractors else ()
         name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
+        if self._viewpoint != NEAR:
+            name += f" {self._viewpoint}"
         part = self._files.rung(name)
-        radius = rung.drives.radius(self._protocol.radius)
         step = MakePart(
             part,
             measure_rung,
@@ -186,7 +238,7 @@ class _Plan:
                 ),
                 rung.drives.num_distractors,
                 self._methods,
-                replace(self._protocol, radius=radius),
+                rung.drives.protocol(self._protocol),
             ),
         )
         self.jobs[name] = Job(name, step, tuple(needs), _RUNG_COST)
@@ -197,7 +249,8 @@ class _Plan:
     ) -> DescribedSource:
         drive = getattr(rung.drives, side)
         # Only drives without a change serve several rungs.
-        if drive != getattr(self._plain, side):
+        is_changed = side == "query" and rung.drives.query_changes
+        if is_changed or drive != getattr(self._plain, side):
             return DriveSimulation(drive)
         files = self._describe(drive, role, needs)
         return files.scans, *self._descriptions(files)
@@ -246,15 +299,23 @@ def _labelled(
 
 
 def _write(
-    measured: Sequence[MeasuredRung], output: Path, protocol: RetrievalProtocol
+    measured: Sequence[MeasuredRung],
+    rows: Sequence[LadderRow],
+    pairs: Sequence[LadderRow],
+    output: Path,
+    protocol: RetrievalProtocol,
+    extent: Extent,
 ) -> tuple[Path, str]:
-    rows = ladder_rows(measured)
     text = ladder_text(rows)
     _write_text(output / "queries.csv", ladder_query_table(measured).to_csv())
     draw_ladder(rows, output / "ladder")
+    if pairs:
+        _write_text(output / "pairs.csv", pair_table(rows, pairs).to_csv())
+        text += f"\n\n{pair_text(rows, pairs)}"
     _write_text(output / "findings.txt", text + "\n")
     table = output / "ladder.csv"
-    _write_text(table, ladder_table(rows, protocol).to_csv())
+    found = ladder_table([*rows, *pairs], protocol, extent.viewpoint)
+    _write_text(table, found.to_csv())
     return table, text
 
 

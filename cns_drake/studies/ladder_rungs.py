@@ -3,20 +3,28 @@
 Each cause changes one of the two drives. The city at the time of mapping, the
 ride and the place of the mapping LiDAR change the drive of the database.
 Conditions and sensor of the later visit change the drive of the query, but
-never its route.
+never its route. Turned, tilted and partly hidden sensors see the same drive.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+import itertools
 import math
 from typing import Any
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.scenarios.scenario import RideConfig, Scenario, TrafficConfig
+from cns_drake.scenarios.scenario import (
+    REAL_DRIVER,
+    DriverConfig,
+    RideConfig,
+    Scenario,
+    TrafficConfig,
+)
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.sensors.lidar.config import WeatherConfig
 from cns_drake.simulation.loaded_drive import load_ways
 from cns_drake.traffic.vehicles import room_for_vehicles
+from evaluation.recognition.protocol import RetrievalProtocol
 
 # The unchanged world, and all causes together.
 NONE = "none"
@@ -32,6 +40,12 @@ _TRANSIENT = (
     "works",
     "furniture",
 )
+# Cause -> the option of the protocol that changes the sensor of each query.
+_QUERY_CHANGES = {
+    "hidden": "hide_sector",
+    "turn": "turn_queries",
+    "tilt": "tilt_queries",
+}
 CAUSES = (
     NONE,
     "construction",
@@ -41,24 +55,43 @@ CAUSES = (
     "returns",
     "ride",
     "sensor",
+    *_QUERY_CHANGES,
+    "driver",
     "viewpoint",
     "lateral",
     "size",
     ALL,
 )
-# Causes that take no part in `all`.
-APART = frozenset({"lateral"})
+# Only on request: a unit that looks ahead alone is a question of its own.
+EXTRAS = ("narrow_sensor",)
+# Stands between the names of two causes at once.
+PAIRED = "+"
+# Causes that take no part in `all`, nor in pairs.
+APART = frozenset({"driver", "lateral", *EXTRAS})
 # Causes that another seed draws anew.
 RANDOM_CAUSES = frozenset(
-    {*_TRANSIENT, "traffic", "weather", "returns", "ride", ALL}
+    {*_TRANSIENT, *_QUERY_CHANGES, "traffic", "weather", "returns", "ride"}
+    | {"driver", ALL}
 )
 
 # Greatest share of the roads' room for traffic: the car needs some, too.
 _MOST_ROOM = 0.5
+# Likewise for a car that follows others, since all wait for each other.
+_FOLLOWED_ROOM = 0.25
 # No driver keeps exactly to a line: the LiDAR of the database is this far ahead
-# of the query's, and to its left [m].
+# of the query's [m].
 _AHEAD = 1.25
-_LEFT = 0.5
+# Where it is on all rungs: its offset to the left [m], and its heading [deg].
+VIEWPOINTS: Mapping[str, tuple[float, float]] = {
+    "near": (0.5, 0.0),
+    "lane": (5.0, 0.0),
+    "reversed": (5.0, 180.0),
+}
+NEAR = "near"
+# A strength of traffic: vehicles stand in all lanes.
+QUEUES = "queues"
+# Vehicles in the streets of a driver who follows others.
+_FOLLOWED = 24
 
 # Cause -> level -> strength. The levels of construction are the map's stages.
 STRENGTHS: Mapping[str, Mapping[int, Any]] = {
@@ -70,14 +103,21 @@ STRENGTHS: Mapping[str, Mapping[int, Any]] = {
     "works": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
     "furniture": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
     # Number of vehicles, and of walkers.
-    "traffic": {1: 15, 2: 30, 3: 60, 4: 120},
+    "traffic": {1: 15, 2: 30, 3: 60, 4: QUEUES},
     # Visibility in fog [m].
     "weather": {1: 200.0, 2: 100.0, 3: 50.0, 4: 25.0},
     "returns": {1: "calibrated"},
     # Class of the road of ISO 8608.
     "ride": {1: "A", 2: "B", 3: "C", 4: "D"},
     # Preset.
-    "sensor": {1: "os1-64", 2: "hdl-64e", 3: "vlp-16", 4: "avia"},
+    "sensor": {1: "os1-64", 2: "hdl-64e", 3: "vlp-16", 4: "mid-360"},
+    "narrow_sensor": {1: "avia"},
+    # Sector [deg].
+    "hidden": {1: 30.0, 2: 60.0, 3: 90.0, 4: 120.0},
+    "turn": {1: True},
+    # Greatest roll, and greatest pitch [deg].
+    "tilt": {1: 0.5, 2: 1.0, 3: 1.5, 4: 3.0},
+    "driver": {1: "wander", 2: "lanes", 3: "all", 4: "reversed"},
     # Offset to the left [m], and heading [deg].
     "viewpoint": {1: (2.0, 0), 2: (4.0, 0), 3: (6.0, 0), 4: (6.0, 180)},
     # Offset to the left [m].
@@ -99,6 +139,11 @@ _WORDS = {
     "returns": "{} returns",
     "ride": "mapped on a road of class {}",
     "sensor": "the query measures with {}",
+    "narrow_sensor": "the query measures with {}",
+    "hidden": "{:g} deg hidden from each query",
+    "turn": "each query turned by a random yaw",
+    "tilt": "each query tilted by up to {:g} deg",
+    "driver": "mapped by another driver: {}",
     "viewpoint": "mapped {0[0]:g} m to the left, heading {0[1]} deg",
     "lateral": "mapped {:g} m to the left",
     "size": "{} more places",
@@ -114,12 +159,25 @@ class RungDrives:
         query: drive of the queries.
         num_distractors: places of other cities in the database.
         lateral: distance between the two ways that a match has to bridge [m].
+        query_changes: option of the protocol -> what it does to the sensor of
+            each query.
     """
 
     database: Scenario
     query: Scenario
     num_distractors: int = 0
     lateral: float = 0.0
+    query_changes: Mapping[str, Any] = field(default_factory=dict)
+
+    def protocol(self, common: RetrievalProtocol) -> RetrievalProtocol:
+        """Returns the protocol of the rung.
+
+        Args:
+            common: that of all rungs.
+        """
+        return replace(
+            common, radius=self.radius(common.radius), **self.query_changes
+        )
 
     def radius(self, along: float) -> float:
         """Returns the radius of a match [m].
@@ -132,14 +190,20 @@ class RungDrives:
         return math.hypot(along, self.lateral)
 
 
-def plain_drives(scenario: Scenario) -> RungDrives:
+def plain_drives(scenario: Scenario, viewpoint: str = NEAR) -> RungDrives:
     """Returns the drives without a change: one route, one city.
 
     Args:
         scenario: the drive of the query.
+        viewpoint: one of `VIEWPOINTS`.
     """
-    database = scenario.model_copy(update={"name": f"{scenario.name}_database"})
-    return RungDrives(_mapped_from(database, _AHEAD, _LEFT, 0.0), scenario)
+    name = f"{scenario.name}_database"
+    if viewpoint != NEAR:
+        name += f"_{viewpoint}"
+    database = scenario.model_copy(update={"name": name})
+    left, heading_deg = VIEWPOINTS[viewpoint]
+    moved = _mapped_from(database, _AHEAD, left, heading_deg)
+    return RungDrives(moved, scenario)
 
 
 def changed_drives(
@@ -162,6 +226,8 @@ def changed_drives(
 
 def in_words(cause: str, strength: Any) -> str:
     """Returns a strength as text."""
+    if strength == QUEUES:
+        return "queues in all lanes"
     return _WORDS[cause].format(strength)
 
 
@@ -177,9 +243,47 @@ def _transient(name: str) -> Callable[[RungDrives, float, int], RungDrives]:
     return change
 
 
-def _traffic(drives: RungDrives, number: int, seed: int) -> RungDrives:
-    traffic = TrafficConfig(vehicles=number, walkers=number, seed=seed)
+def _traffic(drives: RungDrives, number: int | str, seed: int) -> RungDrives:
+    traffic = TrafficConfig(queues=True, seed=seed)
+    if number != QUEUES:
+        traffic = _vehicles(int(number), seed)
     return _with_query(drives, traffic=traffic)
+
+
+def _vehicles(number: int, seed: int) -> TrafficConfig:
+    return TrafficConfig(vehicles=number, walkers=number, seed=seed)
+
+
+def _driver(drives: RungDrives, strength: str, seed: int) -> RungDrives:
+    wander = DriverConfig(
+        wander=REAL_DRIVER.wander,
+        wander_length=REAL_DRIVER.wander_length,
+        seed=seed,
+    )
+    update: dict[str, Any] = {}
+    if strength != "wander" and drives.database.waypoints is None:
+        update["lane_changes"] = REAL_DRIVER.lane_changes
+    changed = drives
+    if strength in ("all", "reversed"):
+        folder = map_folder(drives.database)
+        room = room_for_vehicles(load_ways(folder).graph)
+        number = min(_FOLLOWED, int(_FOLLOWED_ROOM * room))
+        changed = _mapped(drives, traffic=_vehicles(number, seed))
+        update["follows"] = True
+    changed = _mapped(changed, driver=wander.model_copy(update=update))
+    if strength == "reversed":
+        return _viewpoint(changed, VIEWPOINTS["reversed"], seed)
+    return changed
+
+
+def _query_change(
+    option: str,
+) -> Callable[[RungDrives, Any, int], RungDrives]:
+    def change(drives: RungDrives, value: Any, seed: int) -> RungDrives:
+        changes = {**drives.query_changes, option: value, "seed": seed}
+        return replace(drives, query_changes=changes)
+
+    return change
 
 
 def _weather(drives: RungDrives, visibility: float, seed: int) -> RungDrives:
@@ -205,7 +309,8 @@ def _viewpoint(
     drives: RungDrives, offset: tuple[float, float], _: int
 ) -> RungDrives:
     left, heading_deg = offset
-    moved = _mapped_from(drives.database, 0.0, left - _LEFT, heading_deg)
+    plain_left, _ = VIEWPOINTS[NEAR]
+    moved = _mapped_from(drives.database, 0.0, left - plain_left, heading_deg)
     return replace(drives, database=moved)
 
 
@@ -219,12 +324,17 @@ def _size(drives: RungDrives, number: int, _: int) -> RungDrives:
 
 _CHANGES: Mapping[str, Callable[[RungDrives, Any, int], RungDrives]] = {
     "sensor": _sensor,
+    "narrow_sensor": _sensor,
     "returns": _returns,
     "weather": _weather,
     **{name: _transient(name) for name in _TRANSIENT},
     "traffic": _traffic,
     "construction": _construction,
     "ride": _ride,
+    **{
+        cause: _query_change(option) for cause, option in _QUERY_CHANGES.items()
+    },
+    "driver": _driver,
     "viewpoint": _viewpoint,
     "lateral": _lateral,
     "size": _size,
@@ -287,6 +397,7 @@ class Rung:
                 "database": self.drives.database.model_dump(mode="json"),
                 "query": self.drives.query.model_dump(mode="json"),
                 "distractors": self.drives.num_distractors,
+                **self.drives.query_changes,
             }
         )
 
@@ -303,6 +414,7 @@ class Extent:
         most_places: most places of other cities.
         strengths: cause -> level -> strength; construction's are the map's
             stages.
+        viewpoint: one of `VIEWPOINTS`; of the database on all rungs.
     """
 
     causes: Collection[str] = CAUSES[1:]
@@ -312,6 +424,39 @@ class Extent:
     strengths: Mapping[str, Mapping[int, Any]] = field(
         default_factory=lambda: STRENGTHS
     )
+    viewpoint: str = NEAR
+
+
+def plan_pairs(
+    scenario: Scenario, causes: Sequence[str], extent: Extent
+) -> list[Rung]:
+    """Returns the rungs with two causes at once, each at its strongest level.
+
+    Args:
+        scenario: the drive of the query.
+        causes: to be crossed two by two.
+        extent: the part of the ladder.
+    """
+    plain = plain_drives(scenario, extent.viewpoint)
+    known, _ = _known_strengths(scenario, extent)
+    rungs = []
+    for one, other in itertools.combinations(causes, 2):
+        if one not in known or other not in known:
+            continue
+        strengths = {
+            name: known[name][max(known[name])] for name in (one, other)
+        }
+        text = "; ".join(in_words(*item) for item in strengths.items())
+        seeds = extent.seeds
+        if not RANDOM_CAUSES.intersection(strengths):
+            seeds = seeds[:1]
+        rungs += [
+            _rung(
+                f"{one}{PAIRED}{other}", STRONGEST, seed, text, plain, strengths
+            )
+            for seed in seeds
+        ]
+    return rungs
 
 
 def plan_rungs(
@@ -326,10 +471,10 @@ def plan_rungs(
     Raises:
         InputError: the map's roads cannot be used.
     """
-    plain = plain_drives(scenario)
+    plain = plain_drives(scenario, extent.viewpoint)
     known, notes = _known_strengths(scenario, extent)
     rungs = [Rung(NONE, 0, extent.seeds[0], "", plain)]
-    for cause in CAUSES[1:]:
+    for cause in (*CAUSES[1:], *EXTRAS):
         if cause not in extent.causes or cause not in (*known, ALL):
             continue
         members = set(known) - APART if cause == ALL else {cause}
@@ -359,7 +504,7 @@ def _rung(
 ) -> Rung:
     drives = changed_drives(plain, strengths, seed)
     # A drive that differs from the plain one needs another name.
-    ending = f"{cause}_{level}_{seed}"
+    ending = f"{cause.replace(PAIRED, '_')}_{level}_{seed}"
     for role in ("database", "query"):
         drive = getattr(drives, role)
         if drive != getattr(plain, role):
@@ -383,12 +528,27 @@ def _known_strengths(
     if folder.roads.is_file() or folder.lanes.is_file():
         room = int(_MOST_ROOM * room_for_vehicles(load_ways(folder).graph))
         known["traffic"] = {
-            level: min(number, room)
+            level: number if number == QUEUES else min(number, room)
             for level, number in known["traffic"].items()
         }
     else:
-        del known["traffic"]
+        known["traffic"] = {}
+        drivers = ("wander", "lanes")
+        known["driver"] = {
+            level: driver
+            for level, driver in known.get("driver", {}).items()
+            if driver in drivers
+        }
         notes.append("neither roads.yaml nor lanes.json: no traffic")
+    if extent.viewpoint != NEAR:
+        # They say themselves where the LiDAR is.
+        for cause in ("viewpoint", "lateral"):
+            known.pop(cause, None)
+        known.get("driver", {}).pop(STRONGEST, None)
+        notes.append(
+            f"--viewpoint {extent.viewpoint}: no viewpoint, lateral and "
+            "reversed driver"
+        )
     known["size"] = {
         level: number
         for level, number in known["size"].items()

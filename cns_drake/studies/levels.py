@@ -25,10 +25,16 @@ from cns_drake.studies.ladder_rungs import (
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.tables import Table, in_table_order, title
 
+# Causes at the ladder's strengths.
+_LEVELLED = (
+    *("parked_cars", "leaves", "snow", "scaffolds", "works", "furniture"),
+    *("returns", "ride", "viewpoint", "lateral"),
+)
 # All causes together, at the ladder's strengths, would leave nothing to
 # measure.
 LEVEL_STRENGTHS = {
-    **STRENGTHS,
+    **{name: STRENGTHS[name] for name in _LEVELLED},
+    "traffic": {1: 15, 2: 30, 3: 60, 4: 120},
     "weather": {1: 400.0, 2: 200.0, 3: 100.0, 4: 50.0},
     "sensor": {4: "vlp-16"},
     "size": {1: 300},

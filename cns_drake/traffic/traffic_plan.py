@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
+from cns_drake.base.elementary import arcsin, arctan2
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.traffic.follower import Follower, make_follower
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
@@ -42,6 +44,10 @@ _SPARE, _TRIES = 0.06, 4
 _PART = 200
 # Boxes keep this distance, since they are compared only now and then [m].
 _APART = 0.1
+# Least and greatest gap between vehicles of a queue, and their least distance
+# from the ego car, which they let pass [m].
+_GAPS = (1.5, 3.5)
+_LETS_PASS = 0.4
 
 # The ego car's motion: (K,) times -> (K, 2) places [m], (K,) headings [rad].
 EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -427,3 +433,67 @@ def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
             return sorted(out)
         out.append(worst)
         overlaps[worst] = overlaps[:, worst] = False
+
+
+def plan_queues(
+    graph: LaneGraph,
+    *,
+    seed: int,
+    duration: float,
+    ego: EgoPath,
+    ego_box: EgoBox,
+) -> TrafficPlan:
+    """Returns vehicles that stand in queues in all lanes between junctions.
+
+    A vehicle is not there while the ego car is at its place.
+
+    Args:
+        graph: the lanes.
+        seed: seed of kinds and gaps.
+        duration: length of the drive [s].
+        ego: the ego car's motion.
+        ego_box: its size.
+    """
+    rng = np.random.default_rng(seed)
+    kinds, rows = [], []
+    for number in graph.lanes:
+        points = graph.pieces[number].points
+        lane = shapely.LineString(points)
+        end = lane.length - float(rng.uniform(*_GAPS))
+        while True:
+            kind = KINDS[int(draw_kinds(1, rng)[0])]
+            begin = end - kind.size[0]
+            if begin < 0.0:
+                break
+            # Axles stand on the lane; slopes are gentle.
+            rear, front = (
+                shapely.get_coordinates(
+                    lane.interpolate(begin + kind.size[0] / 2 + axle),
+                    include_z=True,
+                )[0]
+                for axle in kind.axles
+            )
+            middle = rear + (front - rear) * (
+                -kind.axles[0] / (kind.axles[1] - kind.axles[0])
+            )
+            x, y, z = (front - rear) / np.linalg.norm(front - rear)
+            kinds.append(kind)
+            rows.append([*middle, float(arctan2(y, x)), -float(arcsin(z))])
+            end = begin - float(rng.uniform(*_GAPS))
+    places = np.array(rows).reshape(-1, 5)
+    times = np.arange(0.0, duration + 2 * STEP, STEP)
+    present = np.ones((len(times), len(kinds)), bool)
+    boxes = [
+        EgoBox(-kind.size[0] / 2, kind.size[0] / 2, kind.size[1] / 2).corners(
+            row[None, :2], row[3:4]
+        )[0]
+        for kind, row in zip(kinds, places, strict=True)
+    ]
+    tree = shapely.STRtree(shapely.polygons(boxes) if boxes else [])
+    passing = shapely.polygons(ego_box.corners(*ego(times)))
+    step, near = tree.query(passing, "dwithin", _LETS_PASS)
+    for shift in (-1, 0, 1):
+        present[np.clip(step + shift, 0, len(times) - 1), near] = False
+    tracks = Tracks(STEP, np.tile(places, (len(times), 1, 1)), present)
+    nobody = Tracks(STEP, np.zeros((len(times), 0, 5)))
+    return TrafficPlan(tuple(kinds), tracks, nobody)

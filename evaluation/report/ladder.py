@@ -288,18 +288,155 @@ _ANSWER_COLUMNS: Columns[_Answers] = {
     "translation_error": lambda a: a.outcome.pose_errors.translation,
     "rotation_error_deg": lambda a: a.outcome.pose_errors.rotation_deg,
     "overlap": lambda a: a.outcome.overlaps,
+    "visible_change": lambda a: 1.0 - a.outcome.overlaps,
 }
 
 
 def ladder_table(
-    rows: Iterable[LadderRow], protocol: RetrievalProtocol
+    rows: Iterable[LadderRow], protocol: RetrievalProtocol, viewpoint: str
 ) -> Table:
-    """Returns one row for each rung, method and gate."""
+    """Returns one row for each rung, method and gate.
+
+    Args:
+        rows: rows for all maps.
+        protocol: that all rungs share.
+        viewpoint: name of the database's place beside the queries.
+    """
     options: Columns[LadderRow] = keyed(
         {name: name for name in _OPTIONS},
         lambda row, name: getattr(protocol, name),
     )
+    options |= {"viewpoint": lambda _: viewpoint}
     return Table.of(rows, {**_ROW_COLUMNS, **options})
+
+
+def strongest_causes(rows: Sequence[LadderRow]) -> list[str]:
+    """Returns the causes, that which leaves the least share of AUC first.
+
+    Means over maps and methods count, without the gate, at the strongest level
+    of each cause.
+
+    Args:
+        rows: rows for all maps.
+    """
+    shares: dict[str, list[float]] = {}
+    for name in dict.fromkeys(row.rung.map_name for row in rows):
+        of_map = [
+            row
+            for row in rows
+            if row.rung.map_name == name and not row.is_gated
+        ]
+        for row in _strongest(of_map):
+            if not math.isnan(row.kept.share):
+                shares.setdefault(row.rung.cause, []).append(row.kept.share)
+    means = {cause: float(np.mean(kept)) for cause, kept in shares.items()}
+    return sorted(means, key=lambda cause: (means[cause], cause))
+
+
+@dataclass(frozen=True)
+class CrossedRow:
+    """A method under two causes at once, and under each alone.
+
+    Attributes:
+        pair: with both.
+        alone: with each of them.
+        excess: what the two cost together beyond the product of what each
+            leaves, as a share of the AUC on the rung `none`.
+        interval: its 95 % interval, of the same samples of queries.
+    """
+
+    pair: LadderRow
+    alone: tuple[LadderRow, LadderRow]
+    excess: float
+    interval: Interval
+
+    @property
+    def is_more(self) -> bool:
+        """Whether both cost more than the two alone, beyond doubt."""
+        return self.interval.low > 0.0
+
+
+def crossed_rows(
+    rows: Sequence[LadderRow], pairs: Iterable[LadderRow]
+) -> list[CrossedRow]:
+    """Compares pairs of causes with each cause alone.
+
+    Args:
+        rows: rows for all maps, with single causes.
+        pairs: rows with two, whose names are joined by "+".
+    """
+    strongest: dict[tuple[object, ...], LadderRow] = {}
+    for row in rows:
+        key = row.rung.map_name, row.method, row.is_gated, row.rung.cause
+        if key not in strongest or strongest[key].rung.level < row.rung.level:
+            strongest[key] = row
+    found = []
+    for pair in pairs:
+        key = pair.rung.map_name, pair.method, pair.is_gated
+        one, other = (
+            strongest[(*key, cause)] for cause in pair.rung.cause.split("+")
+        )
+        draws = (pair.unchanged, one.draws, other.draws, pair.draws)
+        weights = resampled_weights(len(pair.outcomes))
+        interval = Interval(math.nan, math.nan)
+        if len({len(part[0].outcomes) for part in draws}) == 1:
+            none, *kept = (_sampled_auc(part, weights) for part in draws)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                first, second, both = (
+                    np.where(none > 0.0, part / none, math.nan) for part in kept
+                )
+            interval = percentile_interval(first * second - both)
+        excess = one.kept.share * other.kept.share - pair.kept.share
+        found.append(CrossedRow(pair, (one, other), excess, interval))
+    return found
+
+
+def pair_table(rows: Sequence[LadderRow], pairs: Iterable[LadderRow]) -> Table:
+    """Returns a row for each pair of causes, method and gate."""
+    keys: Columns[CrossedRow] = {
+        name: (lambda crossed, value=value: value(crossed.pair))
+        for name, value in _keys().items()
+        if name not in ("cause", "level")
+    }
+    return Table.of(
+        crossed_rows(rows, pairs),
+        {
+            **keys,
+            "cause_a": lambda crossed: crossed.alone[0].rung.cause,
+            "cause_b": lambda crossed: crossed.alone[1].rung.cause,
+            "kept_a": lambda crossed: crossed.alone[0].kept.share,
+            "kept_b": lambda crossed: crossed.alone[1].kept.share,
+            "kept": lambda crossed: crossed.pair.kept.share,
+            "excess": lambda crossed: crossed.excess,
+            "excess_low": lambda crossed: crossed.interval.low,
+            "excess_high": lambda crossed: crossed.interval.high,
+            "more": lambda crossed: crossed.is_more,
+        },
+    )
+
+
+def pair_text(rows: Sequence[LadderRow], pairs: Iterable[LadderRow]) -> str:
+    """Returns the pairs that cost more than both causes alone, as a list."""
+    crossed = [
+        one for one in crossed_rows(rows, pairs) if not one.pair.is_gated
+    ]
+    lines = [
+        f"Two causes at once, without the gate. {len(crossed)} pairs of causes"
+        " and methods; together they cost more than the product of what each"
+        " leaves (95 % intervals) in these:"
+    ]
+    for one in sorted(crossed, key=lambda one: -one.excess):
+        if one.is_more:
+            first, second = one.alone
+            lines.append(
+                f"{one.pair.rung.map_name.capitalize()},"
+                f" {title(one.pair.method)}: {_cause(first)}"
+                f" ({_percent(first.kept.share)} kept) and {_cause(second)}"
+                f" ({_percent(second.kept.share)}) leave {_kept(one.pair)}."
+            )
+    if len(lines) == 1:
+        lines.append("None.")
+    return "\n- ".join(lines)
 
 
 def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:

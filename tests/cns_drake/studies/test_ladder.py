@@ -1,6 +1,7 @@
 """`cns-drake ladder`: the changes of its rungs, and its files."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 import shutil
 
@@ -8,16 +9,30 @@ from helpers import documents, studies
 from helpers.small_map import write_town
 import numpy as np
 import pytest
+import shapely
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario, map_folder
-from cns_drake.simulation.loaded_drive import load_ways
+from cns_drake.simulation.loaded_drive import (
+    EGO_BOX,
+    load_ways,
+    plan_scenario_traffic,
+)
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies import ladder
 from cns_drake.studies.ladder import climb_ladder, distracting_drives
-from cns_drake.studies.ladder_rungs import CAUSES, STRENGTHS, Extent, plan_rungs
+from cns_drake.studies.ladder_rungs import (
+    CAUSES,
+    STRENGTHS,
+    Extent,
+    plan_pairs,
+    plan_rungs,
+)
 from cns_drake.traffic.lane_file import lane_text
+from cns_drake.traffic.overlaps import find_overlaps
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
@@ -35,6 +50,8 @@ CHANGED = {
     "returns": ("query", {"lidars", "seed"}),
     "ride": ("database", {"ride"}),
     "sensor": ("query", {"lidars"}),
+    "narrow_sensor": ("query", {"lidars"}),
+    "driver": ("database", {"driver", "traffic", "lidars"}),
     "viewpoint": ("database", {"lidars"}),
     "lateral": ("database", {"lidars"}),
 }
@@ -100,6 +117,11 @@ def test_one_cause_changes_one_drive(query_drive):
             )
             for side in ("database", "query")
         }
+        if rung.cause in ("hidden", "turn", "tilt"):
+            assert found == {"database": set(), "query": set()}
+            assert rung.drives.query_changes
+            continue
+        assert not rung.drives.query_changes or rung.cause == "all"
         if rung.cause == "size":
             assert found == {"database": set(), "query": set()}
             assert rung.drives.num_distractors == STRENGTHS["size"][rung.level]
@@ -116,7 +138,11 @@ def test_all_is_everything_at_its_level(query_drive):
     assert set(strongest) == set(CAUSES) - {"none"}
     both = strongest["all"].drives
     assert both.num_distractors == 10_000
+    asked = {"hide_sector": 120.0, "turn_queries": True, "tilt_queries": 3.0}
+    assert both.query_changes == {**asked, "seed": 1}
     for cause, (side, fields) in CHANGED.items():
+        if cause in ("driver", "narrow_sensor"):
+            continue
         if "transient" in fields:
             one, other = (
                 getattr(drives.query.transient, cause)
@@ -128,7 +154,7 @@ def test_all_is_everything_at_its_level(query_drive):
         for field in fields - {"lidars", "seed"}:
             assert getattr(getattr(both, side), field) == getattr(alone, field)
     config = both.query.lidars["lidar"]
-    assert (config.preset, config.returns) == ("avia", "calibrated")
+    assert (config.preset, config.returns) == ("mid-360", "calibrated")
     moved = both.database.lidars["lidar"]
     assert moved.rpy_deg[2] == 180.0
     # The lateral offset takes no part.
@@ -147,8 +173,116 @@ def test_levels_and_seeds(query_drive):
     rungs, _ = plan_rungs(query_drive, Extent(causes={"construction"}))
     stages = {r.level: r.drives.database.stage for r in rungs}
     assert stages == {0: "04", 3: "02", 4: "01"}
+    rungs, _ = plan_rungs(query_drive, Extent(causes={"narrow_sensor"}))
+    assert rungs[1].drives.query.lidars["lidar"].preset == "avia"
     rungs, _ = plan_rungs(query_drive, Extent(causes={"size"}, most_places=500))
     assert [r.drives.num_distractors for r in rungs] == [0, 300]
+
+
+def test_queries_of_a_rung_are_asked_as_it_says(query_drive):
+    common = RetrievalProtocol(radius=5.0, query_spacing=20.0)
+    rungs, _ = plan_rungs(
+        query_drive,
+        Extent(causes={"hidden", "turn", "tilt"}, seeds=(3, 4)),
+    )
+    asked = {
+        (rung.cause, rung.level, rung.seed): rung.drives.protocol(common)
+        for rung in rungs
+    }
+    assert asked["none", 0, 3] == common
+    assert asked["hidden", 2, 4] == replace(common, hide_sector=60.0, seed=4)
+    assert asked["turn", 1, 3] == replace(common, turn_queries=True, seed=3)
+    assert asked["tilt", 3, 3] == replace(common, tilt_queries=1.5, seed=3)
+    assert len({rung.fingerprint() for rung in rungs}) == len(rungs)
+
+
+def test_drivers(query_drive):
+    rungs, _ = plan_rungs(query_drive, Extent(causes={"driver"}, seeds=(5,)))
+    plain, *drivers = (rung.drives.database for rung in rungs)
+    assert [one.driver.wander for one in drivers] == [0.35] * 4
+    assert [bool(one.driver.lane_changes) for one in drivers] == [
+        *(False, True, True, True)
+    ]
+    assert [one.driver.follows for one in drivers] == [False, False, True, True]
+    assert {one.driver.seed for one in drivers} == {5}
+    assert all(one.traffic.vehicles > 0 for one in drivers[2:])
+    assert [one.lidars == plain.lidars for one in drivers] == [
+        *(True, True, True, False)
+    ]
+    assert drivers[3].lidars["lidar"].xyz[:2] == (1.25, 5.0)
+    assert drivers[3].lidars["lidar"].rpy_deg[2] == 180.0
+
+
+@pytest.mark.parametrize(
+    ("viewpoint", "left", "heading_deg"),
+    [("near", 0.5, 0.0), ("lane", 5.0, 0.0), ("reversed", 5.0, 180.0)],
+)
+def test_viewpoints_move_all_rungs(query_drive, viewpoint, left, heading_deg):
+    rungs, notes = plan_rungs(query_drive, Extent(viewpoint=viewpoint))
+    causes = {rung.cause for rung in rungs}
+    moving = {"viewpoint", "lateral"}
+    assert causes == set(CAUSES) - (moving if viewpoint != "near" else set())
+    places = {
+        (config.xyz[:2], config.rpy_deg[2])
+        for rung in rungs
+        if rung.cause not in (*moving, "driver", "all")
+        for config in rung.drives.database.lidars.values()
+    }
+    assert places == {((1.25, left), heading_deg)}
+    assert any("--viewpoint" in note for note in notes) == (viewpoint != "near")
+    (plain, *_), _ = plan_rungs(query_drive, Extent())
+    same_name = plain.drives.database.name == rungs[0].drives.database.name
+    assert same_name == (viewpoint == "near")
+
+
+def test_pairs_have_both_causes(query_drive):
+    extent = Extent(seeds=(1, 2))
+    causes = ("snow", "hidden", "construction", "size")
+    rungs = plan_pairs(query_drive, causes, extent)
+    names = [(rung.cause, rung.seed) for rung in rungs]
+    assert len(names) == len(set(names)) == 5 * 2 + 1
+    assert ("construction+size", 2) not in names
+    both = next(r for r in rungs if r.cause == "snow+hidden").drives
+    assert both.query.transient.snow == STRENGTHS["snow"][4]
+    assert both.query_changes["hide_sector"] == 120.0
+    assert both.database.stage == query_drive.stage
+
+
+def test_queues_stand_in_all_lanes_but_where_the_car_is(query_drive):
+    (_, rung), _ = plan_rungs(
+        query_drive, Extent(causes={"traffic"}, levels=(4,))
+    )
+    scenario = rung.drives.query
+    assert scenario.traffic.queues
+    assert rung.strength == "queues in all lanes"
+    drive = plan_drive(scenario)
+    plan = plan_scenario_traffic(scenario, drive)
+    lanes = load_ways(map_folder(scenario)).graph
+    lines = shapely.MultiLineString(
+        [lanes.pieces[k].points[:, :2] for k in lanes.lanes]
+    )
+    places = shapely.points(plan.vehicles.values[0, :, :2])
+    assert shapely.distance(lines, places).max() < 0.5
+    # A vehicle needs 7 m of a lane, some more.
+    assert lines.length / 12 < len(places) < lines.length / 5
+    halves = np.array([EGO_BOX.half_size])
+    halves = np.concatenate([halves, [k.size[:2] for k in plan.kinds]])
+    halves[1:] /= 2
+    poses = np.full((40, len(halves), 3), np.nan)
+    times = np.linspace(0.0, drive.duration, len(poses))
+    gaps = []
+    for row, t in zip(poses, times, strict=True):
+        R_WB, p_WB = drive.poses(np.array([t]))
+        yaw = np.arctan2(R_WB[:, 1, 0], R_WB[:, 0, 0])
+        row[:1] = EGO_BOX.middles(p_WB[:, :2], yaw)
+        there = plan.vehicles.is_present(t)
+        row[1:][there] = plan.vehicles.at(t)[0][there][:, [0, 1, 3]]
+        gaps.append(np.nanmin(np.hypot(*(row[1:, :2] - row[0, :2]).T)))
+    found = np.zeros((len(halves), len(halves)), bool)
+    find_overlaps(poses, halves, found)
+    assert not found.any()
+    # Some stand close to the car, in its lane or beside it.
+    assert np.median(gaps) < 12.0
 
 
 def test_what_a_map_lacks(query_drive, town):

@@ -19,6 +19,9 @@ from evaluation.report.ladder import (
     ladder_rows,
     ladder_table,
     ladder_text,
+    pair_table,
+    pair_text,
+    strongest_causes,
 )
 
 
@@ -55,7 +58,7 @@ def measured(cause, level, answers, seed=1):
 
 def cells(rows):
     """Returns the rows of the table, each column -> value."""
-    table = ladder_table(rows, PAPER_PROTOCOL)
+    table = ladder_table(rows, PAPER_PROTOCOL, "near")
     return [dict(zip(table.header, row, strict=True)) for row in table.rows]
 
 
@@ -123,7 +126,9 @@ def test_every_number_follows_from_the_queries(climbed):
     rows = list(
         csv.DictReader(
             io.StringIO(
-                ladder_table(ladder_rows(climbed), PAPER_PROTOCOL).to_csv()
+                ladder_table(
+                    ladder_rows(climbed), PAPER_PROTOCOL, "lane"
+                ).to_csv()
             )
         )
     )
@@ -225,3 +230,53 @@ def test_the_figure_is_the_same_each_time(climbed, tmp_path):
         )
         assert one == other
         assert len(one) > 1000
+
+
+def crossing():
+    """60 queries: 48 and 45 are right under a cause, 12 under both."""
+    rng = np.random.default_rng(3)
+    right = {"none": np.ones(60, bool)}
+    for cause, number in (("snow", 48), ("fog", 45), ("snow+fog", 12)):
+        right[cause] = rng.permutation(np.arange(60) < number)
+    return ladder_rows(
+        [
+            measured(
+                cause,
+                4 * (cause != "none"),
+                [answered("solid", False, is_right)],
+            )
+            for cause, is_right in right.items()
+        ]
+    )
+
+
+def test_pairs_that_do_more_than_both_alone():
+    *rows, pair = crossing()
+    assert strongest_causes(rows) == ["fog", "snow", "none"]
+    table = pair_table(rows, [pair])
+    (cell,) = (dict(zip(table.header, row, strict=True)) for row in table.rows)
+    assert (cell["cause_a"], cell["cause_b"]) == ("snow", "fog")
+    excess = rows[1].kept.share * rows[2].kept.share - pair.kept.share
+    assert cell["excess"] == pytest.approx(excess)
+    assert 0 < cell["excess_low"] < excess < cell["excess_high"]
+    assert cell["more"]
+    text = pair_text(rows, [pair])
+    assert "Town, SOLiD: snow (" in text
+    assert text.count("\n- ") == 1
+
+
+def test_pairs_that_do_no_more():
+    """Nothing is beyond doubt where the pair costs what one cause costs."""
+    *rows, _ = crossing()
+    (pair,) = ladder_rows(
+        [
+            measured("none", 0, rows[0].draws),
+            measured("snow+fog", 4, rows[2].draws),
+        ]
+    )[1:]
+    table = pair_table(rows, [pair])
+    (cell,) = (dict(zip(table.header, row, strict=True)) for row in table.rows)
+    # The product is less than what the worse of the two leaves.
+    assert cell["excess"] < 0
+    assert not cell["more"]
+    assert pair_text(rows, [pair]).endswith("- None.")
