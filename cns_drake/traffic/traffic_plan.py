@@ -495,5 +495,5 @@ def plan_queues(
     for shift in (-1, 0, 1):
         present[np.clip(step + shift, 0, len(times) - 1), near] = False
     tracks = Tracks(STEP, np.tile(places, (len(times), 1, 1)), present)
-    nobody = Tracks(STEP, np.zeros((len(times), 0, 5)))
-    return TrafficPlan(tuple(kinds), tracks, nobody)
+    walkers = Tracks(STEP, np.zeros((len(times), 0, 5)))
+    return TrafficPlan(tuple(kinds), tracks, walkers)

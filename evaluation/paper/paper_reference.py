@@ -258,7 +258,9 @@ def _best_methods(results: Sequence[RecognitionResult]) -> list[list[str]]:
     return [
         [
             method
-            for method, cell in zip(methods, row[3::3], strict=True)
+            for method, cell in zip(
+                methods, row[-3 * len(methods) :: 3], strict=True
+            )
             if isinstance(cell, Cell) and cell.rank == 1
         ]
         for row in table.rows

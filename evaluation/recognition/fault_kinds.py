@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
@@ -56,6 +57,34 @@ class PairEvidence:
     changed_classes: list[str]
     right_fits: np.ndarray
     fits: Mapping[str, np.ndarray]
+
+    @property
+    def visible_changes(self) -> np.ndarray:
+        """(Q,) part of each query's scan that the right place does not show."""
+        return 1.0 - self.overlaps
+
+    @property
+    def visible_change(self) -> tuple[float, int]:
+        """The mean of these, and the number of queries that have one."""
+        return mean_visible_change(self.overlaps)
+
+
+def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
+    """Returns the mean visible change, and the number of queries.
+
+    The visible change of a query is the part of its scan that the best of its
+    matches does not show.
+
+    Args:
+        overlaps: (Q,) see `PairEvidence`; queries without one do not count.
+
+    Returns:
+        NaN and 0 if none has one.
+    """
+    known = overlaps[~np.isnan(overlaps)]
+    if len(known) == 0:
+        return math.nan, 0
+    return float(1.0 - known.mean()), len(known)
 
 
 def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:

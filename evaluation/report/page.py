@@ -135,7 +135,7 @@ def write_report(report: Report, folder: Path) -> Path:
     tables = _shown_tables(report)
     numbers = {
         "survival": survival_numbers(report.survivals),
-        "tcr": change_table(report.changes, report.reference),
+        "tcr": change_table(report.changes, report.reference, report.evidence),
         "place_recognition": audit_table(results, report.reference),
         "poses": pose_numbers(results),
         "metrics": metric_numbers(results),
@@ -224,12 +224,12 @@ def write_page(path: Path, report: Report) -> None:
 def _shown_tables(report: Report) -> dict[str, list[Table]]:
     """Returns name of a file -> its tables for print."""
     results = report.recognitions
-    changes = change_table(report.changes, report.reference)
+    changes = change_table(report.changes, report.reference, report.evidence)
     return {
         "survival": [survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
         "place_recognition": recognition_tables(
-            results, report.changes, report.reference
+            results, report.changes, report.reference, report.evidence
         ),
         "why": [fault_table(results, report.evidence)],
         "poses": [pose_table(results)],

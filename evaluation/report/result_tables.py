@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 import itertools
 from operator import attrgetter
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,7 +48,8 @@ _CHANGE_CAPTION = (
     "Temporal change ratio: TCR_sym is 0 where nothing changed and 1 where"
     " everything did. Same stage: TCR_sym of the two routes in one stage of the"
     " city, where nothing changed. Where both drove: only voxels within 40 m of"
-    " both routes."
+    " both routes. Visible change: the part of a query's scan that the best of"
+    " its matches does not show, mean over the queries that have one."
 )
 _AUDIT_CAPTION = (
     "All numbers with 95 % intervals (bootstrap over queries) and the counts"
@@ -110,14 +112,21 @@ _PROTOCOL = protocol_columns("outcome.protocol")
 
 
 def change_table(
-    results: Sequence[ChangeResult], reference: Reference = NO_REFERENCE
+    results: Sequence[ChangeResult],
+    reference: Reference = NO_REFERENCE,
+    evidence: Evidence = MappingProxyType({}),
 ) -> Table:
     """Returns Table I: the change of each pair, and its parts.
 
     Args:
         results: for all pairs.
         reference: its published values stand beside ours, and below.
+        evidence: for the visible change of pairs.
     """
+
+    def visible(one: ChangeResult) -> tuple[float | None, int | None]:
+        return _visible_change(evidence, one.report.source, one.report.target)
+
     table = Table.of(
         results,
         {
@@ -135,15 +144,25 @@ def change_table(
             ),
             "voxels in hulls": lambda r: r.report.change.num_in_hull,
             "unchanged": lambda r: r.report.change.num_unchanged,
+            "visible change": lambda r: visible(r)[0],
+            "queries": lambda r: visible(r)[1],
         },
         _CHANGE_CAPTION,
     )
     names = {result.map_name for result in results}
     further = tuple(
-        (label, stages, None, value, *(None,) * 6)
+        (label, stages, None, value, *(None,) * (len(table.header) - 4))
         for label, stages, value in reference.further_changes(names)
     )
     return replace(table, rows=table.rows + further)
+
+
+def _visible_change(
+    evidence: Evidence, database: str, query: str
+) -> tuple[float | None, int | None]:
+    """Returns the mean visible change of a pair, and of how many queries."""
+    known = evidence.get((database, query))
+    return (None, None) if known is None else known.visible_change
 
 
 def _by_pair_and_method(
@@ -182,6 +201,7 @@ def recognition_tables(
     results: Sequence[RecognitionResult],
     changes: Sequence[ChangeResult],
     reference: Reference = NO_REFERENCE,
+    evidence: Evidence = MappingProxyType({}),
 ) -> list[Table]:
     """Returns Table II in its forms.
 
@@ -192,7 +212,8 @@ def recognition_tables(
     if any(map(reference.covers, results)):
         modes.insert(0, None)
     return [
-        recognition_table(results, changes, mode, reference) for mode in modes
+        recognition_table(results, changes, mode, reference, evidence)
+        for mode in modes
     ]
 
 
@@ -201,6 +222,7 @@ def recognition_table(
     changes: Sequence[ChangeResult],
     mode: Mode | None = None,
     reference: Reference = NO_REFERENCE,
+    evidence: Evidence = MappingProxyType({}),
 ) -> Table:
     """Returns Table II: a row for each pair, three columns for each method.
 
@@ -210,6 +232,7 @@ def recognition_table(
         mode: mode in which methods are counted; None for the mode that the
             reference used for each.
         reference: its values stand beside ours.
+        evidence: for the visible change of the pairs.
     """
     methods = in_table_order(result.method for result in results)
     tcr = symmetric_changes(changes)
@@ -230,7 +253,10 @@ def recognition_table(
             for name in _MEASURES.values()
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
-        rows.append((pair[0], " → ".join(pair[1:]), tcr.get(pair), *cells))
+        outcome = next(iter(of_method.values())).result.outcome
+        visible, _ = _visible_change(evidence, outcome.database, outcome.query)
+        name = " → ".join(pair[1:])
+        rows.append((pair[0], name, tcr.get(pair), visible, *cells))
     captions = {
         None: f", {reference.counting[0]}",
         "all": ", all queries counted (mode all)",
@@ -247,9 +273,12 @@ def recognition_table(
     if any(map(reference.covers, results)):
         beside = f" In brackets or small: the value of {reference.title}."
     return Table(
-        ("map", "DB → query", "TCR_sym", *tuple(_MEASURES) * len(methods)),
+        (
+            *("map", "DB → query", "TCR_sym", "visible change"),
+            *tuple(_MEASURES) * len(methods),
+        ),
         tuple(rows),
-        groups=(("", 3), *((title(method), 3) for method in methods)),
+        groups=(("", 4), *((title(method), 3) for method in methods)),
         caption=f"Place recognition{captions[mode]}. {protocol}{beside}"
         " Bold: best of a row; underlined: second.",
     )
@@ -638,6 +667,7 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     "changed_class": lambda q: q.evidence and q.evidence.changed_classes,
     "right_fit": lambda q: q.evidence and q.evidence.right_fits,
     "wrong_fit": lambda q: q.evidence and q.evidence.fits[q.result.method],
+    "visible_change": lambda q: q.evidence and q.evidence.visible_changes,
 }
 
 

@@ -131,6 +131,17 @@ def test_change_beside_the_paper(report):
     assert float(change["paper"]) == 0.2920
     assert 0.03 < float(change["TCR_sym"]) < 0.5
     assert float(change["same stage, both routes"]) < 0.02
+    # Visible change: the mean of the queries' own.
+    seen = {
+        row["query_frame"]: row["overlap"]
+        for row in read_csv(report / "queries.csv")
+        if row["overlap"]
+    }
+    shares = np.array(list(seen.values()), dtype=float)
+    assert int(change["queries"]) == len(shares) > 0
+    assert float(change["visible change"]) == pytest.approx(1 - shares.mean())
+    assert float(change["visible change"]) > 0.0
+    assert (real["visible change"], real["queries"]) == ("", "")
     assert float(real["paper"]) == 0.1819
     assert real["TCR_sym"] == ""
     shown = f"{float(change['TCR_sym']):.4f}"
