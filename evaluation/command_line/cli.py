@@ -15,6 +15,7 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
+from evaluation.command_line.localising import localise
 from evaluation.command_line.options import (
     Align,
     AlignName,
@@ -307,6 +308,14 @@ def scores(
     if num_ignored:
         terminal.note(f"{num_ignored} points are not finite, and left out")
     terminal.note(f"wrote {output}")
+
+
+app.command(
+    epilog=example(
+        "cns-eval localise drives/metropolis_01 drives/metropolis_04 \\",
+        "    --method gicp --start 1 --start-turn 5",
+    )
+)(localise)
 
 
 @app.command(epilog=example("cns-eval report drives --output report"))

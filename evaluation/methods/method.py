@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 import sys
 import traceback
+from types import ModuleType
 from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
@@ -305,24 +306,13 @@ def load_method(path: Path) -> type[Method]:
         InputError: if there is no such file, it fails, or it registers no
             method, several or one that is not whole.
     """
-    if not path.is_file():
-        raise InputError(f"--method: {path}: no such file")
-    # Entered like any import, since dataclasses look their module up; under
-    # a name that no other module has.
-    name = f"own_method_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise InputError(f"--method: {path}: not a Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    with _faults(path):
-        spec.loader.exec_module(module)
+    module = run_module(path)
     found = [
         value
         for value in vars(module).values()
         if isinstance(value, type)
         and issubclass(value, Method)
-        and value.__module__ == name
+        and value.__module__ == module.__name__
         and "name" in vars(value)
     ]
     if len(found) != 1:
@@ -342,12 +332,33 @@ def load_method(path: Path) -> type[Method]:
     for name in _CALLED:
         if name in vars(method):
             setattr(
-                method, name, _with_named_faults(getattr(method, name), path)
+                method, name, with_named_faults(getattr(method, name), path)
             )
     return method
 
 
-def _with_named_faults(function: Callable, path: Path) -> Callable:
+def run_module(path: Path) -> ModuleType:
+    """Runs a Python file of a method's author, and returns its module.
+
+    Raises:
+        InputError: if there is no such file, or it fails.
+    """
+    if not path.is_file():
+        raise InputError(f"--method: {path}: no such file")
+    # Entered like any import, since dataclasses look their module up; under
+    # a name that no other module has.
+    name = f"own_method_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"--method: {path}: not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    with _faults(path):
+        spec.loader.exec_module(module)
+    return module
+
+
+def with_named_faults(function: Callable, path: Path) -> Callable:
     """Returns a function whose exceptions become one line."""
 
     @functools.wraps(function)

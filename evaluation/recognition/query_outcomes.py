@@ -74,20 +74,7 @@ class QueryOutcomes:
         scores count half, and no candidate is the lowest score. NaN if all or
         none of the queries have a match.
         """
-        num_with = int(self.has_match.sum())
-        num_without = len(self) - num_with
-        if num_with == 0 or num_without == 0:
-            return math.nan
-        scores = np.where(np.isnan(self.best_scores), -np.inf, self.best_scores)
-        # This is the sum of ranks of Mann and Whitney's U test; equal scores
-        # share the mean of their ranks.
-        _, of_score, counts = np.unique(
-            scores, return_inverse=True, return_counts=True
-        )
-        mean_ranks = np.cumsum(counts) - 0.5 * (counts - 1)
-        ranks = mean_ranks[of_score][self.has_match].sum()
-        wins = ranks - 0.5 * num_with * (num_with + 1)
-        return float(wins / (num_with * num_without))
+        return auroc(self.best_scores, self.has_match)
 
     @property
     def one_percent_rank(self) -> int:
@@ -149,6 +136,33 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
         first_right_ranks=first_right,
         num_places=num_places,
     )
+
+
+def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
+    """Returns the area under the receiver operating characteristic.
+
+    The chance that a positive one has a higher score than another; equal scores
+    count half. NaN if all or none are positive.
+
+    Args:
+        scores: (N,); NaN is the lowest.
+        is_positive: (N,) bool.
+    """
+    num_with = int(is_positive.sum())
+    num_without = len(scores) - num_with
+    if num_with == 0 or num_without == 0:
+        return math.nan
+    # This is the sum of ranks of Mann and Whitney's U test; equal scores share
+    # the mean of their ranks.
+    _, of_score, counts = np.unique(
+        np.where(np.isnan(scores), -np.inf, scores),
+        return_inverse=True,
+        return_counts=True,
+    )
+    mean_ranks = np.cumsum(counts) - 0.5 * (counts - 1)
+    ranks = mean_ranks[of_score][is_positive].sum()
+    wins = ranks - 0.5 * num_with * (num_with + 1)
+    return float(wins / (num_with * num_without))
 
 
 def _mean(values: np.ndarray) -> float:

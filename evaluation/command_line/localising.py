@@ -1,0 +1,204 @@
+"""The command `localise`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cns_drake.base import terminal
+from evaluation.command_line.options import (
+    Align,
+    AlignName,
+    Jobs,
+    Json,
+    LidarName,
+    Parameters,
+)
+
+
+def localise(
+    place: Annotated[Path, typer.Argument(metavar="MAP")],
+    query: Annotated[Path, typer.Argument(metavar="QUERY")],
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="icp|plane-icp|gicp|vgicp|kiss-matcher|FILE.py",
+            help="Estimator; a Python file holds one's own function.",
+        ),
+    ],
+    start: Annotated[
+        float, typer.Option(help="Distance of a start from the truth [m].")
+    ] = 0.5,
+    start_turn: Annotated[
+        float, typer.Option(help="Angle of a start to the truth [deg].")
+    ] = 2.0,
+    seed: Annotated[int, typer.Option(help="Seed of the starts.")] = 0,
+    parameter: Parameters = None,
+    query_spacing: Annotated[
+        float,
+        typer.Option(help="Distance between two queries along the path [m]."),
+    ] = 10.0,
+    follow: Annotated[
+        bool,
+        typer.Option(
+            "--track",
+            help="Follow the whole drive, each scan from the end of the last.",
+        ),
+    ] = False,
+    odometry_drift: Annotated[
+        float,
+        typer.Option(
+            metavar="PART",
+            help="Drift of the odometry of --track: part of the way, and as "
+            "many degrees for each metre.",
+        ),
+    ] = 0.01,
+    align: Align = AlignName.AUTO,
+    lidar: LidarName = None,
+    jobs: Jobs = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Write results by query, localisation.csv, and with --track a "
+            "picture.",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Localisation of scans in a map.
+
+    MAP and QUERY are drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS) or
+    clouds (.pcd .ply .npy .bin). The map is made of a drive's scans at their
+    true poses. A cloud as QUERY is one scan at the origin of the map. Each scan
+    is aligned from its true pose, moved by --start in a random direction and
+    turned by --start-turn about a random axis.
+    """
+    import math
+
+    from cns_drake.base.errors import InputError
+    from cns_drake.base.files import make_folder
+    from cns_drake.base.process import num_cores
+    from evaluation.alignment import in_one_world
+    from evaluation.drives import Drive, check_same_world
+    from evaluation.localisation import localise as queries
+    from evaluation.localisation import tracking
+    from evaluation.localisation.estimators import (
+        default_settings,
+        make_estimator,
+        make_map,
+    )
+    from evaluation.report.localisation import draw_track
+    from evaluation.study.chosen_methods import parse_setting
+
+    starts = queries.Starts(start, start_turn, seed).checked()
+    if not (math.isfinite(query_spacing) and query_spacing > 0.0):
+        raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
+    tracking.check_drift(odometry_drift)
+    settings = default_settings(method).with_values(
+        map(parse_setting, parameter or [])
+    )
+    estimator = make_estimator(method, settings)
+    source = queries.open_source(place, lidar)
+    drive = queries.as_query(queries.open_source(query, lidar))
+    for one in (source, drive):
+        for note in one.notes if isinstance(one, Drive) else ():
+            terminal.note(note)
+    if isinstance(source, Drive):
+        alignment = in_one_world(source, drive, align.value, terminal.track)
+        if alignment is not None:
+            source, drive = alignment.first, alignment.second
+            terminal.note(alignment.report.to_text())
+        check_same_world(source, drive)
+    surroundings = make_map(source, settings, terminal.track)
+    is_mapped = queries.mapped_frames(source, surroundings, drive)
+    localiser = queries.Localiser(surroundings, estimator, settings)
+    if output is not None:
+        make_folder(output)
+    values: dict = {
+        "method": Path(method).stem,
+        "map": source.name,
+        "query": drive.name,
+        "start": start,
+        "start_turn_deg": start_turn,
+        "seed": seed,
+    }
+    if follow:
+        rows = tracking.track_drive(
+            localiser, drive, is_mapped, starts, odometry_drift, terminal.track
+        )
+        values |= {"odometry_drift": odometry_drift}
+        values |= tracking.TrackSummary(rows).to_json()
+        if output is not None:
+            draw_track(rows, output / "track")
+    else:
+        frames = queries.query_frames(drive, is_mapped, query_spacing)
+        rows = queries.localise(
+            localiser,
+            drive,
+            frames,
+            starts,
+            jobs or num_cores(),
+            terminal.track,
+        )
+    values |= queries.Localisation(rows).to_json()
+    if output is not None:
+        queries.write_rows(rows, output / "localisation.csv")
+        terminal.note(f"wrote {output / 'localisation.csv'}")
+    if json:
+        terminal.print_json(values)
+    else:
+        terminal.print_rows(_rows(values))
+
+
+def _rows(values: dict) -> Iterator[tuple[str, str]]:
+    """Yields names and values of the results."""
+
+    def text(name: str) -> str:
+        value = values[name]
+        return "undefined" if value is None else f"{value:.3f}"
+
+    yield "method", values["method"]
+    yield "map <- query", f"{values['map']} <- {values['query']}"
+    yield (
+        "start",
+        f"{values['start']:g} m, {values['start_turn_deg']:g} deg",
+    )
+    if "within_03m" in values:
+        yield "way in the map", f"{values['way']:.0f} m"
+        yield "  within 0.3 m", text("within_03m")
+        yield (
+            "  lost",
+            f"{text('lost_per_km')} a kilometre ({values['lost']} times,"
+            f" {values['lost_for_good']} for good)",
+        )
+        yield "  found again after", f"{text('back_after_median')} m"
+    yield "scans", str(values["queries"])
+    yield "within 0.3 m and 1 deg", text("success_03m_1deg")
+    yield "within 2 m and 5 deg", text("success_2m_5deg")
+    for name, unit in (("translation", "m"), ("rotation", "deg")):
+        ending = "_deg" if unit == "deg" else ""
+        yield (
+            f"{name} error, median, 95 %",
+            f"{text(f'{name}_median{ending}')} {unit},"
+            f" {text(f'{name}_95{ending}')} {unit}",
+        )
+    yield (
+        "  along, across, up",
+        ", ".join(text(f"{one}_median") for one in ("along", "across", "up")),
+    )
+    yield (
+        "AUROC of the own score",
+        f"{text('auroc_own_score')}  (fit {text('auroc_fit')}, residual"
+        f" {text('auroc_residual')}, Hessian {text('auroc_hessian')})",
+    )
+    yield (
+        "wrong, but believed",
+        f"{text('confident_wrong')} of all, {text('confident_of_wrong')} of"
+        " the wrong",
+    )
+    yield "scan without a map", text("unmapped_mean")

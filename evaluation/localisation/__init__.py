@@ -1,0 +1,1 @@
+"""Localisation of single scans, or of a drive, in a map."""

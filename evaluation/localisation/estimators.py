@@ -1,0 +1,418 @@
+"""Estimators: each moves a scan onto a map, from a start.
+
+Shipped are those of small_gicp (K. Koide, "small_gicp: Efficient and parallel
+algorithms for point cloud registration", JOSS 2024) and, as an optional extra,
+KISS-Matcher (H. Lim et al., ICRA 2025). An own one is a Python function.
+
+small_gicp's point to plane multiplies the offset of a pair by the normal along
+each axis of the world. It is the usual error on surfaces that are parallel to
+two axes; on others it also resists a motion along the surface.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
+import inspect
+import math
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import small_gicp
+
+from cns_drake.base import points as clouds
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import Track, silent
+from evaluation.alignment.registration import Surface
+from evaluation.clouds.cloud_files import read_blocks
+from evaluation.drives.sampling import sample_frames, within_range
+from evaluation.maps.voxel_maps import VoxelAccumulator, thin
+from evaluation.methods.method import run_module, with_named_faults
+
+# Points of scans are used up to here, along each axis of the LiDAR [m].
+MAX_RANGE = 100.0
+# Distance between the scans of a drive that enter the map [m].
+_MAP_SPACING = 1.0
+# A normal is fitted to no fewer points.
+FEWEST_POINTS = 10
+# An alignment ends with a step below these [m, rad].
+_STILL = (1e-4, 1e-5)
+# A point of a scan fits a surface of the map this near [m].
+_FIT = 0.15
+# Farthest pair that says something of the fit [m].
+_PAIR = 1.0
+# Planes that a scan would measure exactly are rough by this [m].
+_ROUGHNESS = 0.01
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of the shipped estimators.
+
+    Attributes:
+        voxel: side of the voxels to which the map is thinned [m].
+        scan_voxel: that of a scan [m].
+        width: greatest distance of a pair of points [m]. VGICP pairs a point
+            with the Gaussian of its own voxel at any distance.
+        last_width: width of a second alignment from the end of the first [m];
+            0 for none.
+        resolution: side of the voxels of VGICP and of KISS-Matcher [m].
+        neighbours: number of points that a normal or a covariance is fitted
+            to.
+        iterations: greatest number of steps of an alignment.
+    """
+
+    voxel: float = 0.5
+    scan_voxel: float = 0.5
+    width: float = 2.0
+    last_width: float = 0.0
+    resolution: float = 1.0
+    neighbours: int = 10
+    iterations: int = 50
+
+    def with_values(self, values: Iterable[tuple[str, Any]]) -> "Settings":
+        """Returns settings with other values, numbers or their text.
+
+        Raises:
+            InputError: if a setting is unknown, or a value does not fit.
+        """
+        known = {one.name: type(one.default) for one in fields(self)}
+        found = {}
+        for name, text in values:
+            if name not in known:
+                raise InputError(
+                    f"--set: no setting {name!r} (known: {', '.join(known)})"
+                )
+            try:
+                value = known[name](text)
+            except (TypeError, ValueError):
+                value = math.nan
+            least = 0.0 if name == "last_width" else 1e-3
+            least = 4.0 if name == "neighbours" else least
+            if not least <= value <= 1000.0:
+                raise InputError(
+                    f"--set: {name}: {text!r} is no number from {least:g} to"
+                    " 1000"
+                )
+            found[name] = value
+        return replace(self, **found)
+
+
+@dataclass(frozen=True, eq=False)
+class LocalisationMap:
+    """A map to be localised in.
+
+    Attributes:
+        name: of its drive or file.
+        surface: the thinned points in W, with normals and covariances.
+    """
+
+    name: str
+    surface: Surface
+
+    @cached_property
+    def _voxels(self) -> dict[float, small_gicp.GaussianVoxelMap]:
+        return {}
+
+    def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
+        """Returns a Gaussian for each voxel of a side [m]."""
+        if resolution not in self._voxels:
+            voxels = small_gicp.GaussianVoxelMap(resolution)
+            voxels.insert(self.surface.cloud)
+            self._voxels[resolution] = voxels
+        return self._voxels[resolution]
+
+    def around(self, p_W: np.ndarray, distance: float) -> np.ndarray:
+        """Returns the points (M, 3) in a box around a point [m]."""
+        offsets = self.surface.points - p_W
+        return self.surface.points[within_range(offsets, distance)]
+
+    def distances(self, points_W: np.ndarray) -> np.ndarray:
+        """Returns the distance (N,) of each point to the nearest one [m]."""
+        _, squares = self.surface.tree.batch_nearest_neighbor_search(points_W)
+        return np.sqrt(np.asarray(squares))
+
+
+def make_map(
+    source: Drive | Path, settings: Settings, track: Track = silent
+) -> LocalisationMap:
+    """Maps a drive at its true poses, or reads a cloud in W.
+
+    Raises:
+        InputError: if it cannot be read, or has hardly a point.
+    """
+    accumulator = VoxelAccumulator(settings.voxel)
+    if isinstance(source, Drive):
+        frames = sample_frames(source.X_WS[:, :3, 3], _MAP_SPACING).tolist()
+        for frame in track(frames, f"mapping {source.name}", len(frames)):
+            scan = source.scan(frame)
+            near = within_range(clouds.xyz(scan), MAX_RANGE)
+            accumulator.add(scan[near], source.X_WS[frame])
+    else:
+        for block in read_blocks(source):
+            accumulator.add(block)
+    points = accumulator.to_map().centroids_W
+    if len(points) < FEWEST_POINTS:
+        raise InputError(
+            f"{source.name}: a map of {len(points)} points, fewer than"
+            f" {FEWEST_POINTS}"
+        )
+    return map_of(points, source.name, settings)
+
+
+def map_of(
+    points: np.ndarray, name: str, settings: Settings
+) -> LocalisationMap:
+    """Returns the map of points (M, 3) in W, M >= FEWEST_POINTS [m]."""
+    cloud = small_gicp.PointCloud(points)
+    tree = small_gicp.KdTree(cloud)
+    small_gicp.estimate_normals_covariances(cloud, tree, settings.neighbours)
+    # A view of the cloud's normals, whose rows have four numbers.
+    surface = Surface(points, cloud.normals()[:, :3], cloud, tree)
+    return LocalisationMap(name, surface)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The end of one alignment.
+
+    Attributes:
+        X_WS: (4, 4); None if the estimator found no pose.
+        score: the estimator's own score, higher for a better end; None for the
+            share of the scan that fits.
+        iterations: number of steps; 0 if unknown.
+    """
+
+    X_WS: np.ndarray | None
+    score: float | None = None
+    iterations: int = 0
+
+
+# Takes a map, the points (N, 3) of a scan in S, thinned and as measured, and
+# the start X_WS.
+Estimator = Callable[
+    [LocalisationMap, np.ndarray, np.ndarray, np.ndarray], Estimate
+]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The fit of a scan at a pose.
+
+    Attributes:
+        share: of its points that lie on a surface of the map.
+        residual: root mean square of the distances of pairs off their planes
+            [m]; NaN without a pair.
+        covariance: (6, 6) of a small motion about the LiDAR, in axes of W:
+            turn [rad], move [m]. It is the inverse of the Hessian of point to
+            plane, times the square of the residual.
+    """
+
+    share: float
+    residual: float
+    covariance: np.ndarray
+
+
+def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
+    """Returns how a scan (N, 3) in S fits a map at a pose."""
+    p_W = poses.transform(X_WS, scan)
+    found, squares = surface.tree.batch_nearest_neighbor_search(p_W)
+    is_pair = np.asarray(squares) < _PAIR**2
+    nearest = np.asarray(found, dtype=np.int64)[is_pair]
+    n_W = surface.normals[nearest]
+    off = np.einsum("ni,ni->n", n_W, p_W[is_pair] - surface.points[nearest])
+    arms = p_W[is_pair] - X_WS[:3, 3]
+    J = np.concatenate([np.cross(arms, n_W), n_W], axis=1)
+    residual = math.sqrt(np.mean(off**2)) if len(off) else math.nan
+    sigma = max(residual, _ROUGHNESS) if len(off) else 1.0
+    return Fit(
+        float(np.count_nonzero(np.abs(off) < _FIT) / len(scan)),
+        residual,
+        # What nothing holds has a deviation of 100 m and 100 rad.
+        np.linalg.inv(J.T @ J / sigma**2 + 1e-4 * np.eye(6)),
+    )
+
+
+def _by_small_gicp(
+    kind: str,
+    settings: Settings,
+    surroundings: LocalisationMap,
+    scan: np.ndarray,
+    measured: np.ndarray,
+    start: np.ndarray,
+) -> Estimate:
+    del measured
+    source = small_gicp.PointCloud(scan)
+    surface = surroundings.surface
+    target: tuple = (surface.cloud, source, surface.tree)
+    if kind in ("GICP", "VGICP"):
+        small_gicp.estimate_covariances(
+            source, num_neighbors=settings.neighbours
+        )
+    if kind == "VGICP":
+        target = (surroundings.voxels(settings.resolution), source)
+    X, iterations = start, 0
+    options: dict = {} if kind == "VGICP" else {"registration_type": kind}
+    for width in filter(None, (settings.width, settings.last_width)):
+        found = small_gicp.align(
+            *target,
+            init_T_target_source=X,
+            max_correspondence_distance=width,
+            max_iterations=settings.iterations,
+            translation_epsilon=_STILL[0],
+            rotation_epsilon=_STILL[1],
+            **options,
+        )
+        iterations += found.iterations + 1
+        if found.num_inliers and np.isfinite(found.T_target_source).all():
+            X = found.T_target_source
+    return Estimate(X, None, iterations)
+
+
+def _by_kiss_matcher(
+    package: ModuleType,
+    settings: Settings,
+    surroundings: LocalisationMap,
+    scan: np.ndarray,
+    measured: np.ndarray,
+    start: np.ndarray,
+) -> Estimate:
+    del scan
+    # Its numbers are float32: far coordinates would lose decimals.
+    p_WS = start[:3, 3]
+    target = surroundings.around(p_WS, MAX_RANGE) - p_WS
+    if len(target) < FEWEST_POINTS:
+        return Estimate(None, -math.inf)
+    matcher = package.KISSMatcher(
+        package.KISSMatcherConfig(voxel_size=settings.resolution)
+    )
+    found = matcher.estimate(
+        list(measured.astype(np.float32)), list(target.astype(np.float32))
+    )
+    if not found.valid:
+        return Estimate(None, -math.inf)
+    X = poses.make_pose(
+        np.asarray(found.rotation, np.float64),
+        np.asarray(found.translation, np.float64).ravel() + p_WS,
+    )
+    return Estimate(X, float(matcher.get_num_final_inliers()))
+
+
+def _by_own(
+    function: Callable,
+    path: Path,
+    surroundings: LocalisationMap,
+    scan: np.ndarray,
+    measured: np.ndarray,
+    start: np.ndarray,
+) -> Estimate:
+    del scan
+    nearby = surroundings.around(start[:3, 3], MAX_RANGE)
+    answer = function(nearby, measured.copy(), start.copy())
+    try:
+        X, score = answer
+        score = float(score)
+        X = None if X is None else np.array(X, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{path}: returned {type(answer).__name__} instead of a pose"
+            " (4, 4) and a score"
+        ) from error
+    if X is not None and not _is_pose(X):
+        raise InputError(
+            f"{path}: returned no pose: (4, 4) with a rotation and a last row"
+            " 0 0 0 1"
+        )
+    return Estimate(X, score if score == score else -math.inf)
+
+
+def _is_pose(X: np.ndarray) -> bool:
+    if X.shape != (4, 4) or not np.isfinite(X).all():
+        return False
+    R = X[:3, :3]
+    return bool(
+        np.allclose(R @ R.T, np.eye(3), atol=1e-3)
+        and np.linalg.det(R) > 0.0
+        and np.allclose(X[3], [0.0, 0.0, 0.0, 1.0], atol=1e-6)
+    )
+
+
+_KINDS = {
+    "icp": "ICP",
+    "plane-icp": "PLANE_ICP",
+    "gicp": "GICP",
+    "vgicp": "VGICP",
+}
+_KISS_MATCHER = "kiss-matcher"
+METHODS = (*_KINDS, _KISS_MATCHER)
+# The best on unchanged cities; see docs/localisation.md.
+_DEFAULTS: dict[str, Settings] = {}
+
+
+def default_settings(method: str) -> Settings:
+    """Returns the settings of a method."""
+    return _DEFAULTS.get(method, Settings())
+
+
+def make_estimator(method: str, settings: Settings) -> Estimator:
+    """Returns an estimator.
+
+    Args:
+        method: one of `METHODS`, or the name of a Python file.
+        settings: of a shipped method; an own one has those of its file.
+
+    Raises:
+        InputError: if there is no such method, its package is not installed,
+            or its file cannot be used.
+    """
+    if method in _KINDS:
+        return partial(_by_small_gicp, _KINDS[method], settings)
+    if method == _KISS_MATCHER:
+        try:
+            import kiss_matcher
+        except ImportError as error:
+            raise InputError(
+                "--method kiss-matcher: the package is not installed"
+                " (pip install 'cns-drake[kiss-matcher]')"
+            ) from error
+        return partial(_by_kiss_matcher, kiss_matcher, settings)
+    if not method.endswith(".py"):
+        raise InputError(
+            f"--method: no method {method!r} (known: {', '.join(METHODS)}, or"
+            " FILE.py)"
+        )
+    path = Path(method)
+    module = run_module(path)
+    own = {
+        name: value
+        for name, value in vars(module).items()
+        if inspect.isfunction(value)
+        and value.__module__ == module.__name__
+        and not name.startswith("_")
+    }
+    function = own.get("localise")
+    if function is None and len(own) == 1:
+        (function,) = own.values()
+    if function is None:
+        raise InputError(
+            f"{path}: has {len(own)} functions, none of which is `localise`"
+        )
+    return partial(_by_own, with_named_faults(function, path), path)
+
+
+def thinned(measured: np.ndarray, settings: Settings, where: str) -> np.ndarray:
+    """Returns a scan (N, 3) with one point for each voxel.
+
+    Raises:
+        InputError: if hardly a point is left.
+    """
+    points = thin(measured, settings.scan_voxel)
+    if len(points) < FEWEST_POINTS:
+        raise InputError(
+            f"{where}: {len(points)} points in voxels of"
+            f" {settings.scan_voxel:g} m, fewer than {FEWEST_POINTS}"
+        )
+    return points

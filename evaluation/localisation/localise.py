@@ -1,0 +1,488 @@
+"""Single scans, each localised in a map from a start of its own.
+
+Frames: world W, LiDAR S. An error has three parts in axes of the vehicle's way:
+along it, across (to the left) and up.
+"""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+import csv
+from dataclasses import dataclass
+import math
+import multiprocessing
+from pathlib import Path
+import time
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base import points as clouds
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing
+from cns_drake.base.json_text import json_number
+from cns_drake.base.progress import Track, silent
+from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.drives import open_drive
+from evaluation.drives.sampling import cropped, sample_frames
+from evaluation.localisation.estimators import (
+    MAX_RANGE,
+    Estimator,
+    LocalisationMap,
+    Settings,
+    judge,
+    thinned,
+)
+from evaluation.recognition.pose_errors import (
+    SUCCESS_ROTATION_DEG,
+    SUCCESS_TRANSLATION,
+    pose_error,
+)
+from evaluation.recognition.query_outcomes import auroc
+
+# Ends with errors of at most these are right [m, deg].
+RIGHT_TRANSLATION = 0.3
+RIGHT_ROTATION_DEG = 1.0
+# Farther starts are a matter of place recognition [m].
+FARTHEST_START = 50.0
+# A query is localised if the map's drive, or a point of the map's file, is this
+# near to its LiDAR [m].
+NEAR = 7.5
+# Share of the right ends that a user believes, by the score.
+_BELIEVED = 0.95
+# Queries that wait for a process, of each.
+_WAITING = 4
+
+# One row for each query: its frame and time; the start's offset in W [m] and
+# turn, as a rotation vector in S; errors of the end; scores; deviations of the
+# end by the covariance [m]; the share of the scan that has no point of the map
+# within a voxel, at the true pose; steps, and seconds of processor time.
+QUERY = np.dtype(
+    [
+        ("frame", "<i8"),
+        ("stamp_ns", "<i8"),
+        *(
+            (name, "<f8")
+            for name in (
+                *("start_x", "start_y", "start_z"),
+                *("start_turn_x_deg", "start_turn_y_deg", "start_turn_z_deg"),
+                *("translation_error", "rotation_error_deg"),
+                *("along", "across", "up"),
+                *("own_score", "fit", "residual"),
+                *("std_along", "std_across", "std_up", "unmapped"),
+            )
+        ),
+        ("iterations", "<i8"),
+        ("seconds", "<f8"),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Starts:
+    """The draw of starts.
+
+    Attributes:
+        radius: distance to the true position [m].
+        turn_deg: angle to the true orientation [deg].
+        seed: of all directions.
+    """
+
+    radius: float
+    turn_deg: float
+    seed: int = 0
+
+    def checked(self) -> "Starts":
+        """Returns itself.
+
+        Raises:
+            InputError: if it is out of range.
+        """
+        if not 0.0 < self.radius <= FARTHEST_START:
+            raise InputError(
+                f"--start: {self.radius:g} m is not above 0 and up to"
+                f" {FARTHEST_START:g}"
+            )
+        if not 0.0 <= self.turn_deg <= 180.0:
+            raise InputError(
+                f"--start-turn: {self.turn_deg:g} deg is not from 0 to 180"
+            )
+        if self.seed < 0:
+            raise InputError(f"--seed: {self.seed} is below 0")
+        return self
+
+    def draw(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the start of a frame, the same for all methods.
+
+        Returns:
+            (3,) its offset in W [m], on a sphere; (3,) its turn about a random
+            axis, a rotation vector in S [rad].
+        """
+        rng = np.random.default_rng([self.seed, frame])
+        offset, axis = rng.normal(size=(2, 3))
+        return (
+            self.radius * offset / np.linalg.norm(offset),
+            math.radians(self.turn_deg) * axis / np.linalg.norm(axis),
+        )
+
+
+class _OneScan(Drive):
+    """A cloud as a drive of one scan, at the origin of its world."""
+
+    def __init__(self, path: Path):
+        self.name = path.name
+        self.world_frame = "map"
+        self._scan = read_cloud(path)
+
+    def __len__(self) -> int:
+        return 1
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return np.zeros(1, np.int64)
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return np.eye(4)[None]
+
+    def scan(self, index: int) -> np.ndarray:
+        del index
+        return self._scan
+
+
+def open_source(path: Path, lidar: str | None = None) -> Drive | Path:
+    """Opens a drive; returns the path of a cloud.
+
+    Raises:
+        InputError: if it cannot be read.
+    """
+    path = Path(path)
+    if path.is_file() and is_cloud(path):
+        return path
+    return open_drive(path, lidar)
+
+
+def as_query(source: Drive | Path) -> Drive:
+    """Returns the queries: a drive, or a cloud as one scan at the origin."""
+    return source if isinstance(source, Drive) else _OneScan(source)
+
+
+def mapped_frames(
+    place: Drive | Path, surroundings: LocalisationMap, query: Drive
+) -> np.ndarray:
+    """Returns for each frame of the queries whether the map holds it, (N,).
+
+    Raises:
+        InputError: if it holds none.
+    """
+    p_WQ = query.X_WS[:, :3, 3]
+    if isinstance(place, Drive):
+        from scipy.spatial import cKDTree
+
+        distances, _ = cKDTree(place.X_WS[:, :3, 3]).query(p_WQ)
+    else:
+        distances = surroundings.distances(p_WQ)
+    is_mapped = distances <= NEAR
+    if not is_mapped.any():
+        raise InputError(
+            f"{query.name}: nowhere within {NEAR:g} m of the map of"
+            f" {surroundings.name}; the nearest scan is"
+            f" {distances.min():.1f} m away"
+        )
+    return is_mapped
+
+
+def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
+    """Returns R_WT (N, 3, 3): columns along the way, to its left, and up.
+
+    Args:
+        p_WS: (N, 3) positions of a drive [m].
+        X_WS: (N, 4, 4) its poses; where it stands, x of S counts as along.
+    """
+    along = np.zeros_like(p_WS)
+    if len(p_WS) > 1:
+        along = np.gradient(p_WS, axis=0)
+    stands = np.linalg.norm(along, axis=1) < 1e-3
+    along[stands] = X_WS[stands, :3, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    left = np.cross([0.0, 0.0, 1.0], along)
+    # A way straight up has no left of its own.
+    steep = np.linalg.norm(left, axis=1) < 1e-6
+    left[steep] = X_WS[steep, :3, 1]
+    left /= np.linalg.norm(left, axis=1, keepdims=True)
+    return np.stack([along, left, np.cross(along, left)], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Localiser:
+    """Localises scans in one map by one estimator.
+
+    Attributes:
+        surroundings: the map.
+        estimator: see `make_estimator`.
+        settings: those for thinning scans.
+    """
+
+    surroundings: LocalisationMap
+    estimator: Estimator
+    settings: Settings
+
+    def end(
+        self, scan: np.ndarray, X_WS0: np.ndarray, where: str
+    ) -> tuple[np.ndarray | None, np.ndarray, dict[str, Any]]:
+        """Aligns one scan.
+
+        Args:
+            scan: structured array, in S.
+            X_WS0: the start.
+            where: name of the scan, for messages.
+
+        Returns:
+            X_WS or None; the thinned scan (N, 3); fields of `QUERY`.
+
+        Raises:
+            InputError: if the scan has hardly a point.
+        """
+        measured = cropped(scan, MAX_RANGE)
+        points = thinned(measured, self.settings, where)
+        begin = time.process_time()
+        found = self.estimator(self.surroundings, points, measured, X_WS0)
+        seconds = time.process_time() - begin
+        known = {"iterations": found.iterations, "seconds": seconds}
+        known |= dict.fromkeys(("own_score", "fit"), -math.inf)
+        if found.X_WS is not None:
+            fit = judge(self.surroundings.surface, points, found.X_WS)
+            known |= {
+                "own_score": fit.share if found.score is None else found.score,
+                "fit": fit.share,
+                "residual": fit.residual,
+                "covariance": fit.covariance,
+            }
+        return found.X_WS, points, known
+
+    def query(
+        self,
+        frame: int,
+        stamp_ns: int,
+        scan: np.ndarray,
+        X_WS: np.ndarray,
+        R_WT: np.ndarray,
+        offset: np.ndarray,
+        turn: np.ndarray,
+        X_WS0: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Localises one scan and compares with the truth.
+
+        Args:
+            frame: its number.
+            stamp_ns: its time.
+            scan: structured array, in S.
+            X_WS: the truth.
+            R_WT: see `way_axes`.
+            offset: (3,) of the start in W [m].
+            turn: (3,) of the start in S [rad].
+            X_WS0: another start than these two give.
+
+        Returns:
+            A record of `QUERY`; the end X_WS or None.
+        """
+        if X_WS0 is None:
+            R = Rotation.from_rotvec(turn).as_matrix()
+            X_WS0 = poses.make_pose(X_WS[:3, :3] @ R, X_WS[:3, 3] + offset)
+        where = f"scan {frame}"
+        end, points, known = self.end(scan, X_WS0, where)
+        row = np.zeros((), QUERY)
+        for name in QUERY.names[8:]:
+            if QUERY[name].kind == "f":
+                row[name] = np.nan
+        covariance = known.pop("covariance", None)
+        for name, value in known.items():
+            row[name] = value
+        row["frame"], row["stamp_ns"] = frame, stamp_ns
+        for axis, o, t in zip("xyz", offset, np.degrees(turn), strict=True):
+            row[f"start_{axis}"], row[f"start_turn_{axis}_deg"] = o, t
+        far = self.surroundings.distances(poses.transform(X_WS, points))
+        row["unmapped"] = np.mean(far > self.settings.voxel)
+        if end is not None:
+            row["translation_error"], row["rotation_error_deg"] = pose_error(
+                end, np.eye(4), X_WS
+            )
+            errors = R_WT.T @ (end[:3, 3] - X_WS[:3, 3])
+            spread = R_WT.T @ covariance[3:, 3:] @ R_WT
+            for k, name in enumerate(("along", "across", "up")):
+                row[name] = errors[k]
+                row[f"std_{name}"] = math.sqrt(spread[k, k])
+        return row, end
+
+
+# The localiser of a process that was forked.
+_localiser: Localiser
+
+
+def _query(*arguments: Any) -> np.ndarray:
+    return _localiser.query(*arguments)[0]
+
+
+def localise(
+    localiser: Localiser,
+    query: Drive,
+    frames: Sequence[int],
+    starts: Starts,
+    jobs: int = 1,
+    track: Track = silent,
+) -> np.ndarray:
+    """Localises scans of a drive, each on its own.
+
+    Args:
+        localiser: the map and the estimator.
+        query: the drive.
+        frames: of the scans, in any order.
+        starts: the draw of starts.
+        jobs: number of processes, where the system can fork.
+        track: reports progress.
+
+    Returns:
+        (K,) of `QUERY`, in the order of the frames.
+
+    Raises:
+        InputError: if a scan cannot be read, or has hardly a point.
+    """
+    global _localiser
+    X_WS, stamps = query.X_WS, query.stamps_ns
+    R_WT = way_axes(X_WS[:, :3, 3], X_WS)
+
+    def arguments(frame: int) -> tuple:
+        drawn = starts.draw(frame)
+        scan = query.scan(frame)
+        # A table would be copied with all its columns.
+        scan = clouds.from_xyz(clouds.xyz(scan))
+        return frame, stamps[frame], scan, X_WS[frame], R_WT[frame], *drawn
+
+    def rows() -> Iterator[np.ndarray]:
+        if jobs == 1 or "fork" not in multiprocessing.get_all_start_methods():
+            for frame in frames:
+                yield localiser.query(*arguments(frame))[0]
+            return
+        context = multiprocessing.get_context("fork")
+        with ProcessPoolExecutor(jobs, context) as pool:
+            for first in range(0, len(frames), _WAITING * jobs):
+                some = frames[first : first + _WAITING * jobs]
+                waiting = [pool.submit(_query, *arguments(f)) for f in some]
+                for one in waiting:
+                    yield one.result()
+
+    _localiser = localiser
+    try:
+        done = list(track(rows(), f"localising {query.name}", len(frames)))
+    except InputError as error:
+        raise InputError(f"{query.name}: {error}") from error
+    return np.array(done, QUERY)
+
+
+def is_right(
+    rows: np.ndarray,
+    translation: float = RIGHT_TRANSLATION,
+    rotation_deg: float = RIGHT_ROTATION_DEG,
+) -> np.ndarray:
+    """Returns which ends of queries (K,) have at most these errors."""
+    return (rows["translation_error"] <= translation) & (
+        rows["rotation_error_deg"] <= rotation_deg
+    )
+
+
+@dataclass(frozen=True)
+class Localisation:
+    """The results of one method on one pair.
+
+    Attributes:
+        rows: (K,) of `QUERY`.
+    """
+
+    rows: np.ndarray
+
+    @property
+    def believed_from(self) -> float:
+        """The score that 95 % of the right ends reach; NaN without any."""
+        scores = self.rows["own_score"][is_right(self.rows)]
+        if len(scores) == 0:
+            return math.nan
+        return float(np.quantile(scores, 1.0 - _BELIEVED, method="lower"))
+
+    def to_json(self) -> dict[str, float | int | None]:
+        """Returns the summary.
+
+        Numbers of successes count all queries; quantiles count those with a
+        pose.
+        """
+        rows = self.rows
+        right = is_right(rows)
+        posed = rows[~np.isnan(rows["translation_error"])]
+
+        def quantile(name: str, part: float) -> float | None:
+            values = np.abs(posed[name])
+            return float(np.quantile(values, part)) if len(values) else None
+
+        believed = rows["own_score"] >= self.believed_from
+        near = is_right(rows, SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG)
+        found: dict[str, float | int | None] = {
+            "queries": len(rows),
+            "without_pose": len(rows) - len(posed),
+            "success_03m_1deg": float(right.mean()),
+            "success_2m_5deg": float(near.mean()),
+            "translation_median": quantile("translation_error", 0.5),
+            "translation_95": quantile("translation_error", 0.95),
+            "rotation_median_deg": quantile("rotation_error_deg", 0.5),
+            "rotation_95_deg": quantile("rotation_error_deg", 0.95),
+        }
+        for name in ("along", "across", "up"):
+            found[f"{name}_median"] = quantile(name, 0.5)
+            found[f"std_{name}_median"] = quantile(f"std_{name}", 0.5)
+        # A small residual, or a small deviation, is a high score.
+        deviation = np.max(
+            [rows[f"std_{name}"] for name in ("along", "across", "up")], axis=0
+        )
+        for name, scores in (
+            ("own_score", rows["own_score"]),
+            ("fit", rows["fit"]),
+            ("residual", -rows["residual"]),
+            ("hessian", -deviation),
+        ):
+            found[f"auroc_{name}"] = json_number(auroc(scores, right))
+        found["believed_from"] = json_number(self.believed_from)
+        found["confident_wrong"] = float(np.mean(believed & ~right))
+        wrong = np.count_nonzero(~right)
+        found["confident_of_wrong"] = (
+            float(np.count_nonzero(believed & ~right) / wrong)
+            if wrong and right.any()
+            else None
+        )
+        found["unmapped_mean"] = float(rows["unmapped"].mean())
+        found["seconds_mean"] = float(rows["seconds"].mean())
+        return found
+
+
+def write_rows(rows: np.ndarray, path: Path) -> None:
+    """Writes results by query as CSV; a number that is unknown is empty."""
+    with (
+        completing(path) as part,
+        open(part, "w", newline="", encoding="utf-8") as stream,
+    ):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(rows.dtype.names)
+        for row in rows.tolist():
+            writer.writerow(
+                "" if isinstance(v, float) and not math.isfinite(v) else v
+                for v in row
+            )
+
+
+def query_frames(
+    query: Drive, is_mapped: np.ndarray, spacing: float
+) -> list[int]:
+    """Returns frames of queries, at equal distances where there is a map."""
+    frames = sample_frames(query.X_WS[:, :3, 3], spacing)
+    chosen = frames[is_mapped[frames]]
+    # A short pass through the map may lie between two of them.
+    return (chosen if len(chosen) else np.flatnonzero(is_mapped)[:1]).tolist()

@@ -1,0 +1,198 @@
+"""Tracking: a drive followed through a map, each scan from the last pose."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import Track, silent
+from evaluation.drives.sampling import sample_frames, travelled
+from evaluation.localisation.localise import (
+    QUERY,
+    RIGHT_TRANSLATION,
+    Localiser,
+    Starts,
+    way_axes,
+)
+
+# Distance between two aligned scans [m].
+SPACING = 2.0
+# A vehicle with a greater error is lost [m].
+LOST = 2.0
+# The drift of an odometry changes after this way [m].
+_DRIFT_LENGTH = 100.0
+# A drift of 1 % in length goes with .01 deg/m in heading.
+_TURN_OF_DRIFT_DEG = 1.0
+_DRIFT_SEED = 5
+
+TRACKED = np.dtype(
+    [("stretch", "<i8"), ("way", "<f8"), ("step", "<f8"), *QUERY.descr]
+)
+
+
+def check_drift(drift: float) -> None:
+    """Refuses a drift that is no share."""
+    if not 0.0 <= drift <= 1.0:
+        raise InputError(f"--odometry-drift: {drift:g} is not from 0 to 1")
+
+
+def drifting_steps(
+    X_WS: np.ndarray, way: np.ndarray, drift: float, seed: int
+) -> np.ndarray:
+    """Returns the motion between poses as a drifting odometry measures it.
+
+    In each 100 m of way the lengths are wrong by one factor, and the heading
+    turns with the way at one rate: both normal, with deviations of `drift` and
+    of `drift` deg for each metre.
+
+    Args:
+        X_WS: (N, 4, 4) true poses.
+        way: (N,) length of the way up to each [m].
+        drift: share of the way; 0 for none.
+        seed: of the draw.
+
+    Returns:
+        (N - 1, 4, 4) poses of each LiDAR in the one before.
+    """
+    steps = poses.inverse(X_WS[:-1]) @ X_WS[1:]
+    part = (way[1:] // _DRIFT_LENGTH).astype(np.int64)
+    rng = np.random.default_rng([seed, _DRIFT_SEED])
+    length_error, turn_rate_deg = (
+        drift * rng.normal(size=(int(part[-1]) + 1, 2))[part].T
+    )
+    steps[:, :3, 3] *= 1.0 + length_error[:, None]
+    turn = np.radians(_TURN_OF_DRIFT_DEG * turn_rate_deg * np.diff(way))
+    # The vertical of the world, in the LiDAR's frame.
+    up_S = X_WS[:-1, 2, :3]
+    R = Rotation.from_rotvec(turn[:, None] * up_S).as_matrix()
+    steps[:, :3, :3] = R @ steps[:, :3, :3]
+    steps[:, :3, 3] = np.einsum("nij,nj->ni", R, steps[:, :3, 3])
+    return steps
+
+
+def track_drive(
+    localiser: Localiser,
+    query: Drive,
+    is_mapped: np.ndarray,
+    starts: Starts,
+    drift: float,
+    track: Track = silent,
+) -> np.ndarray:
+    """Follows a drive through the stretches of its way that the map holds.
+
+    On each stretch the first start is drawn, and each later one is the last end
+    moved by the odometry.
+
+    Args:
+        localiser: the map and the estimator.
+        query: the drive.
+        is_mapped: (N,) see `mapped_frames`.
+        starts: the draw of starts.
+        drift: see `drifting_steps`.
+        track: reports progress.
+
+    Returns:
+        (K,) of `TRACKED`: of `QUERY`, and before it the number of the stretch,
+        the way from the drive's first scan and from the scan before [m].
+
+    Raises:
+        InputError: if a scan cannot be read, or has hardly a point.
+    """
+    X_WS = query.X_WS
+    way = travelled(X_WS[:, :3, 3])
+    R_WT = way_axes(X_WS[:, :3, 3], X_WS)
+    frames = sample_frames(X_WS[:, :3, 3], SPACING)
+    frames = frames[is_mapped[frames]]
+    if len(frames) < 2:
+        raise InputError(
+            f"{query.name}: {len(frames)} scans, {SPACING:g} m apart, in the"
+            " map; a track has two and more"
+        )
+    # Between two stretches the drive left the map.
+    gaps = np.add.reduceat(~is_mapped, frames)[:-1] > 0
+    stretches = np.concatenate([[0], np.cumsum(gaps)])
+    steps = drifting_steps(X_WS[frames], way[frames], drift, starts.seed)
+    rows = np.zeros(len(frames), TRACKED)
+    last: np.ndarray | None = None
+    for k in track(range(len(frames)), f"tracking {query.name}", len(frames)):
+        frame = int(frames[k])
+        is_first = k == 0 or stretches[k] != stretches[k - 1]
+        offset = turn = np.zeros(3)
+        start = None
+        if is_first or last is None:
+            offset, turn = starts.draw(frame)
+        else:
+            start = last @ steps[k - 1]
+            offset = start[:3, 3] - X_WS[frame, :3, 3]
+            R = X_WS[frame, :3, :3].T @ start[:3, :3]
+            turn = Rotation.from_matrix(R).as_rotvec()
+        row, end = localiser.query(
+            frame,
+            int(query.stamps_ns[frame]),
+            query.scan(frame),
+            X_WS[frame],
+            R_WT[frame],
+            offset,
+            turn,
+            start,
+        )
+        # Without a pose the vehicle goes on by its odometry.
+        last = end
+        if end is None:
+            R = Rotation.from_rotvec(turn).as_matrix()
+            last = poses.make_pose(
+                X_WS[frame, :3, :3] @ R, X_WS[frame, :3, 3] + offset
+            )
+            row["translation_error"] = np.linalg.norm(offset)
+            row["rotation_error_deg"] = np.degrees(np.linalg.norm(turn))
+        for name in QUERY.names:
+            rows[name][k] = row[name]
+        rows["stretch"][k], rows["way"][k] = stretches[k], way[frame]
+        rows["step"][k] = 0.0 if is_first else way[frame] - way[frames[k - 1]]
+    return rows
+
+
+@dataclass(frozen=True)
+class TrackSummary:
+    """The results of a track.
+
+    Attributes:
+        rows: (K,) of `TRACKED`.
+    """
+
+    rows: np.ndarray
+
+    def losses(self) -> list[tuple[float, bool]]:
+        """Returns the way until each loss ended [m], and whether it did."""
+        found = []
+        for stretch in np.unique(self.rows["stretch"]):
+            rows = self.rows[self.rows["stretch"] == stretch]
+            lost = rows["translation_error"] > LOST
+            begins = np.flatnonzero(np.diff(lost.astype(int), prepend=0) == 1)
+            for begin in begins.tolist():
+                back = np.flatnonzero(~lost[begin:])
+                end = begin + int(back[0]) if len(back) else len(rows) - 1
+                way = float(rows["way"][end] - rows["way"][begin])
+                found.append((way, bool(len(back))))
+        return found
+
+    def to_json(self) -> dict[str, float | int | None]:
+        """Returns the summary; the way counts, not the number of scans."""
+        way = float(self.rows["step"].sum())
+        within = self.rows["translation_error"] <= RIGHT_TRANSLATION
+        losses = self.losses()
+        back = [length for length, is_back in losses if is_back]
+        return {
+            "way": way,
+            "stretches": int(self.rows["stretch"][-1]) + 1,
+            "within_03m": (
+                float(self.rows["step"][within].sum()) / way if way else None
+            ),
+            "lost": len(losses),
+            "lost_per_km": 1000.0 * len(losses) / way if way else None,
+            "lost_for_good": len(losses) - len(back),
+            "back_after_median": float(np.median(back)) if back else None,
+        }
