@@ -44,8 +44,13 @@ _STILL = (1e-4, 1e-5)
 _FIT = 0.15
 # Farthest pair that says something of the fit [m].
 _PAIR = 1.0
+# Shift of the voxels of VGICP, as a part of their side.
+_VOXEL_SHIFT = 0.37
 # Planes that a scan would measure exactly are rough by this [m].
 _ROUGHNESS = 0.01
+# Normals are known to 3 deg. That is the square of the part along a surface,
+# which would seem to hold a scan there.
+_NORMAL_NOISE = math.sin(math.radians(3.0)) ** 2
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,10 @@ class Settings:
         Raises:
             InputError: if a setting is unknown, or a value does not fit.
         """
-        known = {one.name: type(one.default) for one in fields(self)}
+        known: dict[str, Callable] = {
+            one.name: int if isinstance(one.default, int) else float
+            for one in fields(self)
+        }
         found = {}
         for name, text in values:
             if name not in known:
@@ -118,10 +126,10 @@ class LocalisationMap:
         return {}
 
     def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
-        """Returns a Gaussian for each voxel of a side [m]."""
+        """Returns a Gaussian for each voxel of a side [m], in W shifted."""
         if resolution not in self._voxels:
             voxels = small_gicp.GaussianVoxelMap(resolution)
-            voxels.insert(self.surface.cloud)
+            voxels.insert(self.surface.cloud, _voxel_shift(resolution))
             self._voxels[resolution] = voxels
         return self._voxels[resolution]
 
@@ -134,6 +142,15 @@ class LocalisationMap:
         """Returns the distance (N,) of each point to the nearest one [m]."""
         _, squares = self.surface.tree.batch_nearest_neighbor_search(points_W)
         return np.sqrt(np.asarray(squares))
+
+
+def _voxel_shift(resolution: float) -> np.ndarray:
+    """Returns the pose of W in the frame of the voxels of VGICP.
+
+    The ground at height 0, and walls at round numbers, would lie on the sides
+    of voxels, where rounding chooses between two.
+    """
+    return poses.make_pose(np.eye(3), np.full(3, _VOXEL_SHIFT * resolution))
 
 
 def make_map(
@@ -208,7 +225,8 @@ class Fit:
             [m]; NaN without a pair.
         covariance: (6, 6) of a small motion about the LiDAR, in axes of W:
             turn [rad], move [m]. It is the inverse of the Hessian of point to
-            plane, times the square of the residual.
+            plane, less what the noise of normals adds to it, times the square
+            of the residual.
     """
 
     share: float
@@ -225,15 +243,28 @@ def judge(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
     n_W = surface.normals[nearest]
     off = np.einsum("ni,ni->n", n_W, p_W[is_pair] - surface.points[nearest])
     arms = p_W[is_pair] - X_WS[:3, 3]
-    J = np.concatenate([np.cross(arms, n_W), n_W], axis=1)
+    H = _hessian(arms, n_W)
+    for axis in np.eye(3):
+        H -= _NORMAL_NOISE * _hessian(arms, np.broadcast_to(axis, arms.shape))
     residual = math.sqrt(np.mean(off**2)) if len(off) else math.nan
     sigma = max(residual, _ROUGHNESS) if len(off) else 1.0
     return Fit(
         float(np.count_nonzero(np.abs(off) < _FIT) / len(scan)),
         residual,
-        # What nothing holds has a deviation of 100 m and 100 rad.
-        np.linalg.inv(J.T @ J / sigma**2 + 1e-4 * np.eye(6)),
+        _inverse(H / sigma**2),
     )
+
+
+def _hessian(arms: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Returns the Hessian (6, 6) of point to plane: of a turn, and a move."""
+    J = np.concatenate([np.cross(arms, normals), normals], axis=1)
+    return J.T @ J
+
+
+def _inverse(H: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eigh(H)
+    # What nothing holds has a deviation of 100 m, or 100 rad.
+    return vectors / np.maximum(values, 1e-4) @ vectors.T
 
 
 def _by_small_gicp(
@@ -247,6 +278,7 @@ def _by_small_gicp(
     del measured
     source = small_gicp.PointCloud(scan)
     surface = surroundings.surface
+    X_VW = np.eye(4)
     target: tuple = (surface.cloud, source, surface.tree)
     if kind in ("GICP", "VGICP"):
         small_gicp.estimate_covariances(
@@ -254,7 +286,8 @@ def _by_small_gicp(
         )
     if kind == "VGICP":
         target = (surroundings.voxels(settings.resolution), source)
-    X, iterations = start, 0
+        X_VW = _voxel_shift(settings.resolution)
+    X, iterations = X_VW @ start, 0
     options: dict = {} if kind == "VGICP" else {"registration_type": kind}
     for width in filter(None, (settings.width, settings.last_width)):
         found = small_gicp.align(
@@ -269,7 +302,7 @@ def _by_small_gicp(
         iterations += found.iterations + 1
         if found.num_inliers and np.isfinite(found.T_target_source).all():
             X = found.T_target_source
-    return Estimate(X, None, iterations)
+    return Estimate(poses.inverse(X_VW) @ X, None, iterations)
 
 
 def _by_kiss_matcher(

@@ -78,6 +78,7 @@ QUERY = np.dtype(
         ("seconds", "<f8"),
     ]
 )
+COLUMNS = tuple(QUERY.fields or ())
 
 
 @dataclass(frozen=True)
@@ -250,7 +251,10 @@ class Localiser:
         begin = time.process_time()
         found = self.estimator(self.surroundings, points, measured, X_WS0)
         seconds = time.process_time() - begin
-        known = {"iterations": found.iterations, "seconds": seconds}
+        known: dict[str, Any] = {
+            "iterations": found.iterations,
+            "seconds": seconds,
+        }
         known |= dict.fromkeys(("own_score", "fit"), -math.inf)
         if found.X_WS is not None:
             fit = judge(self.surroundings.surface, points, found.X_WS)
@@ -294,9 +298,8 @@ class Localiser:
         where = f"scan {frame}"
         end, points, known = self.end(scan, X_WS0, where)
         row = np.zeros((), QUERY)
-        for name in QUERY.names[8:]:
-            if QUERY[name].kind == "f":
-                row[name] = np.nan
+        for name in COLUMNS[8:-2]:
+            row[name] = np.nan
         covariance = known.pop("covariance", None)
         for name, value in known.items():
             row[name] = value
@@ -464,13 +467,13 @@ class Localisation:
 
 
 def write_rows(rows: np.ndarray, path: Path) -> None:
-    """Writes results by query as CSV; a number that is unknown is empty."""
+    """Writes results by query as CSV; an unknown number is empty."""
     with (
         completing(path) as part,
         open(part, "w", newline="", encoding="utf-8") as stream,
     ):
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(rows.dtype.names)
+        writer.writerow(rows.dtype.fields or ())
         for row in rows.tolist():
             writer.writerow(
                 "" if isinstance(v, float) and not math.isfinite(v) else v

@@ -11,6 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.localisation.localise import (
+    COLUMNS,
     QUERY,
     RIGHT_TRANSLATION,
     Localiser,
@@ -148,7 +149,7 @@ def track_drive(
             )
             row["translation_error"] = np.linalg.norm(offset)
             row["rotation_error_deg"] = np.degrees(np.linalg.norm(turn))
-        for name in QUERY.names:
+        for name in COLUMNS:
             rows[name][k] = row[name]
         rows["stretch"][k], rows["way"][k] = stretches[k], way[frame]
         rows["step"][k] = 0.0 if is_first else way[frame] - way[frames[k - 1]]
