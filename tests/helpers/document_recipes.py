@@ -300,6 +300,12 @@ RECIPES = {
         changes=(_FIRST, _LAST, ("drives/", "output/")),
         after=("evaluation",),
     ),
+    "help: localise": Recipe(
+        "cns-eval localise drives/metropolis_01",
+        changes=(_FIRST, _LAST, ("drives/", "output/")),
+        after=("evaluation",),
+        prints=("AUROC",),
+    ),
     "help: scores": Recipe(
         "cns-eval scores --method solid",
         changes=(("sequences/04", "sequences/02"),),
@@ -630,6 +636,13 @@ RECIPES = {
         after=("own city",),
         prints=("exact.csv",),
     ),
+    "localisation": Recipe(
+        ".venv/bin/cns-eval localise",
+        changes=(_FIRST, _LAST),
+        after=("own city",),
+        prints=("within 0.3 m and 1 deg",),
+        makes=("localisation/localisation.csv",),
+    ),
     "own data": Recipe(
         ".venv/bin/cns-eval tcr kitti",
         changes=(("sequences/04", "sequences/02"),),
@@ -683,5 +696,6 @@ NOT_RUN = {
     "cns-drake levels ours": "likewise",
     "cns-eval pr --method map-closures": "needs an extra",
     "pip install '.[map-closures]'": "installs that extra",
+    "pip install '.[kiss-matcher]'": "likewise",
     "@misc{song2025city": "a citation",
 }

@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 import sys
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
@@ -40,6 +41,7 @@ SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
 # Each point of a scan is in a voxel of its own.
 EXACT = Settings(scan_voxel=1e-3)
 P_BS = (0.7, -0.4, 1.9)
+PROJECT = Path(__file__).parents[3]
 QUAT_BS = Rotation.from_euler("ZYX", [140.0, 12.0, -7.0], degrees=True)
 
 
@@ -437,3 +439,15 @@ def test_settings_are_checked():
     for name, value in (("width", "0"), ("neighbours", "3"), ("voxel", "-1")):
         with pytest.raises(InputError, match=name):
             Settings().with_values([(name, value)])
+
+
+def test_the_method_in_the_documents(streets, capsys):
+    path = PROJECT / "docs/examples/robust_plane_icp.py"
+    command = ["localise", streets["map"], streets["query"], "--json"]
+    options = ["--method", path, "--query-spacing", "8", "--start", "1"]
+    status, out, _ = run(capsys, *command, *options)
+    assert status == 0
+    values = json.loads(out)
+    assert values["method"] == "robust_plane_icp"
+    assert values["success_03m_1deg"] == 1.0
+    assert values["translation_95"] < 0.02
