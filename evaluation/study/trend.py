@@ -11,6 +11,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
+from scipy.stats import rankdata
 
 from cns_drake.base.files import completing, make_folder
 from evaluation.report.drawing import method_entry, method_style, save
@@ -43,11 +44,24 @@ _NUMBERS = (
     "with_match",
     "auc_unchanged",
     "kept",
+    "visible_change",
 )
+# Measures of change: attribute of a point -> its name on an axis.
+_CHANGES = {
+    "tcr_sym": r"TCR$_\mathrm{sym}$",
+    "visible_change": "visible change",
+}
+_CONFIDENCE = (2.5, 97.5)
 
 
 def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
-    """Writes `trend.csv` and the figure `trend`; returns the table's path.
+    """Writes `trend.csv`, `correlations.csv` and figures.
+
+    The figures are `trend`, and `visible_change`: what fails over TCR_sym and
+    over visible change.
+
+    Returns:
+        The path of `trend.csv`.
 
     Raises:
         InputError: a file cannot be written.
@@ -59,10 +73,100 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
         lambda point, name: _rounded(getattr(point, name)),
     )
     table = Table.of(points, {**numbers, **protocol_columns("protocol")})
-    with completing(path) as part:
-        part.write_text(table.to_csv(), encoding="utf-8")
+    for name, one in (
+        (path.name, table),
+        ("correlations.csv", correlation_table(points)),
+    ):
+        with completing(folder / name) as part:
+            part.write_text(one.to_csv(), encoding="utf-8")
     draw_trend(points, folder / "trend")
+    _draw_failures(points, folder / "visible_change")
     return path
+
+
+def correlation_table(points: Sequence[TrendPoint]) -> Table:
+    """Returns how well each measure of change predicts each method's failure.
+
+    A row has Spearman's rank correlation of 1 - AUC with TCR_sym and with the
+    visible change over all databases, with 95 % intervals by bootstrap over
+    databases, and the interval of the difference of the two.
+
+    Args:
+        points: those of all databases and methods.
+    """
+    rows: list[tuple[object, ...]] = []
+    for method in in_table_order(point.method for point in points):
+        known = np.array(
+            [
+                (one.failure, *(getattr(one, name) for name in _CHANGES))
+                for one in points
+                if one.method == method
+            ]
+        )
+        known = known[~np.isnan(known).any(axis=1)]
+        if len(known) == 0:
+            continue
+        rng = np.random.default_rng(0)
+        draws = rng.integers(len(known), size=(_RESAMPLES, len(known)))
+        found = _correlations(known)
+        samples = _correlations(known[draws])
+        cells: list[object] = [method, len(known)]
+        for value, sampled in (
+            *zip(found, samples.T, strict=True),
+            (found[1] - found[0], samples[:, 1] - samples[:, 0]),
+        ):
+            cells += [
+                _rounded(number)
+                for number in (float(value), *_interval(sampled))
+            ]
+        rows.append(tuple(cells))
+    names = ("rho_tcr_sym", "rho_visible_change", "difference")
+    return Table(
+        (
+            *("method", "databases"),
+            *(
+                f"{name}{end}"
+                for name in names
+                for end in ("", "_low", "_high")
+            ),
+        ),
+        tuple(rows),
+    )
+
+
+def _correlations(values: np.ndarray) -> np.ndarray:
+    """Returns Spearman's correlation of the first column with the others.
+
+    Args:
+        values: (..., N, C).
+
+    Returns:
+        (..., C - 1); NaN where a column is constant.
+    """
+    ranks = rankdata(values, axis=-2)
+    ranks -= ranks.mean(axis=-2, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ranks /= np.linalg.norm(ranks, axis=-2, keepdims=True)
+    return (ranks[..., :1] * ranks[..., 1:]).sum(axis=-2)
+
+
+def _interval(samples: np.ndarray) -> tuple[float, float]:
+    known = samples[~np.isnan(samples)]
+    if len(known) == 0:
+        return math.nan, math.nan
+    low, high = np.percentile(known, _CONFIDENCE)
+    return float(low), float(high)
+
+
+def _draw_failures(points: Sequence[TrendPoint], stem: Path) -> None:
+    """Draws what fails over both measures of change."""
+    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
+    panels = figure.subplots(1, len(_CHANGES), sharey=True)
+    for axes, change in zip(panels, _CHANGES, strict=True):
+        _draw_panel(axes, points, "1 - AUC", lambda one: one.failure, change)
+        axes.set_ylim(-0.02, 1.02)
+    _add_legend(panels[0], points)
+    save(figure, stem)
 
 
 def _rounded(value: object) -> object:
@@ -98,7 +202,12 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
         )
         panels[1].set_ylim(bottom=0.0)
         panels[1].axhline(1.0, color="gray", linewidth=0.8)
-    panels[0].legend(
+    _add_legend(panels[0], points)
+    save(figure, stem)
+
+
+def _add_legend(axes: Axes, points: Sequence[TrendPoint]) -> None:
+    axes.legend(
         handles=[
             method_entry(method, with_line=True)
             for method in in_table_order(point.method for point in points)
@@ -106,7 +215,6 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
         fontsize=8,
         framealpha=0.8,
     )
-    save(figure, stem)
 
 
 def _draw_panel(
@@ -114,13 +222,15 @@ def _draw_panel(
     points: Sequence[TrendPoint],
     label: str,
     value: Callable[[TrendPoint], float],
+    change: str = "tcr_sym",
 ) -> None:
     for method in in_table_order(point.method for point in points):
         colour, style, marker = method_style(method)
         known = sorted(
-            (p.tcr_sym, value(p))
+            (getattr(p, change), value(p))
             for p in points
-            if p.method == method and not math.isnan(value(p))
+            if p.method == method
+            and not math.isnan(value(p) + getattr(p, change))
         )
         if not known:
             continue
@@ -135,7 +245,7 @@ def _draw_panel(
         low, high = smooth_band(x, y, grid)
         axes.fill_between(grid, low, high, color=colour, alpha=0.18, lw=0)
         axes.plot(grid, smooth(x, y, grid), style, color=colour)
-    axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylabel=label)
+    axes.set(xlabel=_CHANGES[change], ylabel=label)
     axes.grid(alpha=0.3)
 
 

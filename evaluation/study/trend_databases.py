@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
+import numpy as np
+
 from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
@@ -16,13 +18,18 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change.tcr import temporal_change
 from evaluation.drives import Drive, check_same_world, open_drive
+from evaluation.drives.sampling import gather
+from evaluation.recognition.fault_kinds import mean_visible_change
+from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import (
     DriveSource,
+    KeptDrive,
     RecordedDrive,
     Survey,
     survey_recording,
@@ -45,6 +52,7 @@ class TrendPoint:
         queries, with_match: numbers of queries, and of those with a match.
         protocol: that of place recognition.
         auc_unchanged: that of the database's control; NaN without one.
+        visible_change: mean over queries, see `PairEvidence`.
     """
 
     database: str
@@ -58,6 +66,12 @@ class TrendPoint:
     with_match: int
     protocol: RetrievalProtocol
     auc_unchanged: float = math.nan
+    visible_change: float = math.nan
+
+    @property
+    def failure(self) -> float:
+        """What is missing of a perfect AUC."""
+        return 1.0 - self.auc
 
     @property
     def kept(self) -> float:
@@ -186,7 +200,14 @@ def measure_drives(
     files = StudyFiles(output.absolute())
     make_folder(output)
     survey = files.survey(query_name)
-    step = Survey(query, frozenset({"queries"}), methods, protocol, survey)
+    step = Survey(
+        query,
+        frozenset({"queries"}),
+        methods,
+        protocol,
+        survey,
+        with_scans=True,
+    )
     jobs = [Job(name=f"survey {query_name}", step=step)]
     sources = {name: one.source for name, one in databases.items()}
     sources |= controls
@@ -199,7 +220,7 @@ def measure_drives(
                 measure_database,
                 (
                     sources[name],
-                    survey.drive,
+                    (survey.drive, survey.scans),
                     tuple(survey.described(one) for one in methods),
                     methods,
                     protocol,
@@ -227,7 +248,7 @@ def measure_drives(
 def measure_database(
     reporter: Reporter,
     source: DriveSource,
-    surveyed: Part,
+    surveyed: tuple[Part, Part],
     described: tuple[Part, ...],
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
@@ -237,31 +258,43 @@ def measure_database(
     Args:
         reporter: takes the progress.
         source: opens the database, which is in the world of the query.
-        surveyed: the `SurveyedDrive` of the query drive.
+        surveyed: the `SurveyedDrive` and the `KeptScans` of the query drive.
         described: each method's descriptions of the query drive.
         methods: to run.
         protocol: that of place recognition.
     """
     running = [method.make() for method in methods]
     database = survey_recording(
-        source(), {"places"}, running, protocol, reporter.track
+        source(),
+        {"places"},
+        running,
+        protocol,
+        reporter.track,
+        with_scans=True,
     )
-    query_track = surveyed.read()
+    query_track, query_scans = (part.read() for part in surveyed)
     check_same_world(database.drive.placed, query_track.placed)
     change = temporal_change(
         database.drive.coarse.centroids_W, query_track.coarse.centroids_W
     )
     points = []
+    visible_change = math.nan
     for method, part in zip(running, described, strict=True):
         _, queries = part.read()
         places = database.described[method.name]
+        retrieval = score(method, places, queries, protocol)
         found = judge_retrieval(
-            method,
-            places.name,
-            queries.name,
-            score(method, places, queries, protocol),
-            protocol,
+            method, places.name, queries.name, retrieval, protocol
         )
+        if not points:
+            # Matches do not depend on the method.
+            assert database.scans is not None
+            visible_change = _visible_change(
+                KeptDrive(database.drive, database.scans),
+                KeptDrive(query_track, query_scans),
+                retrieval,
+                protocol,
+            )
         metrics = found.metrics
         points.append(
             TrendPoint(
@@ -275,9 +308,47 @@ def measure_database(
                 queries=metrics.num_queries,
                 with_match=metrics.num_with_match,
                 protocol=found.protocol,
+                visible_change=visible_change,
             )
         )
     return points
+
+
+def _visible_change(
+    database: KeptDrive,
+    query: KeptDrive,
+    retrieval: Retrieval,
+    protocol: RetrievalProtocol,
+) -> float:
+    """Returns the mean over queries, see `PairEvidence`."""
+    is_match = retrieval.matches.any(axis=0)
+    place_scans = [
+        gather(database, frame, 1, protocol.max_range)
+        if is_needed
+        else np.empty((0, 3))
+        for frame, is_needed in zip(
+            retrieval.database_frames.tolist(), is_match, strict=True
+        )
+    ]
+    frames = retrieval.query_frames
+    query_scans = [
+        gather(
+            query,
+            frame,
+            1,
+            protocol.max_range,
+            sensor=protocol.query_sensor(frame),
+        )
+        for frame in frames.tolist()
+    ]
+    overlaps = best_overlaps(
+        place_scans,
+        database.X_WS[retrieval.database_frames],
+        query_scans,
+        protocol.query_poses(query.X_WS[frames], frames),
+        retrieval.matches,
+    )
+    return mean_visible_change(overlaps)[0]
 
 
 def _recorded(path: Path, lidar: str | None) -> RecordedDrive:

@@ -7,12 +7,14 @@ from helpers import studies
 from helpers.small_towns import drive
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from evaluation.change.drive_change import compare, survey
 from evaluation.drives import open_drive
 from evaluation.methods import known_methods, make_method
+from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study import trend, trend_databases
@@ -171,6 +173,76 @@ def test_few_versions_are_joined_by_lines(number, tmp_path, monkeypatch):
         for line in falling:
             assert (line[0, 0], line[-1, 0]) == (0.0, 0.3)
             np.testing.assert_allclose(line.sum(axis=1), 1.0)
+
+
+def test_visible_change_is_what_matches_do_not_show(folder, points):
+    database, query = (
+        open_drive(folder / name) for name in ("metropolis_01", "metropolis_04")
+    )
+    protocol = RetrievalProtocol(place="first")
+    found = run(
+        database, query, make_method("solid", {}), protocol=protocol
+    ).retrieval
+    overlaps = overlap_matrix(database, query, protocol)
+    best = np.where(found.matches, overlaps, np.nan)[found.matches.any(axis=1)]
+    expected = 1.0 - np.nanmax(best, axis=1).mean()
+    changes = {
+        point.visible_change
+        for point in points
+        if point.database == "metropolis_01"
+    }
+    assert len(changes) == 1
+    assert changes.pop() == pytest.approx(expected, abs=1e-9)
+    assert expected > 0.01
+
+
+def test_correlations_are_those_of_scipy(tmp_path):
+    rng = np.random.default_rng(5)
+    points = [
+        SimpleNamespace(
+            method=method,
+            tcr_sym=float(x),
+            visible_change=float(x + 0.3 * z),
+            failure=float(round(x + z, 1)),
+        )
+        for method in ("solid", "btc")
+        for x, z in rng.uniform(size=(30, 2))
+    ]
+    points.append(
+        SimpleNamespace(
+            method="btc", tcr_sym=np.nan, visible_change=0.0, failure=0.0
+        )
+    )
+    table = trend.correlation_table(points)
+    for values in table.rows:
+        row = dict(zip(table.header, values, strict=True))
+        mine = [p for p in points if p.method == row["method"]][:30]
+        assert row["databases"] == 30
+        failures = [p.failure for p in mine]
+        for name in ("tcr_sym", "visible_change"):
+            expected = spearmanr(failures, [getattr(p, name) for p in mine])
+            value = float(row[f"rho_{name}"])
+            assert value == pytest.approx(expected.statistic, abs=1e-6)
+            low, high = (
+                float(row[f"rho_{name}_{end}"]) for end in ("low", "high")
+            )
+            assert low < value < high
+        both = float(row["rho_visible_change"]) - float(row["rho_tcr_sym"])
+        assert float(row["difference"]) == pytest.approx(both, abs=2e-6)
+
+
+def test_constant_measures_have_no_correlation():
+    points = [
+        SimpleNamespace(
+            method="btc", tcr_sym=0.1, visible_change=float(k), failure=0.1 * k
+        )
+        for k in range(6)
+    ]
+    ((_, number, rho, *_, other, _, _, _, _, _),) = trend.correlation_table(
+        points
+    ).rows
+    assert (number, float(other)) == (6, 1.0)
+    assert np.isnan(rho)
 
 
 def test_a_line_stays_a_line():
