@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
+from scipy.spatial import ConvexHull
 
 # Rays are cast in single precision, which cannot resolve a metre beyond this
 # [m].
@@ -116,79 +117,36 @@ def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
         return surface
     if isinstance(surface, HalfSpaceSurface):
         return TriangleSurface(_PLANE_CORNERS, _PLANE_TRIANGLES)
+    angle = np.linspace(0.0, np.pi / 2.0, sides // 2 + 1)
+    radius, z = np.sin(angle), np.cos(angle)
+    z[-1] = 0.0
     if isinstance(surface, EllipsoidSurface):
-        radius, z = _arc(sides // 2)
-        unit = _revolve(
-            np.concatenate([radius, radius[-2::-1]]),
-            np.concatenate([z, -z[-2::-1]]),
-            sides,
-        )
+        unit = _revolved(radius, z, sides)
         return TriangleSurface(unit.p_GVset * surface.semi_axes, unit.triangles)
     half = surface.length / 2.0
     if isinstance(surface, CylinderSurface):
-        r = surface.radius
-        z = np.array([1, 1, -1, -1]) * half
-        return _revolve(np.array([0, r, r, 0]), z, sides)
+        return _revolved(np.array([surface.radius]), np.array([half]), sides)
     if isinstance(surface, CapsuleSurface):
-        radius, z = _arc(sides // 2)
-        radius, z = radius * surface.radius, z * surface.radius + half
-        return _revolve(
-            np.concatenate([radius, radius[::-1]]),
-            np.concatenate([z, -z[::-1]]),
-            sides,
-        )
+        r = surface.radius
+        return _revolved(r * radius, r * z + half, sides)
     raise TypeError(f"no triangles for {type(surface).__name__}")
 
 
-def _arc(num_steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns radius and z of the unit circle from the pole to z = 0."""
-    angle = np.linspace(0.0, np.pi / 2.0, num_steps + 1)
-    return np.sin(angle), np.cos(angle)
-
-
-def _revolve(radius: np.ndarray, z: np.ndarray, sides: int) -> TriangleSurface:
-    """Returns the surface that a profile sweeps about z.
+def _revolved(radius: np.ndarray, z: np.ndarray, sides: int) -> TriangleSurface:
+    """Returns the convex hull of circles about z, mirrored at z = 0.
 
     Args:
-        radius: (N,) radii from the upper to the lower pole, both of which
-            have radius zero [m].
-        z: (N,) heights [m].
+        radius, z: (N,) radii and heights of the circles, z >= 0 [m].
         sides: number of sides of each circle.
     """
-    angle = 2.0 * np.pi * np.arange(sides) / sides
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    inner = range(1, len(radius) - 1)
-    vertices = [np.array([(0.0, 0.0, z[0])])]
-    vertices += [
-        np.column_stack([radius[i] * circle, np.full(len(circle), z[i])])
-        for i in inner
-    ]
-    vertices += [np.array([(0.0, 0.0, z[-1])])]
-
-    first = np.arange(sides)
-    second = (first + 1) % sides
-    upper_ring, lower_pole = 1, 1 + len(inner) * sides
-    triangles = [
-        np.column_stack(
-            [np.zeros_like(first), upper_ring + first, upper_ring + second]
-        )
-    ]
-    for _ in inner[:-1]:
-        lower_ring = upper_ring + sides
-        a, b = upper_ring + first, upper_ring + second
-        c, d = lower_ring + first, lower_ring + second
-        triangles += [np.column_stack([a, c, d]), np.column_stack([a, d, b])]
-        upper_ring = lower_ring
-    triangles.append(
-        np.column_stack(
-            [
-                np.full_like(first, lower_pole),
-                upper_ring + second,
-                upper_ring + first,
-            ]
-        )
-    )
-    return TriangleSurface(
-        np.concatenate(vertices),
-        np.concatenate(triangles).astype(np.int32),
-    )
+    angle = 2.0 * np.pi * np.arange(sides)[:, None] / sides
+    xyz = radius * np.cos(angle), radius * np.sin(angle), z
+    upper = np.stack(np.broadcast_arrays(*xyz), axis=-1).reshape(-1, 3)
+    vertices = np.unique(np.concatenate([upper, upper * (1, 1, -1)]), axis=0)
+    hull = ConvexHull(vertices)
+    triangles = hull.simplices.astype(np.int32)
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    outward = np.cross(b - a, c - a) * hull.equations[:, :3]
+    is_inside_out = outward.sum(axis=1) < 0.0
+    triangles[is_inside_out] = triangles[is_inside_out, ::-1]
+    return TriangleSurface(vertices, triangles)
