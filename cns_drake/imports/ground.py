@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
@@ -13,6 +13,7 @@ from shapely.geometry import Point
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
+from cns_drake.imports.faces import surface_samples
 from cns_drake.imports.foreign_city import Imported
 
 # Cells of a guessed ground, and how far it reaches beyond the city [m].
@@ -26,9 +27,6 @@ _SMOOTHING = 1.5
 _DEPTH = 0.1
 # Farther from the convex hull of the feet nothing lies between them [m].
 _BESIDE_HULL = 1.0
-# Longest edge that is not divided first, and points at a time.
-_MOST_STEPS = 256
-_AT_ONCE = 1_000_000
 # Corners of flat things of these classes give the height of the ground.
 _EVERY_CORNER = 7
 
@@ -173,40 +171,10 @@ def bottom_of(
     # The guessed ground must not cover streets and water.
     laid = [one.triangles for one in structures if one.is_ground]
     covered = np.concatenate([np.zeros((0, 3, 3)), *laid])
-    lowered = ground.below(_lattice(covered, ground.cell / 2.0))
+    lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
     model = Model(
         (Part("surface", MeshShape(name)),),
         {name: lowered.to_mesh()},
         Point(0.0, 0.0).buffer(1.0),
     )
     return [Structure(name, "terrain", model, (0.0, 0.0, 0.0))]
-
-
-def _lattice(triangles: np.ndarray, spacing: float) -> Iterator[np.ndarray]:
-    """Yields evenly dense points (N, 3) on triangles (M, 3, 3).
-
-    No place on a triangle is farther from all of them than the spacing.
-
-    Args:
-        triangles: to sample [m].
-        spacing: greatest distance from a place to a point [m].
-    """
-    while len(triangles):
-        edges = triangles - np.roll(triangles, 1, axis=1)
-        longest = np.linalg.norm(edges, axis=2).max(axis=1)
-        steps = np.maximum(1, np.ceil(longest / spacing)).astype(int)
-        for number in np.unique(steps[steps <= _MOST_STEPS]):
-            part = triangles[steps == number]
-            i, j = np.meshgrid(np.arange(number + 1), np.arange(number + 1))
-            inside = i + j <= number
-            u, v = i[inside] / number, j[inside] / number
-            weights = np.stack([1.0 - u - v, u, v], axis=1)
-            most = max(1, _AT_ONCE // len(weights))
-            for first in range(0, len(part), most):
-                some = part[first : first + most]
-                yield np.einsum("kc,mcx->mkx", weights, some).reshape(-1, 3)
-        # Large triangles are divided into four.
-        a, b, c = np.moveaxis(triangles[steps > _MOST_STEPS], 1, 0)
-        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])

@@ -8,6 +8,7 @@ import shapely
 from cns_drake.base.elementary import sin
 from cns_drake.city.geometry.upper_sides import (
     from_above,
+    quartered,
     turned_up,
     unit_normals,
 )
@@ -150,16 +151,8 @@ def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
         last = corners[fine]
         middles = last[:, :, :2].mean(axis=1)
         done.append(last[~shapely.contains_xy(road, middles)])
-        corners = _subdivided(corners[~fine])
+        corners = quartered(corners[~fine])
     return np.concatenate(done)
-
-
-def _subdivided(corners: np.ndarray) -> np.ndarray:
-    """Returns the four triangles of each between the middles of its sides."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-    parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-    return np.concatenate([np.stack(part, axis=1) for part in parts])
 
 
 def _merged(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -46,6 +46,14 @@ def from_above(triangles: np.ndarray) -> np.ndarray:
     return np.asarray(shapely.polygons(triangles[:, :, :2]), object)
 
 
+def quartered(triangles: np.ndarray) -> np.ndarray:
+    """Returns the four triangles of each between the middles of its sides."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
 class UpperSides:
     """The upper sides of solids, with their height at any place."""
 

@@ -13,6 +13,7 @@ from scipy.ndimage import (
 import shapely
 from shapely import STRtree
 
+from cns_drake.imports.faces import surface_samples
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.ground import Ground
 
@@ -37,81 +38,6 @@ _SAMPLE_SPACING = 0.5
 _FARTHEST = 1500.0
 # Roads are used if their connected room has at least this area [m^2].
 _LEAST_ROAD = 800.0
-# Longer triangles are divided, so that their far parts can be left out.
-_LONGEST = 256  # In spacings.
-# Triangles at a time.
-_AT_ONCE = 64
-
-
-def surface_samples(
-    triangles: np.ndarray,
-    spacing: float,
-    window: tuple[np.ndarray, np.ndarray] | None = None,
-) -> Iterator[np.ndarray]:
-    """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
-
-    No place on a triangle is farther from all of them than the spacing.
-
-    Args:
-        triangles: to sample.
-        spacing: greatest distance from a place to a point [m].
-        window: (2,) least and greatest x and y; points outside are left out.
-    """
-    while len(triangles):
-        if window is not None:
-            low, high = window
-            xy = triangles[:, :, :2]
-            is_near = (xy.max(axis=1) >= low) & (xy.min(axis=1) <= high)
-            triangles = triangles[is_near.all(axis=1)]
-        edges = triangles - np.roll(triangles, 1, axis=1)
-        longest = np.linalg.norm(edges, axis=2).max(axis=1, initial=0.0)
-        is_small = longest <= _LONGEST * spacing
-        small = triangles[is_small]
-        for first in range(0, len(small), _AT_ONCE):
-            points = _samples(small[first : first + _AT_ONCE], spacing)
-            if window is not None:
-                xy = points[:, :2]
-                points = points[((xy >= low) & (xy <= high)).all(axis=1)]
-            yield points
-        a, b, c = np.moveaxis(triangles[~is_small], 1, 0)
-        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])
-
-
-def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
-    """Returns points (N, 3) on triangles (M, 3, 3), one after the other [m].
-
-    Lines of points run across the two longer sides, along the shortest one.
-    """
-    sides = np.roll(triangles, 1, axis=1) - np.roll(triangles, -1, axis=1)
-    lengths = np.sqrt((sides * sides).sum(axis=2))
-    # The apex is opposite the shortest side.
-    apex = lengths.argmin(axis=1)[:, None, None]
-    a, b, c = (
-        np.take_along_axis(triangles, (apex + k) % 3, axis=1)[:, 0]
-        for k in range(3)
-    )
-    lines = np.maximum(np.ceil(lengths.max(axis=1) / spacing).astype(int), 1)
-    owner, u = _parts(lines)
-    steps = u * lengths.min(axis=1)[owner] / spacing
-    line, v = _parts(np.maximum(np.ceil(steps).astype(int), 1))
-    owner, u, v = owner[line], u[line][:, None], v[:, None]
-    return a[owner] + u * ((1.0 - v) * (b - a)[owner] + v * (c - a)[owner])
-
-
-def _parts(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the ends of equal parts of N things, as shares from 0 to 1.
-
-    Args:
-        counts: (N,) number of parts of each.
-
-    Returns:
-        (M,) number of the thing, and (M,) share.
-    """
-    owner = np.repeat(np.arange(len(counts)), counts + 1)
-    first = np.cumsum(counts + 1) - counts - 1
-    return owner, (np.arange(len(owner)) - first[owner]) / counts[owner]
 
 
 @dataclass(frozen=True)
