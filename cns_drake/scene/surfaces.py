@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
-from scipy.spatial import ConvexHull
+
+from cns_drake.base.round_shapes import revolved
 
 # Rays are cast in single precision, which cannot resolve a metre beyond this
 # [m].
@@ -121,32 +122,11 @@ def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
     radius, z = np.sin(angle), np.cos(angle)
     z[-1] = 0.0
     if isinstance(surface, EllipsoidSurface):
-        unit = _revolved(radius, z, sides)
-        return TriangleSurface(unit.p_GVset * surface.semi_axes, unit.triangles)
+        corners, triangles = revolved(radius, z, sides)
+        return TriangleSurface(corners * surface.semi_axes, triangles)
     half = surface.length / 2.0
     if isinstance(surface, CylinderSurface):
-        return _revolved(np.array([surface.radius]), np.array([half]), sides)
-    if isinstance(surface, CapsuleSurface):
-        r = surface.radius
-        return _revolved(r * radius, r * z + half, sides)
-    raise TypeError(f"no triangles for {type(surface).__name__}")
-
-
-def _revolved(radius: np.ndarray, z: np.ndarray, sides: int) -> TriangleSurface:
-    """Returns the convex hull of circles about z, mirrored at z = 0.
-
-    Args:
-        radius, z: (N,) radii and heights of the circles, z >= 0 [m].
-        sides: number of sides of each circle.
-    """
-    angle = 2.0 * np.pi * np.arange(sides)[:, None] / sides
-    xyz = radius * np.cos(angle), radius * np.sin(angle), z
-    upper = np.stack(np.broadcast_arrays(*xyz), axis=-1).reshape(-1, 3)
-    vertices = np.unique(np.concatenate([upper, upper * (1, 1, -1)]), axis=0)
-    hull = ConvexHull(vertices)
-    triangles = hull.simplices.astype(np.int32)
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    outward = np.cross(b - a, c - a) * hull.equations[:, :3]
-    is_inside_out = outward.sum(axis=1) < 0.0
-    triangles[is_inside_out] = triangles[is_inside_out, ::-1]
-    return TriangleSurface(vertices, triangles)
+        radius, z = np.array([surface.radius]), np.array([half])
+    else:
+        radius, z = surface.radius * radius, surface.radius * z + half
+    return TriangleSurface(*revolved(radius, z, sides))

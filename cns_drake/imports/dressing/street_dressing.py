@@ -9,6 +9,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, MultiPoint, Point
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.round_shapes import revolved
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import Occupancy, placed
@@ -90,13 +91,11 @@ def without_curves(model: Model) -> Model:
             name = _DISC if is_disc else _POST
             sides = _SIDES_OF_DISC if is_disc else _SIDES
             part = _with_mesh(part, name, (r, r, shape.length))
-            meshes[name] = _turned((1.0, 1.0), (-0.5, 0.5), sides)
+            meshes[name] = _turned([1.0], [0.5], sides)
         elif isinstance(shape, SphereShape):
             part = _with_mesh(part, _BALL, (shape.radius,) * 3)
             low = np.sqrt(0.5)
-            meshes[_BALL] = _turned(
-                (low, 1.0, low), (-low, 0.0, low), _SIDES, 1.0
-            )
+            meshes[_BALL] = _turned([0.0, low, 1.0], [1.0, low, 0.0], _SIDES)
         parts.append(part)
     return replace(model, parts=tuple(parts), meshes=meshes)
 
@@ -106,42 +105,12 @@ def _with_mesh(part: Part, name: str, scale: tuple[float, ...]) -> Part:
     return replace(part, shape=MeshShape(name, (x, y, z)))
 
 
-def _turned(
-    radii: tuple[float, ...],
-    heights: tuple[float, ...],
-    sides: int,
-    pole: float | None = None,
-) -> Mesh:
-    """Returns a profile turned about z.
-
-    Args:
-        radii: from below.
-        heights: at these radii.
-        sides: sides of the polygon, which has the area of the circle.
-        pole: where the axis is met, above and below; at the same heights as
-            the first and the last radius if None.
-    """
+def _turned(radius: list[float], z: list[float], sides: int) -> Mesh:
+    """Returns a solid of `revolved` whose polygons have the circles' areas."""
     step = 2.0 * np.pi / sides
-    angle = step * np.arange(sides)
-    circle = np.sqrt(step / np.sin(step)) * np.column_stack(
-        [np.cos(angle), np.sin(angle)]
-    )
-    rings = [
-        np.column_stack([r * circle, np.full(sides, z)])
-        for r, z in zip(radii, heights, strict=True)
-    ]
-    low, high = (heights[0], heights[-1]) if pole is None else (-pole, pole)
-    vertices = np.concatenate([[(0.0, 0.0, low)], *rings, [(0.0, 0.0, high)]])
-    top = len(vertices) - 1
-    last = top - sides
-    faces: list[tuple[int, ...]] = []
-    for k in range(sides):
-        n = (k + 1) % sides
-        faces += [(0, 1 + n, 1 + k), (top, last + k, last + n)]
-        for start in range(1, last, sides):
-            above = start + sides
-            faces.append((start + k, start + n, above + n, above + k))
-    return Mesh(vertices, tuple(faces))
+    wide = np.sqrt(step / np.sin(step)) * np.array(radius)
+    vertices, triangles = revolved(wide, np.array(z), sides)
+    return Mesh(vertices, tuple(map(tuple, triangles.tolist())))
 
 
 # Least distance of all objects from the middle of a drive [m].
