@@ -13,7 +13,6 @@ from threadpoolctl import threadpool_limits
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.map_folder import LANES_NAME
-from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
@@ -272,22 +271,16 @@ def _report(
 ) -> ImportReport:
     return ImportReport(
         kinds=dict(Counter(one.kind for one in city.kept)),
-        triangles=sum(map(_triangles_of, city.kept)),
+        # All but buildings may share their meshes.
+        triangles=sum(
+            one.structure.model.num_triangles
+            if one.kind.startswith("Building")
+            else len(one.triangles)
+            for one in city.kept
+        ),
         stages={stage: len(some) for stage, some in city.standing.items()},
         undated=city.undated,
         dated=city.dated,
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
-    )
-
-
-def _triangles_of(one: Imported) -> int:
-    """Returns a structure's number of triangles; 0 if it shares its meshes."""
-    shapes = [part.shape for part in one.structure.model.parts]
-    if not one.kind.startswith("Building"):
-        return len(one.triangles)
-    return sum(
-        one.structure.model.meshes[shape.mesh].num_triangles
-        for shape in shapes
-        if isinstance(shape, MeshShape)
     )

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import os
 from pathlib import Path
+import re
 import shutil
 from typing import Any
 
@@ -19,7 +20,7 @@ import yaml
 from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import stage_sdf, structure_table
-from cns_drake.city.geometry.structures import BoxShape, MeshShape, Structure
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.whole_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
@@ -33,7 +34,7 @@ from cns_drake.imports.options import (
 from cns_drake.imports.staged_city import Growth, StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
-OF_BOX = 12  # triangles
+_OF_BOX = 12  # triangles
 _CRUISE = 8.0  # [m/s]
 _ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
 _DPI = 130
@@ -91,11 +92,12 @@ def write_world(
     triangles: dict[str, int] = {}
     for structure in structures:
         for name, mesh in structure.model.meshes.items():
+            path = f"{MESH_FOLDER}/{name}.obj"
             # Trees of a kind share their meshes.
-            if name not in triangles:
+            if path not in triangles:
                 text = mesh.to_obj()
-                (draft / MESH_FOLDER / f"{name}.obj").write_text(text, "utf-8")
-                triangles[name] = triangles_in(text)
+                (draft / path).write_text(text, "utf-8")
+                triangles[path] = triangles_in(text)
     sizes = {}
     for stage, some in city.standing.items():
         standing = [*bottom, *(one.structure for one in some)]
@@ -105,7 +107,7 @@ def write_world(
             comment=f"Imported by cns-drake from {source.name}.",
         )
         (draft / stage_name(stage)).write_text(text, "utf-8")
-        sizes[stage] = _size(standing, triangles)
+        sizes[stage] = stage_size(text, triangles)
     return sizes
 
 
@@ -116,16 +118,17 @@ def triangles_in(obj: str) -> int:
     return faces.count(" ") - 2 * faces.count("f")
 
 
-def _size(
-    structures: Sequence[Structure], triangles: Mapping[str, int]
-) -> tuple[int, int]:
-    """Returns the numbers of structures with a surface, and of triangles."""
-    shapes = [p.shape for one in structures for p in one.model.parts]
-    return sum(bool(one.model.parts) for one in structures), sum(
-        triangles[shape.mesh] if isinstance(shape, MeshShape) else OF_BOX
-        for shape in shapes
-        if isinstance(shape, MeshShape | BoxShape)
-    )
+def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
+    """Returns the numbers of structures with a surface, and of triangles.
+
+    Args:
+        sdf: the text of a stage.
+        triangles: path of a mesh in the map's folder -> its triangles.
+    """
+    structures = set(re.findall('visual name="([^"/]+)', sdf))
+    meshes = re.findall("<uri>([^<]+)</uri>", sdf)
+    boxes = _OF_BOX * sdf.count("<box>")
+    return len(structures), boxes + sum(map(triangles.__getitem__, meshes))
 
 
 def city_facts(

@@ -79,6 +79,16 @@ class Model:
     meshes: dict[str, Mesh]
     footprint: BaseGeometry
 
+    @property
+    def num_triangles(self) -> int:
+        """Triangles of all parts; any other shape counts as a box."""
+        return sum(
+            self.meshes[part.shape.mesh].num_triangles
+            if isinstance(part.shape, MeshShape)
+            else 12
+            for part in self.parts
+        )
+
 
 @dataclass(frozen=True)
 class Structure:

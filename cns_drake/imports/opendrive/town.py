@@ -1,9 +1,8 @@
 """A town on an imported road network, and its files."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
-import re
 
 import numpy as np
 import shapely
@@ -15,7 +14,7 @@ from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.starter import starter_plan, starter_stages
 from cns_drake.city.geometry.polygons import polygons_of
-from cns_drake.city.geometry.structures import MeshShape, Structure
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.streets import street_surfaces
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.open_ground import place_car
@@ -24,8 +23,8 @@ from cns_drake.city.plan.stages import Stages
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.map_files import (
-    OF_BOX,
     draw_overview,
+    stage_size,
     triangles_in,
     write_drives,
     write_facts,
@@ -372,10 +371,18 @@ def write_town(
         None,
         town.drives,
     )
-    sizes = _sizes(files, stages)
+    triangles = {
+        name: triangles_in(text)
+        for name, text in files.items()
+        if name.endswith(".obj")
+    }
+    sizes = {
+        stage: stage_size(files[stage_name(stage)], triangles)
+        for stage in stages
+    }
     report = ImportReport(
         kinds=town.kinds,
-        triangles=sum(map(_triangles, town.city.structures)),
+        triangles=sum(one.model.num_triangles for one in town.city.structures),
         stages={stage: size[0] for stage, size in sizes.items()},
         undated=0,
         dated=0,
@@ -383,43 +390,6 @@ def write_town(
         faults=town.faults.rows(),
     )
     return report, sizes
-
-
-def _sizes(
-    files: Mapping[str, str], stages: Iterable[str]
-) -> dict[str, tuple[int, int]]:
-    """Returns stage -> its numbers of structures and triangles.
-
-    Args:
-        files: path -> text, of the stages and their meshes.
-        stages: their names.
-    """
-    triangles = {
-        name: triangles_in(text)
-        for name, text in files.items()
-        if name.endswith(".obj")
-    }
-    sizes = {}
-    for stage in stages:
-        text = files[stage_name(stage)]
-        structures = set(re.findall('visual name="([^"/]+)', text))
-        meshes = re.findall("<uri>([^<]+)</uri>", text)
-        boxes = OF_BOX * text.count("<box>")
-        sizes[stage] = (
-            len(structures),
-            boxes + sum(map(triangles.__getitem__, meshes)),
-        )
-    return sizes
-
-
-def _triangles(structure: Structure) -> int:
-    count = 0
-    for part in structure.model.parts:
-        if isinstance(part.shape, MeshShape):
-            count += structure.model.meshes[part.shape.mesh].num_triangles
-        else:
-            count += OF_BOX
-    return count
 
 
 def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
