@@ -28,10 +28,6 @@ _PACKAGES = (
     "zstandard",
 )
 _BLOCK_BYTES = 1 << 20
-# Greatest number of files whose digests a process keeps.
-_MOST_KEPT = 64
-# File -> what notices its changes, and its digest.
-_kept: dict[Path, tuple[FileWatch, str]] = {}
 # The key of the inputs' combined digest in a recording's metadata.
 INPUTS_KEY = "inputs_sha256"
 
@@ -87,10 +83,7 @@ def digest_inputs(
         inputs["lanes"] = map_folder(scenario).lanes
     if scenario.traffic.fcd is not None:
         inputs["fcd"] = Path(scenario.traffic.fcd)
-    digests = {
-        name: digest_file(path, watch) if watch else _known_digest(path)
-        for name, path in inputs.items()
-    }
+    digests = {name: digest_file(one, watch) for name, one in inputs.items()}
     if watch and scenario.imu.kalibr is not None:
         watch.take_down(str(scenario.imu.kalibr))
     kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
@@ -160,23 +153,6 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     # The file itself comes last, without its name.
     _take(path, digest.update)
     return digest.hexdigest()
-
-
-def _known_digest(path: Path) -> str:
-    """Returns `digest_file`, read anew only if a file has changed since."""
-    path = path.absolute()
-    if path in _kept:
-        watch, digest = _kept[path]
-        if watch.changed() is None:
-            return digest
-        del _kept[path]
-    watch = FileWatch()
-    digest = digest_file(path, watch)
-    if watch.is_settled():
-        while len(_kept) >= _MOST_KEPT:
-            del _kept[next(iter(_kept))]
-        _kept[path] = watch, digest
-    return digest
 
 
 def _take(path: Path | str, update: Callable[[bytes], None]) -> None:

@@ -5,7 +5,6 @@ import os
 from pathlib import Path
 import re
 import stat
-import time
 from xml.parsers import expat
 
 from cns_drake.base.files import user_errors
@@ -19,10 +18,6 @@ _NAMING = {
     ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
     ".gltf": re.compile(rb'"uri"\s*:\s*"([^":]+)"'),
 }
-
-
-# Longest tick of a file system's clock, with a margin [ns].
-_TICK_NS = 3_000_000_000
 
 
 class FileWatch:
@@ -50,18 +45,6 @@ class FileWatch:
             if _state(_status(path)) != state:
                 return path
         return None
-
-    def is_settled(self) -> bool:
-        """Returns whether no file has changed shortly before now.
-
-        Clocks of file systems tick: of two changes within a tick, the second
-        one leaves no trace.
-        """
-        newest = max(
-            (max(state[2:]) for state in self._states.values() if state),
-            default=0,
-        )
-        return newest + _TICK_NS < time.time_ns()
 
 
 def _status(path: str) -> os.stat_result | None:

@@ -9,14 +9,12 @@ from helpers.tiny_drive import tiny_scenario
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scenarios import provenance
 from cns_drake.scenarios.provenance import (
     combined_digest,
     dependency_versions,
     digest_file,
     digest_inputs,
 )
-from cns_drake.scene import referenced_files
 
 MODEL = """<sdf version="1.9"><!-- <uri>left_out.obj</uri> --><model name="m">
 <link name="l"><visual name="v"><geometry><mesh><uri>{}</uri></mesh></geometry>
@@ -86,51 +84,6 @@ def test_each_file_that_a_world_reads_counts(scenario, tmp_path, name):
     file.unlink()
     if name != "tiny.sdf":
         assert digest_inputs(scenario)["world"] != before["world"]
-
-
-@pytest.fixture
-def digested(monkeypatch):
-    """Returns the files that are digested, as they are."""
-    files = []
-
-    def digest(path, watch=None):
-        files.append(path.name)
-        return digest_file(path, watch)
-
-    monkeypatch.setattr(provenance, "digest_file", digest)
-    monkeypatch.setattr(provenance, "_kept", {})
-    return files
-
-
-@pytest.mark.parametrize("name", [*READ, "tiny.sdf"])
-def test_files_are_digested_again_after_a_change(
-    scenario, tmp_path, name, digested, monkeypatch
-):
-    monkeypatch.setattr(referenced_files, "_TICK_NS", -(10**18))
-    before = digest_inputs(scenario)
-    assert digest_inputs(scenario) == before
-    assert len(digested) == 3
-    file = tmp_path / "world" / name
-    file.write_text(file.read_text() + "\n")
-    after = digest_inputs(scenario)
-    assert digested[3:] == ["tiny.sdf"]
-    provenance._kept.clear()
-    assert digest_inputs(scenario) == after != before
-
-
-def test_what_has_just_changed_is_digested_again(scenario, digested):
-    """Its next change may leave no trace in the clock."""
-    digest_inputs(scenario)
-    digest_inputs(scenario)
-    assert digested.count("tiny.sdf") == 2
-
-
-def test_few_digests_are_kept(scenario, digested, monkeypatch):
-    monkeypatch.setattr(referenced_files, "_TICK_NS", -(10**18))
-    monkeypatch.setattr(provenance, "_MOST_KEPT", 2)
-    digest_inputs(scenario)
-    assert len(digested) == 3
-    assert len(provenance._kept) == 2
 
 
 def test_what_a_world_does_not_read_does_not_count(scenario, tmp_path):
