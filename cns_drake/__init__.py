@@ -20,6 +20,14 @@ if TYPE_CHECKING:
     from cns_drake.scenarios.scenario import Scenario
     from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
     from cns_drake.scene.world import World, load_world
+    from cns_drake.sensors.drake_configs import (
+        ApplyImuConfig,
+        ApplyLidarConfig,
+        ApplyOdometryConfig,
+        ImuConfig,
+        LidarConfig,
+        OdometryConfig,
+    )
     from cns_drake.sensors.imu.imu import Imu, add_imu
     from cns_drake.sensors.imu.noise import ImuNoise
     from cns_drake.sensors.lidar.adding import add_lidar, add_lidar_view
@@ -47,18 +55,24 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LIDAR_PRESETS",
+    "ApplyImuConfig",
+    "ApplyLidarConfig",
+    "ApplyOdometryConfig",
     "BagWriter",
     "BeamPattern",
     "CalibratedReturns",
     "DirectionPattern",
     "Imu",
+    "ImuConfig",
     "ImuNoise",
     "InputError",
     "Lidar",
+    "LidarConfig",
     "McapRecorder",
     "MeasurementModel",
     "NoddingPattern",
     "Odometry",
+    "OdometryConfig",
     "RosettePattern",
     "Run",
     "Scenario",
@@ -101,6 +115,14 @@ _HOMES = {
     "cns_drake.scenarios.scenario": ("Scenario",),
     "cns_drake.scenarios.scenario_files": ("load_scenario", "make_scenario"),
     "cns_drake.scene.world": ("load_world", "World"),
+    "cns_drake.sensors.drake_configs": (
+        "ApplyImuConfig",
+        "ApplyLidarConfig",
+        "ApplyOdometryConfig",
+        "ImuConfig",
+        "LidarConfig",
+        "OdometryConfig",
+    ),
     "cns_drake.sensors.imu.imu": ("add_imu", "Imu"),
     "cns_drake.sensors.imu.noise": ("ImuNoise",),
     "cns_drake.sensors.lidar.adding": ("add_lidar", "add_lidar_view"),

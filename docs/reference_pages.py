@@ -32,9 +32,9 @@ from cns_drake.scenarios.scenario import (
     TrafficConfig,
     TransientConfig,
 )
-from cns_drake.sensors.imu.config import ImuConfig
-from cns_drake.sensors.lidar.config import LidarConfig, WeatherConfig
-from cns_drake.sensors.odometry.config import OdometryConfig
+from cns_drake.sensors.imu.config import ImuSection
+from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
+from cns_drake.sensors.odometry.config import OdometrySection
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 
@@ -49,10 +49,10 @@ SCENARIO: Sections = {
     "Ride": RideConfig,
     "Traffic": TrafficConfig,
     "Transient": TransientConfig,
-    "LiDARs": LidarConfig,
-    "IMU": ImuConfig,
+    "LiDARs": LidarSection,
+    "IMU": ImuSection,
     "Weather": WeatherConfig,
-    "Odometry": OdometryConfig,
+    "Odometry": OdometrySection,
 }
 FAMILY: Sections = {
     "Family": variation.Family,
@@ -99,7 +99,7 @@ def pages() -> dict[str, str]:
             "[Families](../scenarios.md#families) shows one. All fields but "
             "`ride` and `imu` multiply: every part, seed, city, route and "
             "LiDAR with every other.",
-            FAMILY | {"Ride": RideConfig, "IMU": ImuConfig},
+            FAMILY | {"Ride": RideConfig, "IMU": ImuSection},
         ),
         "city.md": _fields_page(
             "Fields of a city",

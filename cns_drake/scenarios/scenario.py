@@ -23,10 +23,10 @@ from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
-from cns_drake.sensors.imu.config import ImuConfig
-from cns_drake.sensors.lidar.config import LidarConfig, WeatherConfig
+from cns_drake.sensors.imu.config import ImuSection
+from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.odometry.config import OdometryConfig
+from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.sensors.sensor_config import (
     Section,
     SensorConfig,
@@ -279,12 +279,12 @@ class Scenario(Section):
     transient: TransientConfig = Field(
         default=TransientConfig(), exclude_if=lambda value: value.is_off
     )
-    lidars: dict[Name, LidarConfig] = Field(
-        default={"lidar": LidarConfig()}, min_length=1
+    lidars: dict[Name, LidarSection] = Field(
+        default={"lidar": LidarSection()}, min_length=1
     )
-    imu: ImuConfig = ImuConfig()
+    imu: ImuSection = ImuSection()
     weather: WeatherConfig = field_off_by_default(WeatherConfig())
-    odometry: OdometryConfig = field_off_by_default(OdometryConfig())
+    odometry: OdometrySection = field_off_by_default(OdometrySection())
     frames: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
 
@@ -329,7 +329,9 @@ class Scenario(Section):
 
     @field_validator("imu")
     @classmethod
-    def _check_imu_rate(cls, imu: ImuConfig, info: ValidationInfo) -> ImuConfig:
+    def _check_imu_rate(
+        cls, imu: ImuSection, info: ValidationInfo
+    ) -> ImuSection:
         if imu.rate is not None and "lidars" in info.data:
             check_rate(imu.rate, _fastest(info.data["lidars"]))
         return imu
@@ -337,8 +339,8 @@ class Scenario(Section):
     @field_validator("odometry")
     @classmethod
     def _check_odometry_rate(
-        cls, odometry: OdometryConfig, info: ValidationInfo
-    ) -> OdometryConfig:
+        cls, odometry: OdometrySection, info: ValidationInfo
+    ) -> OdometrySection:
         if odometry.rate is not None and "lidars" in info.data:
             # Every scan needs its own pose.
             fastest = _fastest(info.data["lidars"])
@@ -406,7 +408,7 @@ class Scenario(Section):
         """Returns the scenario with other returns of every LiDAR.
 
         Args:
-            returns: see `LidarConfig`. Calibrated returns drop the noise and
+            returns: see `LidarSection`. Calibrated returns drop the noise and
                 losses of ideal ones; ideal returns drop the weather.
             weather: in place of the scenario's.
         """
@@ -519,7 +521,7 @@ def _merge(
     return merged
 
 
-def _fastest(lidars: dict[str, LidarConfig]) -> int:
+def _fastest(lidars: dict[str, LidarSection]) -> int:
     return max(config.rate for config in lidars.values())
 
 

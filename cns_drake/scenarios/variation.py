@@ -42,8 +42,8 @@ from cns_drake.scenarios.scenario_files import (
 )
 from cns_drake.scenarios.shipped import shipped_drives
 from cns_drake.scene.world import load_world, structures_in
-from cns_drake.sensors.imu.config import ImuConfig
-from cns_drake.sensors.lidar.config import LidarConfig
+from cns_drake.sensors.imu.config import ImuSection
+from cns_drake.sensors.lidar.config import LidarSection
 
 # Tags of structures that can be missing; streets, ground and furniture stay.
 _REMOVABLE = ("building", "vegetation")
@@ -134,7 +134,7 @@ class Family(_Model):
     routes: DrawnRoutes | None = None
     lidars: tuple[str, ...] = ()
     ride: RideConfig | None = None
-    imu: ImuConfig | None = None
+    imu: ImuSection | None = None
 
 
 def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
@@ -202,7 +202,7 @@ def vary(
         text = f"what stage {family.towards} lacks"
         removable = _difference(base, stage, family.towards, source)
     routes = _routes(base, family)
-    units: list[tuple[str | None, dict[str, LidarConfig]]]
+    units: list[tuple[str | None, dict[str, LidarSection]]]
     units = [(None, base.lidars)]
     if family.lidars:
         units = [

@@ -29,8 +29,8 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import World
 from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.imu.imu import apply_imu_config
-from cns_drake.sensors.lidar.adding import apply_lidar_config
+from cns_drake.sensors.imu.imu import add_described_imu
+from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation.loaded_drive import (
     load_stage,
@@ -146,11 +146,12 @@ def make_station(
         if moving is not None and config.motion_distortion:
             # They keep moving during a turn.
             moving_bodies = moving.moving_frames
-        lidar = apply_lidar_config(
+        lidar = add_described_lidar(
             config,
             builder,
             scene_graph,
             base,
+            sensor_pose(config),
             name=name,
             seed=scenario.seed,
             weather=scenario.weather,
@@ -169,7 +170,7 @@ def make_station(
         if moving is not None:
             connect_traffic(builder, moving, lidar, config.motion_distortion)
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
-    measured |= apply_imu_config(
+    measured |= add_described_imu(
         scenario.imu,
         builder,
         base,

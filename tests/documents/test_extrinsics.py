@@ -5,8 +5,8 @@ import numpy as np
 import yaml
 
 from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.imu.config import ImuConfig
-from cns_drake.sensors.lidar.config import LidarConfig
+from cns_drake.sensors.imu.config import ImuSection
+from cns_drake.sensors.lidar.config import LidarSection
 
 
 def test_extrinsics_are_those_of_the_default_places():
@@ -17,7 +17,7 @@ def test_extrinsics_are_those_of_the_default_places():
         for row in rows
         if row[0].strip("`") in ("extrinsicTrans", "extrinsic_T")
     }
-    X_LI = sensor_pose(LidarConfig()).inverse() @ sensor_pose(ImuConfig())
+    X_LI = sensor_pose(LidarSection()).inverse() @ sensor_pose(ImuSection())
     np.testing.assert_allclose(said["extrinsicTrans"], X_LI.translation())
     np.testing.assert_allclose(
         said["extrinsic_T"], X_LI.inverse().translation()

@@ -697,5 +697,9 @@ NOT_RUN = {
     "cns-eval pr --method map-closures": "needs an extra",
     "pip install '.[map-closures]'": "installs that extra",
     "pip install '.[kiss-matcher]'": "likewise",
+    "python -m pydrake.visualization.meldis": "a server, which does not end; "
+    "test_example_diagrams runs the scenario",
+    "lidars: typing.Mapping": "lines of an example of Drake's",
+    "for _, lidar in scenario": "likewise",
     "@misc{song2025city": "a citation",
 }

@@ -22,7 +22,7 @@ from cns_drake.sensors.sensor_config import (
 KALIBR_FILE = "imu.yaml"
 
 
-class ImuConfig(Mount):
+class ImuSection(Mount):
     """An IMU, ideal and with one sample a scan unless a field says otherwise.
 
     Attributes:
@@ -50,7 +50,7 @@ class ImuConfig(Mount):
     @property
     def is_ideal(self) -> bool:
         """Whether it measures exactly, once a scan."""
-        return self == ImuConfig(xyz=self.xyz, rpy_deg=self.rpy_deg)
+        return self == ImuSection(xyz=self.xyz, rpy_deg=self.rpy_deg)
 
     def sample_rate(self, scan_rate: int) -> int:
         """Returns the samples per second.

@@ -28,7 +28,7 @@ from cns_drake.sensors.carriers import (
     connect_motion,
     sensor_pose,
 )
-from cns_drake.sensors.imu.config import ImuConfig
+from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 
 # Rounding error of a sample's time, in periods.
@@ -144,8 +144,8 @@ def add_imu(
     return replace(imu, noisy=noisy)
 
 
-def apply_imu_config(
-    config: ImuConfig,
+def add_described_imu(
+    config: ImuSection,
     builder: DiagramBuilder,
     body: RigidBody,
     *,

@@ -21,13 +21,9 @@ from pydrake.systems.framework import DiagramBuilder, System
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleSweep
 from cns_drake.scene.perception_geometry import geometry_revision_port
-from cns_drake.sensors.carriers import (
-    body_and_pose,
-    connect_motion,
-    sensor_pose,
-)
+from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.config import (
-    LidarConfig,
+    LidarSection,
     WeatherConfig,
     make_measurement,
     make_pattern,
@@ -156,11 +152,12 @@ def add_lidar(
     return lidar
 
 
-def apply_lidar_config(
-    config: LidarConfig,
+def add_described_lidar(
+    config: LidarSection,
     builder: DiagramBuilder,
     scene_graph: SceneGraph,
-    body: RigidBody,
+    body: RigidBody | Frame,
+    X_PS: RigidTransform,
     *,
     name: str = "lidar",
     seed: int = 0,
@@ -174,7 +171,8 @@ def apply_lidar_config(
         config: the description.
         builder: holds `scene_graph`.
         scene_graph: the SceneGraph to scan.
-        body: the body that carries it.
+        body: P, the body that carries it, or a frame on one.
+        X_PS: pose of the sensor in P.
         name: name of the system.
         seed: seed of its noise.
         weather: weather around it.
@@ -187,7 +185,7 @@ def apply_lidar_config(
         builder,
         scene_graph,
         body,
-        sensor_pose(config),
+        X_PS,
         pattern,
         name=name,
         measurement=make_measurement(config, name, seed),

@@ -50,7 +50,7 @@ class WeatherConfig(Section):
         return Weather(self.visibility, self.rain, self.snowfall)
 
 
-class LidarConfig(Mount):
+class LidarSection(Mount):
     """A LiDAR.
 
     Attributes:
@@ -106,7 +106,7 @@ class LidarConfig(Mount):
         return preset
 
     @model_validator(mode="after")
-    def _check_returns(self) -> LidarConfig:
+    def _check_returns(self) -> LidarSection:
         if self.returns == "ideal":
             if self.echoes != Echoes.STRONGEST:
                 raise ValueError(
@@ -122,7 +122,7 @@ class LidarConfig(Mount):
         return self
 
     @model_validator(mode="after")
-    def _check_unit(self) -> LidarConfig:
+    def _check_unit(self) -> LidarSection:
         unit = LIDAR_PRESETS[self.preset].pattern
         if self.columns and unit.num_columns is None:
             raise ValueError(f"the preset '{self.preset}' has no columns")
@@ -134,7 +134,7 @@ class LidarConfig(Mount):
             )
         return self
 
-    def with_preset(self, preset: str) -> LidarConfig:
+    def with_preset(self, preset: str) -> LidarSection:
         """Returns another unit with the same place and measurement.
 
         Raises:
@@ -147,19 +147,19 @@ class LidarConfig(Mount):
         )
 
 
-def make_lidar_config(preset: str) -> LidarConfig:
+def make_lidar_config(preset: str) -> LidarSection:
     """Returns a LiDAR of a preset.
 
     Raises:
         InputError: there is no such preset.
     """
     try:
-        return LidarConfig(preset=preset)
+        return LidarSection(preset=preset)
     except ValidationError as error:
         raise InputError(describe_validation_error("--lidar", error)) from None
 
 
-def make_pattern(config: LidarConfig) -> BeamPattern:
+def make_pattern(config: LidarSection) -> BeamPattern:
     """Returns the beams of one turn."""
     return make_beam_pattern(
         config.preset,
@@ -171,7 +171,7 @@ def make_pattern(config: LidarConfig) -> BeamPattern:
 
 
 def make_returns(
-    config: LidarConfig, weather: WeatherConfig, name: str, seed: int
+    config: LidarSection, weather: WeatherConfig, name: str, seed: int
 ) -> CalibratedReturns | None:
     """Returns the model of a LiDAR's calibrated returns; None for ideal ones.
 
@@ -196,7 +196,7 @@ def make_returns(
 
 
 def make_measurement(
-    config: LidarConfig, name: str, seed: int
+    config: LidarSection, name: str, seed: int
 ) -> MeasurementModel:
     """Returns the model of a LiDAR's measurement of true ranges.
 

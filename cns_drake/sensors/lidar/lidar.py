@@ -374,9 +374,11 @@ class Lidar(LeafSystem):
         frame = round(time / self._pattern.period)
         if self._pattern.repeats:
             return frame, self._first
-        if self._latest.frame != frame:
-            self._latest = _Turn(frame, self._pattern.beams(frame))
-        return frame, self._latest
+        # Two threads may ask for different turns.
+        turn = self._latest
+        if turn.frame != frame:
+            turn = self._latest = _Turn(frame, self._pattern.beams(frame))
+        return frame, turn
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
         """Returns positions and orientations of S: one, or each column's."""

@@ -3,7 +3,7 @@
 from cns_drake.sensors.sensor_config import Section
 
 
-class OdometryConfig(Section):
+class OdometrySection(Section):
     """The rate at which the exact motion of the vehicle is recorded.
 
     Attributes:

@@ -104,6 +104,7 @@ def add_odometry(
     builder: DiagramBuilder,
     body: RigidBody | Frame,
     *,
+    X_PB: RigidTransform | None = None,
     motion: System | None = None,
     name: str = "odometry",
 ) -> OdometrySensor:
@@ -113,6 +114,8 @@ def add_odometry(
         builder: holds the plant, or `motion`.
         body: the body to observe, or a frame fixed on it, of a finalized
             plant.
+        X_PB: pose of the observed place B in it, by default the body or frame
+            itself.
         motion: the source of body poses and velocities, if not the plant
             itself.
         name: name of the system.
@@ -126,9 +129,11 @@ def add_odometry(
 
         odometry = add_odometry(builder, body)
     """
-    carrier, X_BP = body_and_pose(body, RigidTransform())
-    X_PB = X_BP if isinstance(body, Frame) else None
-    sensor = builder.AddNamedSystem(name, OdometrySensor(carrier, X_PB))
+    carrier, X_CB = body_and_pose(body, X_PB or RigidTransform())
+    is_body = X_PB is None and not isinstance(body, Frame)
+    sensor = builder.AddNamedSystem(
+        name, OdometrySensor(carrier, None if is_body else X_CB)
+    )
     ports = ("body_poses", "body_spatial_velocities")
     inputs = {port: sensor.GetInputPort(port) for port in ports}
     connect_motion(builder, motion, carrier, inputs)

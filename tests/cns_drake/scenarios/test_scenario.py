@@ -19,7 +19,7 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.scenarios.shipped import recordable_drives
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.config import (
-    LidarConfig,
+    LidarSection,
     WeatherConfig,
     make_pattern,
 )
@@ -85,7 +85,7 @@ def test_preset_replaces_the_lidar_where_it_is():
     own = {"lidars": {"a": {"columns": 64, "range_noise": 0.02}}}
     values = scenario.model_dump() | own
     config = make_scenario(values, "test").with_lidar_preset("vlp-16")
-    assert config.lidars["a"] == LidarConfig(preset="vlp-16", range_noise=0.02)
+    assert config.lidars["a"] == LidarSection(preset="vlp-16", range_noise=0.02)
     with pytest.raises(InputError, match=r"--lidar: preset: .*os2-128.*vlp-16"):
         scenario.with_lidar_preset("os2-128")
 
@@ -96,12 +96,12 @@ def test_returns_and_weather_are_replaced(small_map):
     fog = WeatherConfig(visibility=80.0)
     foggy = scenario.with_returns("calibrated", fog)
     assert foggy.weather == fog
-    assert foggy.lidars["a"] == LidarConfig(returns="calibrated")
+    assert foggy.lidars["a"] == LidarSection(returns="calibrated")
     # A written scenario is read again.
     values = foggy.model_dump(mode="json")
     assert make_scenario(values, "test") == foggy
     clear = foggy.with_returns("ideal")
-    assert clear.lidars["a"] == LidarConfig()
+    assert clear.lidars["a"] == LidarSection()
     # Without these fields a scenario is written as before there were any.
     dumped = clear.model_dump(mode="json")
     assert "weather" not in dumped
@@ -321,8 +321,8 @@ def test_a_base_has_what_a_drive_leaves_out(tmp_path):
     assert (shipped.aside, drive.aside) == (1.2, 0.0)
     assert drive.without == ("tower",)
     assert drive.lidars == {
-        "a": LidarConfig(preset="vlp-16", rpy_deg=(0, 10, 0), xyz=(1, 0, 2)),
-        "b": LidarConfig(),
+        "a": LidarSection(preset="vlp-16", rpy_deg=(0, 10, 0), xyz=(1, 0, 2)),
+        "b": LidarSection(),
     }
     # It is recorded whole, without its base.
     values = drive.model_dump(mode="json", exclude_none=True)

@@ -3,6 +3,7 @@
 A few towers stand in place of Downtown, which takes long to load and to show.
 """
 
+import os
 from pathlib import Path
 import re
 import shutil
@@ -45,3 +46,49 @@ def test_an_example_runs_and_shows_its_points(name, small_map, tmp_path):
     assert int(count) > least
     points = objects(read_commands(page.read_text()))
     assert any(key.startswith(path) for key in points)
+
+
+def test_a_scenario_file_runs_and_publishes_its_scans():
+    """In a process of its own, where messages stay."""
+    code = """
+import sys
+
+from drake import lcmt_point_cloud
+from pydrake.common.yaml import yaml_load_typed
+
+sys.path.insert(0, sys.argv[1])
+import hardware_scenario
+
+scenario = yaml_load_typed(
+    schema=hardware_scenario.Scenario,
+    data=open(sys.argv[2]).read(),
+    defaults=hardware_scenario.Scenario(),
+)
+simulator = hardware_scenario.make_simulator(scenario)
+simulator.set_target_realtime_rate(0.0)
+simulator.AdvanceTo(0.5)
+diagram, root = simulator.get_system(), simulator.get_context()
+for name in ("roof", "mast"):
+    lidar = diagram.GetSubsystemByName(name)
+    context = lidar.GetMyContextFromRoot(root)
+    p_WS = lidar.GetOutputPort("X_WS").Eval(context).translation()
+    print(name, len(lidar.GetOutputPort("scan").Eval(context)), *p_WS)
+"""
+    file = DIAGRAMS / "scenarios" / "robot_and_car.yaml"
+    done = subprocess.run(
+        [sys.executable, "-c", code, DIAGRAMS, file],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"LCM_DEFAULT_URL": "memq://"},
+    )
+    rows = dict(line.split(" ", 1) for line in done.stdout.splitlines())
+    count, x, y, z = map(float, rows["roof"].split())
+    assert count > 20_000
+    # The car stands still, 1.6 m below its LiDAR.
+    assert [x, y, z] == pytest.approx([1.0, 3.0, 1.6], abs=0.01)
+    count, x, y, z = map(float, rows["mast"].split())
+    assert count > 50_000
+    # The robot speeds up to 9 rad/s of its wheels, 1.08 m/s, along x.
+    assert -6.0 + 0.05 < x < -6.0 + 0.54
+    assert [y, z] == pytest.approx([0.0, 0.8], abs=0.02)

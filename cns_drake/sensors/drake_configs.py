@@ -1,0 +1,429 @@
+"""Sensors described as Drake describes its cameras.
+
+A struct that `pydrake.common.yaml` reads and writes, and a function that adds
+what it describes to a diagram and publishes it on LCM. The fields of a struct
+are those of the section of a scenario, which stays the only description.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import dataclasses
+from enum import Enum
+from typing import Any, Literal, get_args, get_origin
+
+from drake import lcmt_drake_signal, lcmt_point_cloud
+import numpy as np
+from pydantic import ValidationError
+from pydrake.common.schema import Transform
+from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import SceneGraph
+from pydrake.lcm import DrakeLcm, DrakeLcmInterface
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import GetScopedFrameByName
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
+from pydrake.perception import PointCloudToLcm
+from pydrake.systems.framework import (
+    Context,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+    PortDataType,
+)
+from pydrake.systems.lcm import (
+    LcmBuses,
+    LcmInterfaceSystem,
+    LcmPublisherSystem,
+)
+
+from cns_drake.base.errors import describe_validation_error
+from cns_drake.sensors.imu.config import ImuSection
+from cns_drake.sensors.imu.imu import Imu, add_imu
+from cns_drake.sensors.lidar.adding import add_described_lidar
+from cns_drake.sensors.lidar.config import LidarSection
+from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.odometry.config import OdometrySection
+from cns_drake.sensors.odometry.odometry import (
+    Odometry,
+    OdometrySensor,
+    add_odometry,
+)
+from cns_drake.sensors.sensor_config import Section
+
+# Fields of a section that a struct leaves out: `X_PB` stands for the place, and
+# a layout is that of a recording.
+_LEFT_OUT = ("xyz", "rpy_deg", "layout")
+# Messages a second of a sensor that names no rate, as of a LiDAR's scans.
+_RATE = 20
+
+
+def _struct(kind: str, section: type[Section], doc: str) -> type:
+    """Returns the struct with a section's fields, and Drake's own.
+
+    `yaml_load_typed` takes plain types alone: a choice of values becomes the
+    type of these values, and is checked when the struct is applied.
+    """
+    fields: list[tuple[str, Any, Any]] = [
+        ("name", str, kind.lower()),
+        ("X_PB", Transform, dataclasses.field(default_factory=Transform)),
+    ]
+    for name, info in section.model_fields.items():
+        if name in _LEFT_OUT:
+            continue
+        kept, default = info.annotation, info.default
+        if get_origin(kept) is Literal:
+            kept = type(get_args(kept)[0])
+        if isinstance(default, Enum):
+            kept, default = str, default.value
+        fields.append((name, kept, default))
+    fields += [("seed", int, 0), ("lcm_bus", str, "default")]
+    made = dataclasses.make_dataclass(f"{kind}Config", fields)
+    made.__module__, made.__doc__ = __name__, doc
+    return made
+
+
+LidarConfig = _struct(
+    "Lidar",
+    LidarSection,
+    """A LiDAR, as YAML describes it to Drake.
+
+    Beside the fields of a LiDAR in a scenario, but for place and layout:
+
+    Attributes:
+        name: names the system and the channel.
+        X_PB: pose of the sensor; its `base_frame` names P, a frame of the
+            plant, by default the world's.
+        seed: seed of its noise.
+        lcm_bus: name of the bus that it publishes on.
+
+    Example:
+        from pydrake.common.yaml import yaml_load_typed
+
+        from cns_drake import LidarConfig
+
+        text = "{preset: os1-64, rate: 10}"
+        config = yaml_load_typed(schema=LidarConfig, data=text)
+    """,
+)
+ImuConfig = _struct(
+    "Imu",
+    ImuSection,
+    """An IMU, as YAML describes it to Drake; see `LidarConfig`.
+
+    Without a rate, of its own or in Kalibr's file, it publishes 20 messages a
+    second.
+
+    Example:
+        from cns_drake import ImuConfig
+
+        config = ImuConfig(name="imu", rate=200)
+    """,
+)
+OdometryConfig = _struct(
+    "Odometry",
+    OdometrySection,
+    """Odometry, as YAML describes it to Drake; see `LidarConfig`.
+
+    Without a rate it publishes 20 messages a second.
+
+    Example:
+        from cns_drake import OdometryConfig
+
+        config = OdometryConfig(name="odometry", rate=100)
+    """,
+)
+
+
+def ApplyLidarConfig(
+    config: Any,
+    builder: DiagramBuilder,
+    plant: MultibodyPlant | None = None,
+    scene_graph: SceneGraph | None = None,
+    lcm_buses: LcmBuses | None = None,
+    lcm: DrakeLcmInterface | LcmInterfaceSystem | None = None,
+) -> Lidar:
+    """Adds a LiDAR to a diagram, and publishes its scans on LCM.
+
+    The scans, in the world, are `lcmt_point_cloud` on the channel
+    `DRAKE_POINT_CLOUD_<name>`, one a turn; Meldis shows them.
+
+    Args:
+        config: a `LidarConfig`.
+        builder: holds plant and SceneGraph.
+        plant: finalized; by default the system named `plant`.
+        scene_graph: by default the system named `scene_graph`.
+        lcm_buses: the buses of which the config names one.
+        lcm: the interface to publish on, in place of a bus. Without buses and
+            interface, an interface to the default URL is added.
+
+    Returns:
+        The system, as `add_lidar` does.
+
+    Raises:
+        RuntimeError: there is no such plant, SceneGraph, frame or bus, or the
+            plant is not finalized.
+        ValueError: a field of the config is out of range.
+
+    Example:
+        from cns_drake import ApplyLidarConfig, LidarConfig
+
+        ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
+    """
+    section = _section(config, LidarSection)
+    plant = plant or builder.GetSubsystemByName("plant")
+    scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
+    frame, X_PB = _place(config, plant)
+    lidar = add_described_lidar(
+        section,
+        builder,
+        scene_graph,
+        frame,
+        X_PB,
+        name=config.name,
+        seed=config.seed,
+        motion_distortion=section.motion_distortion,
+    )
+    to_lcm = builder.AddNamedSystem(
+        f"{config.name}_to_lcm", PointCloudToLcm("world")
+    )
+    builder.Connect(
+        lidar.GetOutputPort("point_cloud_W"), to_lcm.get_input_port()
+    )
+    publisher = LcmPublisherSystem.Make(
+        f"DRAKE_POINT_CLOUD_{config.name}",
+        lcmt_point_cloud,
+        _interface(config, builder, lcm_buses, lcm),
+        publish_period=lidar.pattern.period,
+        use_cpp_serializer=True,
+    )
+    builder.AddNamedSystem(f"{config.name}_publisher", publisher)
+    builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
+    return lidar
+
+
+def ApplyImuConfig(
+    config: Any,
+    builder: DiagramBuilder,
+    plant: MultibodyPlant | None = None,
+    scene_graph: SceneGraph | None = None,
+    lcm_buses: LcmBuses | None = None,
+    lcm: DrakeLcmInterface | LcmInterfaceSystem | None = None,
+) -> Imu:
+    """Adds an IMU to a diagram, and publishes its samples on LCM.
+
+    They are `lcmt_drake_signal` on the channel `DRAKE_IMU_<name>`: specific
+    force [m/s^2] and angular velocity [rad/s] in its frame.
+
+    Args:
+        config: an `ImuConfig`.
+        builder: see `ApplyLidarConfig`, as for all further arguments.
+        plant: see there.
+        scene_graph: not used; all sensors have the same arguments.
+        lcm_buses: see there.
+        lcm: see there.
+
+    Raises:
+        InputError: Kalibr's file cannot be used.
+        RuntimeError: see there.
+        ValueError: see there.
+
+    Example:
+        from cns_drake import ApplyImuConfig, ImuConfig
+
+        ApplyImuConfig(ImuConfig(rate=200), builder)
+    """
+    section = _section(config, ImuSection)
+    plant = plant or builder.GetSubsystemByName("plant")
+    rate = section.sample_rate(_RATE)
+    ideal = section.model_copy(update={"rate": None}).is_ideal
+    imu = add_imu(
+        builder,
+        *_place(config, plant),
+        rate=rate,
+        noise=None if ideal else section.noise(config.seed),
+        name=config.name,
+    )
+    ports = imu.ports()
+    axes = [f"{name}_{axis}" for name in ports for axis in "xyz"]
+    _publish_signal(
+        builder,
+        f"DRAKE_IMU_{config.name}",
+        config,
+        ports.values(),
+        axes,
+        lambda *values: np.hstack(values),
+        rate,
+        _interface(config, builder, lcm_buses, lcm),
+    )
+    return imu
+
+
+def ApplyOdometryConfig(
+    config: Any,
+    builder: DiagramBuilder,
+    plant: MultibodyPlant | None = None,
+    scene_graph: SceneGraph | None = None,
+    lcm_buses: LcmBuses | None = None,
+    lcm: DrakeLcmInterface | LcmInterfaceSystem | None = None,
+) -> OdometrySensor:
+    """Adds exact odometry of a frame B to a diagram; publishes it on LCM.
+
+    It is `lcmt_drake_signal` on the channel `DRAKE_ODOMETRY_<name>`: the
+    quaternion of R_WB (w first), p_WB [m], then angular and linear velocity in
+    the world, expressed in B [rad/s, m/s].
+
+    Args:
+        config: an `OdometryConfig`.
+        builder: see `ApplyLidarConfig`, as for all further arguments.
+        plant: see there.
+        scene_graph: not used; all sensors have the same arguments.
+        lcm_buses: see there.
+        lcm: see there.
+
+    Raises:
+        RuntimeError: see there.
+        ValueError: see there.
+
+    Example:
+        from cns_drake import ApplyOdometryConfig, OdometryConfig
+
+        ApplyOdometryConfig(OdometryConfig(rate=100), builder)
+    """
+    section = _section(config, OdometrySection)
+    plant = plant or builder.GetSubsystemByName("plant")
+    frame, X_PB = _place(config, plant)
+    odometry = add_odometry(builder, frame, X_PB=X_PB, name=config.name)
+    axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
+    axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
+    _publish_signal(
+        builder,
+        f"DRAKE_ODOMETRY_{config.name}",
+        config,
+        [odometry.GetOutputPort("odometry")],
+        axes,
+        _odometry_values,
+        section.rate or _RATE,
+        _interface(config, builder, lcm_buses, lcm),
+    )
+    return odometry
+
+
+def _section(config: Any, kind: type[Section]) -> Any:
+    """Returns the checked fields of a struct, without those left out."""
+    given = {
+        name: getattr(config, name)
+        for name in kind.model_fields
+        if name not in _LEFT_OUT
+    }
+    try:
+        return kind.model_validate(given)
+    except ValidationError as error:
+        source = f"{type(config).__name__} {config.name}"
+        text = describe_validation_error(source, error, kind)
+        raise ValueError(text) from None
+
+
+def _place(config: Any, plant: MultibodyPlant) -> tuple[Frame, RigidTransform]:
+    """Returns the frame P that carries a sensor, and X_PB."""
+    frame = plant.world_frame()
+    if config.X_PB.base_frame is not None:
+        frame = GetScopedFrameByName(plant, config.X_PB.base_frame)
+    return frame, config.X_PB.GetDeterministicValue()
+
+
+def _interface(
+    config: Any,
+    builder: DiagramBuilder,
+    lcm_buses: LcmBuses | None,
+    lcm: DrakeLcmInterface | LcmInterfaceSystem | None,
+) -> DrakeLcmInterface | LcmInterfaceSystem:
+    caller = f"{type(config).__name__} {config.name}"
+    if lcm is not None:
+        return lcm
+    if lcm_buses is not None:
+        return lcm_buses.Find(caller, config.lcm_bus)
+    if config.lcm_bus != "default":
+        raise RuntimeError(
+            f"{caller}: lcm_bus: there is no bus '{config.lcm_bus}' without "
+            "lcm_buses"
+        )
+    return builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
+
+
+def _odometry_values(odometry: Odometry) -> np.ndarray:
+    X_WB, V_WB_B = odometry.X_WB, odometry.V_WB_B
+    return np.hstack(
+        [
+            X_WB.rotation().ToQuaternion().wxyz(),
+            X_WB.translation(),
+            V_WB_B.rotational(),
+            V_WB_B.translational(),
+        ]
+    )
+
+
+def _publish_signal(
+    builder: DiagramBuilder,
+    channel: str,
+    config: Any,
+    ports: Iterable[OutputPort],
+    names: list[str],
+    values: Callable[..., np.ndarray],
+    rate: float,
+    lcm: DrakeLcmInterface | LcmInterfaceSystem,
+) -> None:
+    """Adds the systems that publish ports as one signal."""
+    ports = list(ports)
+    signal = builder.AddNamedSystem(
+        f"{config.name}_to_lcm", _SignalToLcm(ports, names, values)
+    )
+    for index, port in enumerate(ports):
+        builder.Connect(port, signal.get_input_port(index))
+    publisher = LcmPublisherSystem.Make(
+        channel, lcmt_drake_signal, lcm, publish_period=1.0 / rate
+    )
+    builder.AddNamedSystem(f"{config.name}_publisher", publisher)
+    builder.Connect(signal.get_output_port(), publisher.get_input_port())
+
+
+class _SignalToLcm(LeafSystem):
+    """Converts the values of ports to an `lcmt_drake_signal`."""
+
+    def __init__(
+        self,
+        ports: list[OutputPort],
+        names: list[str],
+        values: Callable[..., np.ndarray],
+    ):
+        """Declares an input for each port.
+
+        Args:
+            ports: whose types the inputs have.
+            names: names of the values.
+            values: returns them, from the values of all ports.
+        """
+        super().__init__()
+        self._names, self._values = names, values
+        for index, port in enumerate(ports):
+            if port.get_data_type() == PortDataType.kVectorValued:
+                self.DeclareVectorInputPort(f"u{index}", port.size())
+            else:
+                self.DeclareAbstractInputPort(f"u{index}", port.Allocate())
+        self.DeclareAbstractOutputPort(
+            "lcmt_drake_signal",
+            lambda: Value(lcmt_drake_signal()),
+            self._calc,
+        )
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        inputs = [
+            self.get_input_port(index).Eval(context)
+            for index in range(self.num_input_ports())
+        ]
+        message = lcmt_drake_signal()
+        message.val = self._values(*inputs).tolist()
+        message.dim = len(message.val)
+        message.coord = self._names
+        message.timestamp = round(context.get_time() * 1e6)
+        output.set_value(message)

@@ -1,0 +1,320 @@
+"""Sensors described and applied as Drake does it with its cameras."""
+
+from concurrent.futures import ThreadPoolExecutor
+import dataclasses
+
+from drake import lcmt_drake_signal, lcmt_point_cloud
+from helpers.browser import chromium, has_chromium
+import numpy as np
+from pydrake.common.schema import Transform
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+from pydrake.geometry import Box
+from pydrake.lcm import DrakeLcm, DrakeLcmParams
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.tree import SpatialInertia
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.lcm import ApplyLcmBusConfig, LcmSubscriberSystem
+from pydrake.visualization._meldis import Meldis
+import pytest
+
+from cns_drake import (
+    ApplyImuConfig,
+    ApplyLidarConfig,
+    ApplyOdometryConfig,
+    ImuConfig,
+    LidarConfig,
+    OdometryConfig,
+    load_scenario,
+)
+
+X_WR = RigidTransform(RollPitchYaw(0.0, 0.0, 0.6), [1.0, -2.0, 0.5])
+X_RS = RigidTransform(RollPitchYaw(0.1, -0.2, 2.0), [0.3, 0.1, 0.9])
+ROOF = """
+name: roof
+preset: vlp-16
+rate: 10
+range_noise: 0.01
+seed: 3
+X_PB:
+  base_frame: robot
+  translation: [0.3, 0.1, 0.9]
+  rotation: !Rpy
+    deg: [5.729577951308232, -11.459155902616464, 114.59155902616465]
+"""
+
+
+def make_site():
+    """Returns builder and plant of a robot in a closed room."""
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
+    for k, xyz in enumerate([[9, 0, 0], [-7, 0, 0], [0, 8, 0], [0, -6, 0]]):
+        size = [0.2, 30.0, 9.0] if k < 2 else [30.0, 0.2, 9.0]
+        plant.RegisterVisualGeometry(
+            plant.world_body(),
+            RigidTransform(xyz),
+            Box(*size),
+            f"wall_{k}",
+            np.full(4, 0.5),
+        )
+    inertia = SpatialInertia.SolidBoxWithMass(10.0, 0.5, 0.3, 0.2)
+    robot = plant.AddRigidBody("robot", inertia)
+    plant.WeldFrames(plant.world_frame(), robot.body_frame(), X_WR)
+    plant.Finalize()
+    return builder, plant
+
+
+def read_roof():
+    return yaml_load_typed(
+        schema=LidarConfig, data=ROOF, defaults=LidarConfig()
+    )
+
+
+def advance(builder, lcm, duration, *channels):
+    """Returns the messages of channels that a simulation published."""
+    received = {channel: [] for channel in channels}
+    for channel in channels:
+        lcm.Subscribe(channel, received[channel].append)
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(duration)
+    while lcm.HandleSubscriptions(0):
+        pass
+    return simulator, received
+
+
+def points_of(message):
+    """Returns the (N, 3) float32 points of an encoded cloud."""
+    cloud = lcmt_point_cloud.decode(message)
+    rows = np.frombuffer(cloud.data, np.uint8).reshape(cloud.width, -1)
+    return cloud, rows[:, :12].copy().view(np.float32)
+
+
+def test_yaml_and_back():
+    config = read_roof()
+    X_PB = config.X_PB.GetDeterministicValue()
+    assert X_PB.IsNearlyEqualTo(X_RS, 1e-12)
+    text = yaml_dump_typed(config, schema=LidarConfig)
+    again = yaml_load_typed(schema=LidarConfig, data=text)
+    assert yaml_dump_typed(again, schema=LidarConfig) == text
+    assert "preset: vlp-16" in text
+    with pytest.raises(RuntimeError, match="columms"):
+        yaml_load_typed(schema=LidarConfig, data="{columms: 3}")
+
+
+@pytest.mark.parametrize(
+    ("struct", "section"),
+    [
+        (LidarConfig, lambda scenario: scenario.lidars["lidar"]),
+        (ImuConfig, lambda scenario: scenario.imu),
+        (OdometryConfig, lambda scenario: scenario.odometry),
+    ],
+)
+def test_fields_are_those_of_a_scenario(struct, section):
+    described = section(load_scenario("riverside_01"))
+    fields = {f.name: f.default for f in dataclasses.fields(struct)}
+    for name in ("name", "X_PB", "seed", "lcm_bus"):
+        del fields[name]
+    names = set(type(described).model_fields) - {"xyz", "rpy_deg", "layout"}
+    assert set(fields) == names
+    for name, default in fields.items():
+        kept = getattr(described, name)
+        assert default == getattr(kept, "value", kept), name
+
+
+def test_published_scans_are_the_lidars():
+    builder, _ = make_site()
+    lcm = DrakeLcm("memq://")
+    lidar = ApplyLidarConfig(read_roof(), builder, lcm=lcm)
+    channel = "DRAKE_POINT_CLOUD_roof"
+    simulator, received = advance(builder, lcm, 0.4, channel)
+    assert len(received[channel]) == 5
+    cloud, p_WPs = points_of(received[channel][-1])
+    assert cloud.frame_name == "world"
+    context = lidar.GetMyContextFromRoot(simulator.get_context())
+    expected = lidar.GetOutputPort("point_cloud_W").Eval(context).xyzs()
+    np.testing.assert_array_equal(p_WPs, expected.T)
+    X_WS = lidar.GetOutputPort("X_WS").Eval(context)
+    assert X_WS.IsNearlyEqualTo(X_WR @ X_RS, 1e-12)
+    # Each point is on a wall, but for noise and rounding.
+    off = np.abs(p_WPs[:, :1] - [8.9, -6.9]).min(axis=1)
+    off = np.minimum(off, np.abs(p_WPs[:, 1:2] - [7.9, -5.9]).min(axis=1))
+    assert off.std() > 0.003
+    assert off.max() < 0.06
+
+
+@pytest.mark.parametrize("period", [0.02, 0.05, 0.1])
+def test_a_scan_depends_on_its_time_alone(period):
+    """However often others publish, a Simulator gives the same scan."""
+    builder, _ = make_site()
+    lidar = ApplyLidarConfig(read_roof(), builder, lcm=DrakeLcm("memq://"))
+    odometry = OdometryConfig(rate=round(1.0 / period))
+    ApplyOdometryConfig(odometry, builder, lcm=DrakeLcm("memq://"))
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(0.4)
+    port = lidar.GetOutputPort("scan")
+    seen = port.Eval(lidar.GetMyContextFromRoot(simulator.get_context()))
+    fresh = lidar_at(lidar, simulator.get_system(), 0.4)
+    np.testing.assert_array_equal(seen, fresh)
+
+
+def lidar_at(lidar, diagram, time):
+    context = diagram.CreateDefaultContext()
+    context.SetTime(time)
+    port = lidar.GetOutputPort("scan")
+    return port.Eval(lidar.GetMyContextFromRoot(context)).copy()
+
+
+@pytest.mark.parametrize("preset", ["vlp-16", "mid-360"])
+def test_two_threads_with_contexts_of_their_own(preset):
+    builder, _ = make_site()
+    config = dataclasses.replace(read_roof(), preset=preset, rate=20)
+    lidar = ApplyLidarConfig(config, builder, lcm=DrakeLcm("memq://"))
+    diagram = builder.Build()
+    times = [0.05 * k for k in range(8)]
+    expected = [lidar_at(lidar, diagram, time) for time in times]
+    with ThreadPoolExecutor(2) as pool:
+        again = 3 * list(range(8))
+        scans = pool.map(lambda k: lidar_at(lidar, diagram, times[k]), again)
+        for k, scan in zip(again, scans, strict=True):
+            np.testing.assert_array_equal(scan, expected[k])
+
+
+def test_imu_and_odometry_publish_signals():
+    builder, plant = make_site()
+    lcm = DrakeLcm("memq://")
+    place = Transform(X_RS)
+    place.base_frame = "robot"
+    ApplyImuConfig(
+        ImuConfig(X_PB=place, rate=100), builder, plant=plant, lcm=lcm
+    )
+    ApplyOdometryConfig(OdometryConfig(X_PB=place), builder, lcm=lcm)
+    names = ("DRAKE_IMU_imu", "DRAKE_ODOMETRY_odometry")
+    _, received = advance(builder, lcm, 0.2, *names)
+    imu, odometry = (
+        [lcmt_drake_signal.decode(one) for one in received[name]]
+        for name in names
+    )
+    assert [m.timestamp for m in imu] == [10_000 * k for k in range(21)]
+    assert len(odometry) == 5
+    X_WS = X_WR @ X_RS
+    # At rest an accelerometer measures what holds it up.
+    up_S = X_WS.rotation().inverse() @ [0.0, 0.0, 9.81]
+    np.testing.assert_allclose(imu[-1].val, [*up_S, 0, 0, 0], atol=1e-12)
+    assert imu[-1].coord[:2] == ["specific_force_x", "specific_force_y"]
+    quaternion = X_WS.rotation().ToQuaternion().wxyz()
+    np.testing.assert_allclose(
+        odometry[-1].val,
+        [*quaternion, *X_WS.translation(), *np.zeros(6)],
+        atol=1e-12,
+    )
+
+
+def test_an_imu_has_the_errors_of_its_config():
+    builder, _ = make_site()
+    lcm = DrakeLcm("memq://")
+    config = ImuConfig(rate=200, gyroscope_turn_on_bias=0.1, seed=5)
+    ApplyImuConfig(config, builder, lcm=lcm)
+    _, received = advance(builder, lcm, 0.1, "DRAKE_IMU_imu")
+    values = [
+        lcmt_drake_signal.decode(m).val for m in received["DRAKE_IMU_imu"]
+    ]
+    bias = np.array(values)[:, 3:]
+    assert (bias == bias[0]).all()
+    assert 0.01 < np.abs(bias[0]).max() < 0.5
+
+
+def test_buses_by_name():
+    builder, _ = make_site()
+    params = DrakeLcmParams(lcm_url="memq://")
+    buses = ApplyLcmBusConfig({"default": params, "second": params}, builder)
+    config = dataclasses.replace(read_roof(), lcm_bus="second")
+    ApplyLidarConfig(config, builder, lcm_buses=buses)
+    heard = {}
+    for name in ("default", "second"):
+        heard[name] = builder.AddNamedSystem(
+            f"heard_{name}",
+            LcmSubscriberSystem.Make(
+                "DRAKE_POINT_CLOUD_roof",
+                lcmt_point_cloud,
+                buses.Find("test", name),
+            ),
+        )
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(0.2)
+    counts = {}
+    for name, system in heard.items():
+        context = system.GetMyContextFromRoot(simulator.get_context())
+        counts[name] = system.get_output_port().Eval(context).width
+    assert counts["default"] == 0
+    assert counts["second"] > 0
+    config = dataclasses.replace(read_roof(), name="b", lcm_bus="third")
+    builder, _ = make_site()
+    buses = ApplyLcmBusConfig({"default": params}, builder)
+    with pytest.raises(RuntimeError, match=r"LidarConfig b.*third"):
+        ApplyLidarConfig(config, builder, lcm_buses=buses)
+    with pytest.raises(RuntimeError, match=r"b: lcm_bus.*'third'"):
+        ApplyLidarConfig(dataclasses.replace(config, name="b"), make_site()[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"preset": "vlp16"}, "roof: preset: unknown preset 'vlp16'"),
+        ({"rate": 7}, "roof: rate: "),
+        ({"dropout": 1.5}, "roof: dropout: "),
+        ({"returns": "calibrated"}, "roof: .*range_noise"),
+        ({"echoes": "some"}, "roof: echoes: "),
+    ],
+)
+def test_faults_name_config_and_field(change, fault):
+    config = dataclasses.replace(read_roof(), **change)
+    with pytest.raises(ValueError, match=fault):
+        ApplyLidarConfig(config, make_site()[0], lcm=DrakeLcm("memq://"))
+
+
+def test_a_frame_that_is_not_there():
+    config = read_roof()
+    config.X_PB.base_frame = "mast"
+    with pytest.raises(RuntimeError, match="mast"):
+        ApplyLidarConfig(config, make_site()[0], lcm=DrakeLcm("memq://"))
+
+
+def test_scalar_conversion_is_refused_by_name():
+    """As Drake's own RgbdSensor, a LiDAR is for double alone."""
+    builder, _ = make_site()
+    ApplyLidarConfig(read_roof(), builder, lcm=DrakeLcm("memq://"))
+    diagram = builder.Build()
+    for convert in (diagram.ToAutoDiffXd, diagram.ToSymbolic):
+        with pytest.raises(RuntimeError, match=r"::roof of type .*Lidar does"):
+            convert()
+
+
+@pytest.mark.skipif(not has_chromium(), reason="needs Chromium")
+def test_meldis_draws_the_scans(tmp_path, monkeypatch):
+    monkeypatch.setenv("LCM_DEFAULT_URL", "memq://")
+    meldis = Meldis()
+    builder, _ = make_site()
+    lidar = ApplyLidarConfig(read_roof(), builder, lcm=meldis._lcm)
+    simulator, _ = advance(builder, meldis._lcm, 0.1)
+    meldis._invoke_subscriptions()
+    page = tmp_path / "meldis.html"
+    page.write_text(meldis.meshcat.StaticHtml())
+    context = lidar.GetMyContextFromRoot(simulator.get_context())
+    count = len(lidar.GetOutputPort("scan").Eval(context))
+    software = ("--use-gl=angle", "--use-angle=swiftshader")
+    with chromium(tmp_path / "profile", *software) as browser:
+        browser.open(page.as_uri(), 800, 600)
+        browser.wait_for('typeof viewer !== "undefined"')
+        drawn = browser.evaluate("""(() => {
+          const found = [];
+          viewer.scene.traverse((one) => {
+            if (one.isPoints) found.push(one);
+          });
+          return found.map((one) => {
+            let shown = true;
+            for (let k = one; k; k = k.parent) shown = shown && k.visible;
+            return [one.geometry.attributes.position.count, shown];
+          });
+        })()""")
+    assert drawn == [[count, True]]
