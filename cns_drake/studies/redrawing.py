@@ -100,11 +100,10 @@ class RedrawCity(Step):
 
     def is_done(self) -> bool:
         # A folder that has its final name is complete.
-        return Part(self.folder / _PART).is_current(self._made_of())
+        return Part(self.folder / _PART).is_current(self.sources())
 
     def run(self, reporter: Reporter) -> None:
-        folder, made_of = self.folder, self._made_of()
-        inputs = redrawn_inputs(self.map_folder, self.stage, self.seed)
+        folder, made_of = self.folder, self.sources()
         part = part_path(folder)
         # The folder inside has its final name already, since its files contain
         # it.
@@ -114,9 +113,10 @@ class RedrawCity(Step):
                 # Left behind by a run that was killed.
                 shutil.rmtree(part, ignore_errors=True)
                 draft.mkdir(parents=True)
-                for name, content in inputs.items():
+                for name, content in self.inputs().items():
                     (draft / name).write_bytes(content)
             try:
+                self.finish_inputs(draft)
                 generate_city(draft)
             except InputError as error:
                 fault = str(error).removeprefix(f"{draft}{os.sep}")
@@ -135,10 +135,24 @@ class RedrawCity(Step):
         finally:
             shutil.rmtree(part, ignore_errors=True)
 
-    def _made_of(self) -> dict[str, object]:
-        inputs = redrawn_inputs(self.map_folder, self.stage, self.seed)
+    def inputs(self) -> dict[str, bytes]:
+        """Returns name -> content of the inputs of the city."""
+        return redrawn_inputs(self.map_folder, self.stage, self.seed)
+
+    def finish_inputs(self, draft: Path) -> None:
+        """Writes inputs that depend on the city itself.
+
+        Args:
+            draft: the folder with all others.
+        """
+
+    def sources(self) -> dict[str, object]:
+        """Returns all that the city depends on, ready for JSON."""
         return {
-            **{name: content.decode() for name, content in inputs.items()},
+            **{
+                name: content.decode()
+                for name, content in self.inputs().items()
+            },
             "code": code_digest("cns_drake.city.*"),
         }
 
@@ -167,15 +181,16 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     stages = {stage: {"story": f"The whole city, as seed {seed} draws it."}}
     return {
         roads.name: network,
-        plan.name: _to_yaml(
+        plan.name: to_yaml(
             "the map's plan with another seed",
             read_yaml(plan) | {"seed": seed},
         ),
-        STAGES_NAME: _to_yaml("its only stage", {"stages": stages}),
+        STAGES_NAME: to_yaml("its only stage", {"stages": stages}),
     }
 
 
-def _to_yaml(title: str, values: dict) -> bytes:
+def to_yaml(title: str, values: dict) -> bytes:
+    """Returns an input of a redrawn city, with its mark and a title."""
     comment = (
         f"{_MARK.decode()} {__version__}: {title}.\n"
         "# `cns-drake generate --vary` writes it anew when the map changes.\n"
