@@ -10,7 +10,7 @@ from cns_drake.command_line.laddering import ladder, levels
 from cns_drake.command_line.maps import city, import_city, list_drives
 from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
-from cns_drake.command_line.reproducing import reproduce
+from cns_drake.command_line.reproducing import fresh, reproduce
 from cns_drake.command_line.simulating import generate, scan, simulate
 from cns_drake.command_line.trends import trend
 
@@ -47,6 +47,11 @@ app.command(
 app.command(
     epilog=example("cns-drake reproduce metropolis --output study --quick")
 )(reproduce)
+app.command(
+    epilog=example(
+        "cns-drake fresh suburbia --number 1 --number 2 --output fresh"
+    )
+)(fresh)
 app.command(
     epilog=example(
         "cns-drake trend --vary family.yaml \\",

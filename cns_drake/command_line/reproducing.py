@@ -1,4 +1,4 @@
-"""The command `cns-drake reproduce`."""
+"""The commands `cns-drake reproduce` and `cns-drake fresh`."""
 
 from typing import Annotated
 
@@ -12,6 +12,7 @@ from cns_drake.command_line.options import (
     Maps,
     MethodFiles,
     Output,
+    Results,
     Scheduler,
 )
 from evaluation.command_line.options import Costs, Settings, with_protocol
@@ -65,6 +66,51 @@ def reproduce(
         own_methods=method or (),
         settings=parameter or (),
         with_costs=costs,
+        on_note=note,
+    )
+    typer.echo(report)
+
+
+@with_protocol
+def fresh(
+    maps: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="MAP", help="Shipped maps; all of them by default."
+        ),
+    ] = None,
+    *,
+    output: Results,
+    number: Annotated[
+        list[int] | None,
+        typer.Option(
+            metavar="N",
+            help="A version, from 1 to 5; may be repeated. All by default.",
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    method: MethodFiles = None,
+    protocol: RetrievalProtocol,
+) -> None:
+    """Evaluate cities that no method has seen.
+
+    Each map has five versions: the same streets and stages between other
+    buildings, with real drivers; two are turned, so that their streets lie off
+    the axes. Their seeds were drawn before any method ran on them. Nothing is
+    recorded. After an interruption the same command goes on where it was.
+    """
+    with uninterrupted():
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.studies.fresh_cities import evaluate_fresh_cities
+
+    report = evaluate_fresh_cities(
+        maps or (),
+        number or (),
+        output,
+        choose_cluster(jobs, scheduler),
+        protocol=protocol,
+        own_methods=method or (),
         on_note=note,
     )
     typer.echo(report)

@@ -692,6 +692,9 @@ NOT_RUN = {
     "drives, for minutes; test_cli scans with calibrated returns",
     "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
     "script of another project; test_traffic_recording records traffic",
+    "cns-drake fresh": "draws shipped cities and drives through them, for many "
+    "minutes; test_fresh_cities draws a small one",
+    ".venv/bin/cns-drake fresh": "likewise",
     "cns-drake levels mine": "needs these hours; test_levels has such tables",
     "cns-drake levels ours": "likewise",
     "cns-eval pr --method map-closures": "needs an extra",
