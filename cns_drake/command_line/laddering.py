@@ -14,6 +14,8 @@ from cns_drake.command_line.options import (
     MethodFiles,
     Results,
     Scheduler,
+    Task,
+    TaskName,
 )
 
 
@@ -66,6 +68,7 @@ def ladder(
             help="Repeat all random draws N times, and give means.",
         ),
     ] = 1,
+    task: TaskName = Task.PLACE,
     method: MethodFiles = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
@@ -85,6 +88,7 @@ def ladder(
             QUICK_EXTENT,
             QUICK_PROTOCOL,
             climb_ladder,
+            localise_rungs,
         )
         from cns_drake.studies.ladder_rungs import (
             CAUSES,
@@ -108,8 +112,9 @@ def ladder(
             "--levels: the levels are frozen; leave out --quick, --cause, "
             "--seeds, --pairs and --viewpoint"
         )
+    if task is Task.LOCALISE and (levels or pairs):
+        raise InputError("--task localise: leave out --levels and --pairs")
     cluster = choose_cluster(jobs, scheduler)
-    methods = choose_methods(method or ())
     causes = tuple(cause or CAUSES)
     for name in causes:
         if name not in (*CAUSES, *EXTRAS):
@@ -130,11 +135,17 @@ def ladder(
     )
     if levels:
         extent, protocol = LEVELS_EXTENT, LEVELS_PROTOCOL
+    if task is Task.LOCALISE:
+        spacing = protocol.query_spacing
+        own = method or ()
+        path = localise_rungs(maps, output, cluster, extent, spacing, own, note)
+        typer.echo(path)
+        return
     path, text = climb_ladder(
         maps,
         output,
         cluster,
-        methods,
+        choose_methods(method or ()),
         extent,
         protocol,
         with_pairs=pairs,

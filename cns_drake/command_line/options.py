@@ -1,5 +1,6 @@
 """Options that several commands and the diagram scripts share."""
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -57,6 +58,23 @@ Maps = Annotated[
     typer.Argument(
         metavar="MAP",
         help="Maps, by name or folder; all shipped ones by default.",
+    ),
+]
+
+
+class Task(str, Enum):
+    """What drives are compared for."""
+
+    PLACE = "place"
+    LOCALISE = "localise"
+
+
+TaskName = Annotated[
+    Task,
+    typer.Option(
+        "--task",
+        help="Recognise places, or localise scans in the map of the older "
+        "drive.",
     ),
 ]
 MethodFiles = Annotated[

@@ -14,6 +14,8 @@ from cns_drake.command_line.options import (
     Output,
     Results,
     Scheduler,
+    Task,
+    TaskName,
 )
 from evaluation.command_line.options import Costs, Settings, with_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -44,18 +46,28 @@ def reproduce(
     method: MethodFiles = None,
     parameter: Settings = None,
     costs: Costs = True,
+    task: TaskName = Task.PLACE,
     protocol: RetrievalProtocol,
 ) -> None:
     """Simulate a map, evaluate it and report."""
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.reproduction import reproduce_maps
+        from cns_drake.studies.reproduction import (
+            localise_maps,
+            reproduce_maps,
+        )
 
     cluster = choose_cluster(jobs, scheduler)
     if quick and pages:
         raise InputError(
             "--quick and --pages exclude each other; give one of them"
         )
+    if task is Task.LOCALISE:
+        if parameter or pages:
+            raise InputError("--task localise: leave out --set and --pages")
+        spacing = protocol.query_spacing
+        typer.echo(localise_maps(maps, output, cluster, spacing, method or ()))
+        return
     report = reproduce_maps(
         maps,
         output,

@@ -56,6 +56,11 @@ from evaluation.report.ladder import (
     strongest_causes,
 )
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.localisation import (
+    SHIPPED,
+    LocalisedPair,
+    localise_pairs,
+)
 from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
 from evaluation.study.rungs import DescribedSource, measure_rung
 from evaluation.study.surveys import DescribeDrive
@@ -151,6 +156,62 @@ def climb_ladder(
         measured += _measure(planned, plans, cluster, protocol)
         pairs = ladder_rows(measured)[len(rows) :]
     return _write(measured, rows, pairs, output, protocol, extent)
+
+
+def localise_rungs(
+    maps: Sequence[str] | None,
+    output: Path,
+    cluster: Cluster,
+    extent: Extent,
+    spacing: float,
+    own_methods: Sequence[Path] = (),
+    on_note: Callable[[str], None] = lambda text: None,
+) -> Path:
+    """Localises the queries of all rungs of maps in the maps of the databases.
+
+    A rung that changes only how a query is described, or adds places, is left
+    out.
+
+    Args:
+        maps: by name or folder; all shipped ones if empty.
+        output: see `localise_pairs`.
+        cluster: where the work is done.
+        extent: the part of the ladder.
+        spacing: between two queries [m].
+        own_methods: Python files with estimators, run besides the shipped.
+        on_note: receives notes on things that a map lacks.
+
+    Returns:
+        The path of the table.
+
+    Raises:
+        InputError: a map is unknown, the folder cannot be made, or a step
+            failed.
+    """
+    pairs = []
+    for drive in _query_drives(maps or shipped_maps()):
+        rungs, notes = plan_rungs(drive, extent)
+        for text in notes:
+            on_note(f"{drive.source}: {text}")
+        pairs += [
+            LocalisedPair(
+                map_folder(drive).name,
+                str(drive.stage),
+                str(drive.stage),
+                rung.cause,
+                rung.level,
+                rung.strength,
+                (
+                    DriveSimulation(rung.drives.database),
+                    DriveSimulation(rung.drives.query),
+                ),
+                rung.seed,
+            )
+            for rung in rungs
+            if not (rung.drives.query_changes or rung.drives.num_distractors)
+        ]
+    methods = (*SHIPPED, *map(str, own_methods))
+    return localise_pairs(pairs, output, cluster, methods, spacing)
 
 
 def _measure(

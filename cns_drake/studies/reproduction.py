@@ -25,8 +25,13 @@ from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
+from evaluation.study.localisation import (
+    SHIPPED,
+    LocalisedPair,
+    localise_pairs,
+)
 from evaluation.study.plan import plan_study
-from evaluation.study.surveys import Survey
+from evaluation.study.surveys import DriveSource, RecordedDrive, Survey
 
 
 def reproduce_maps(
@@ -128,6 +133,64 @@ def reproduce_maps(
         reference=reference,
         on_note=on_note,
     )
+
+
+def localise_maps(
+    maps: Sequence[str] | None,
+    output: Path,
+    cluster: Cluster,
+    spacing: float,
+    own_methods: Sequence[Path] = (),
+) -> Path:
+    """Localises the last drive of maps in the maps of the earlier drives.
+
+    Drives that are recorded in the folder are read, others are simulated and
+    not recorded. Levels count back from the last stage; at the cause `routes`,
+    the same routes are driven in the last stage.
+
+    Args:
+        maps: by name or folder; all shipped ones if empty.
+        output: see `localise_pairs`.
+        cluster: where the work is done.
+        spacing: between two queries [m].
+        own_methods: Python files with estimators, run besides the shipped.
+
+    Returns:
+        The path of the table.
+
+    Raises:
+        InputError: a map is unknown, the folder cannot be made, or a step
+            failed.
+    """
+
+    def source(drive: Scenario) -> DriveSource:
+        if is_recorded(drive, output):
+            return RecordedDrive(output.absolute() / drive.name)
+        return DriveSimulation(drive)
+
+    pairs = []
+    for folder in [recordable_map(name) for name in maps or _recordable_maps()]:
+        drives = _drives(folder)
+        query = max(drives, key=lambda drive: drive.stage or "")
+        older = [drive for drive in drives if drive is not query]
+        for cause, known in (
+            ("routes", control_drives(drives)),
+            ("stages", older),
+        ):
+            pairs += [
+                LocalisedPair(
+                    folder.name,
+                    drive.name,
+                    query.name,
+                    cause,
+                    level,
+                    f"map of {drive.name}",
+                    (source(drive), source(query)),
+                )
+                for level, drive in enumerate(reversed(known), start=1)
+            ]
+    methods = (*SHIPPED, *map(str, own_methods))
+    return localise_pairs(pairs, output, cluster, methods, spacing)
 
 
 def _surveyed(recording: Job, study: Sequence[Job]) -> Job:

@@ -379,8 +379,8 @@ _KINDS = {
     "gicp": "GICP",
     "vgicp": "VGICP",
 }
-_KISS_MATCHER = "kiss-matcher"
-METHODS = (*_KINDS, _KISS_MATCHER)
+KISS_MATCHER = "kiss-matcher"
+METHODS = (*_KINDS, KISS_MATCHER)
 # The best on unchanged cities; see docs/localisation.md.
 _DEFAULTS: dict[str, Settings] = {}
 
@@ -403,7 +403,7 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
     """
     if method in _KINDS:
         return partial(_by_small_gicp, _KINDS[method], settings)
-    if method == _KISS_MATCHER:
+    if method == KISS_MATCHER:
         try:
             import kiss_matcher
         except ImportError as error:

@@ -1,6 +1,6 @@
 """The results of a ladder: their numbers, tables, words and figure."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from operator import attrgetter
@@ -571,6 +571,24 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"
 
 
+class CauseCell(NamedTuple):
+    """One level of a cell of a figure of methods over causes.
+
+    Attributes:
+        method: its column.
+        cause: its line.
+        level: strength of the cause.
+        share: the colour, from 0 to 1; NaN for none.
+        label: the number of the strongest level.
+    """
+
+    method: str
+    cause: str
+    level: int
+    share: float
+    label: str
+
+
 def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
     """Draws the share of the AUC without a change that each cause leaves.
 
@@ -582,60 +600,87 @@ def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
         stem: path to write, without ending.
     """
     maps = list(dict.fromkeys(row.rung.map_name for row in rows))
-    methods = in_table_order(row.method for row in rows)
-    causes = list(dict.fromkeys(row.rung.cause for row in rows))
+    panels = {
+        (name, f"{name}, {words}"): [
+            CauseCell(
+                row.method,
+                row.rung.cause,
+                row.rung.level,
+                row.kept.share,
+                _label(row),
+            )
+            for row in rows
+            if row.rung.map_name == name and row.is_gated == is_gated
+        ]
+        for name in maps
+        for is_gated, words in _TITLES.items()
+    }
+    draw_cells(panels, "part of AUC that is kept", stem)
+
+
+def draw_cells(
+    panels: Mapping[tuple[str, str], Sequence[CauseCell]],
+    meaning: str,
+    stem: Path,
+) -> None:
+    """Draws methods over causes, a strip for each level.
+
+    Args:
+        panels: map and title -> cells; those of a map are side by side.
+        meaning: of the colours.
+        stem: path to write, without ending.
+    """
+    cells = [cell for panel in panels.values() for cell in panel]
+    maps = list(dict.fromkeys(name for name, _ in panels))
+    methods = in_table_order(cell.method for cell in cells)
+    causes = list(dict.fromkeys(cell.cause for cell in cells))
     size = (
         _EDGES[0] + 2 * _CELL_WIDTH * len(methods),
         len(maps) * (_EDGES[1] + _CELL_HEIGHT * len(causes)),
     )
     figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(len(maps), 2, squeeze=False, sharey=True)
-    for name, line in zip(maps, panels, strict=True):
-        for axes, (is_gated, words) in zip(line, _TITLES.items(), strict=True):
-            shown = [
-                row
-                for row in rows
-                if row.rung.map_name == name and row.is_gated == is_gated
-            ]
-            _draw_panel(axes, shown, methods, causes)
-            axes.set_title(plain(f"{name}, {words}"), fontsize=_FONT_SIZE + 1)
+    grid = figure.subplots(len(maps), 2, squeeze=False, sharey=True)
+    for axes, ((_, words), panel) in zip(
+        grid.flat, panels.items(), strict=True
+    ):
+        _draw_panel(axes, panel, methods, causes)
+        axes.set_title(plain(words), fontsize=_FONT_SIZE + 1)
     bar = figure.colorbar(
         ScalarMappable(_SHARES, _COLOURS),
-        ax=panels[:, 1],
+        ax=grid[:, 1],
         shrink=0.8,
         aspect=30,
     )
-    bar.set_label("part of AUC that is kept", fontsize=_FONT_SIZE)
+    bar.set_label(meaning, fontsize=_FONT_SIZE)
     bar.ax.tick_params(labelsize=_FONT_SIZE)
     save(figure, stem)
 
 
 def _draw_panel(
     axes: Axes,
-    rows: Sequence[LadderRow],
+    panel: Sequence[CauseCell],
     methods: Sequence[str],
     causes: Sequence[str],
 ) -> None:
-    cells: dict[tuple[str, str], list[LadderRow]] = {}
-    for row in rows:
-        cells.setdefault((row.method, row.rung.cause), []).append(row)
+    cells: dict[tuple[str, str], list[CauseCell]] = {}
+    for cell in panel:
+        cells.setdefault((cell.method, cell.cause), []).append(cell)
     for (method, cause), levels in cells.items():
         x, y = methods.index(method), causes.index(cause)
-        levels.sort(key=lambda row: row.rung.level)
+        levels.sort(key=lambda cell: cell.level)
         width = 1.0 / len(levels)
-        for k, row in enumerate(levels):
-            share = row.kept.share
+        for k, cell in enumerate(levels):
+            share = cell.share
             colour = "lightgray" if math.isnan(share) else _COLOURS(share)
             axes.add_patch(
                 Rectangle((x + k * width, y), width, 1.0, color=colour, lw=0)
             )
-        strongest = levels[-1]
-        share = strongest.kept.share
+        share = levels[-1].share
         is_light = math.isnan(share) or _LIGHT[0] < share < _LIGHT[1]
         axes.text(
             x + 0.5,
             y + 0.5,
-            _label(strongest),
+            levels[-1].label,
             ha="center",
             va="center",
             color="black" if is_light else "white",

@@ -1,13 +1,21 @@
 """Figures of localisation."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from matplotlib.figure import Figure
 import numpy as np
 
-from evaluation.localisation.localise import RIGHT_TRANSLATION
+from evaluation.localisation.localise import (
+    RIGHT_TRANSLATION,
+    Localisation,
+    Starts,
+)
 from evaluation.localisation.tracking import LOST
 from evaluation.report.drawing import save
+from evaluation.report.ladder import CauseCell, draw_cells
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:
@@ -38,3 +46,74 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
         axes.grid(alpha=0.3)
         axes.margins(x=0.01)
     save(figure, stem, ("png",))
+
+
+@dataclass(frozen=True)
+class LocalisedRow:
+    """A method on a pair of drives, from starts of one kind.
+
+    Attributes:
+        map_name: name of the city.
+        database, query: names of the drives.
+        cause: of the change between them.
+        level: its strength, from 1 to 4; 0 without a change.
+        strength: in words.
+        method: name of the estimator.
+        starts: the draw of starts.
+        rows: (K,) of `QUERY`.
+    """
+
+    map_name: str
+    database: str
+    query: str
+    cause: str
+    level: int
+    strength: str
+    method: str
+    starts: Starts
+    rows: np.ndarray
+
+    @cached_property
+    def summary(self) -> dict[str, float | int | None]:
+        """All numbers."""
+        return Localisation(self.rows).to_json()
+
+    @property
+    def share(self) -> float:
+        """Share of the queries that end right; the colour of the figure."""
+        return float(self.summary["success_03m_1deg"] or 0.0)
+
+    @property
+    def label(self) -> str:
+        """Median error of position [cm]."""
+        error = self.summary["translation_median"]
+        if error is None:
+            return "–"
+        return f"{100.0 * error:.1f}" if error < 0.1 else f"{100.0 * error:.0f}"
+
+
+def draw_localised(rows: Sequence[LocalisedRow], stem: Path) -> None:
+    """Draws the share of right ends that each cause leaves.
+
+    A cell has a strip for each level, the weakest at its left; the number is
+    the median error at the strongest level [cm].
+
+    Args:
+        rows: rows for all maps, causes, methods and starts.
+        stem: path to write, without ending.
+    """
+    maps = list(dict.fromkeys(row.map_name for row in rows))
+    starts = list(dict.fromkeys(row.starts for row in rows))
+    panels = {
+        (
+            name,
+            f"{name}, start {draw.radius:g} m, {draw.turn_deg:g} deg",
+        ): [
+            CauseCell(row.method, row.cause, row.level, row.share, row.label)
+            for row in rows
+            if row.map_name == name and row.starts == draw
+        ]
+        for name in maps
+        for draw in starts
+    }
+    draw_cells(panels, "part within 0.3 m and 1 deg; numbers: cm", stem)

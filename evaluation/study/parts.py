@@ -283,6 +283,10 @@ class StudyFiles:
         """Returns the part with the `RungOutcome`s of a rung of a ladder."""
         return self._part("rungs", name)
 
+    def localised(self, name: str) -> Part:
+        """Returns the part with the localised queries of a pair of drives."""
+        return self._part("localised", name)
+
     def drawn(self, stem: str) -> Part:
         """Returns the part that names the inputs of a figure."""
         return self._part("figures", stem)

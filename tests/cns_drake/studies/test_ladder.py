@@ -22,7 +22,11 @@ from cns_drake.simulation.loaded_drive import (
 )
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies import ladder
-from cns_drake.studies.ladder import climb_ladder, distracting_drives
+from cns_drake.studies.ladder import (
+    climb_ladder,
+    distracting_drives,
+    localise_rungs,
+)
 from cns_drake.studies.ladder_rungs import (
     CAUSES,
     STRENGTHS,
@@ -34,6 +38,7 @@ from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.overlaps import find_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.localisation import SHIPPED
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
 # Fields that a cause may change, apart from the drive's name.
@@ -410,3 +415,22 @@ def test_the_page_has_every_cause():
         documents.read("docs/ladder.md"), "## What is compared"
     )
     assert [row[0].strip("`") for row in table] == list(CAUSES[1:])
+
+
+def test_rungs_are_localised(town, tmp_path):
+    path = localise_rungs(
+        [str(town)],
+        tmp_path,
+        Cluster(1),
+        Extent(causes=("construction", "hidden", "size"), levels=(4,)),
+        20.0,
+    )
+    with open(path, newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    # Hidden sectors and more places change no map.
+    assert [row["cause"] for row in rows] == ["none"] * 8 + ["construction"] * 8
+    assert {row["method"] for row in rows} == set(SHIPPED)
+    for row in rows[:8]:
+        if row["start"] == "0.5":
+            assert float(row["success_03m_1deg"]) == 1.0
+    assert float(rows[0]["unmapped_mean"]) < 0.05
