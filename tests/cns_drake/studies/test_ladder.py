@@ -430,7 +430,6 @@ def test_rungs_are_localised(town, tmp_path):
     # Hidden sectors and more places change no map.
     assert [row["cause"] for row in rows] == ["none"] * 8 + ["construction"] * 8
     assert {row["method"] for row in rows} == set(SHIPPED)
-    for row in rows[:8]:
-        if row["start"] == "0.5":
-            assert float(row["success_03m_1deg"]) == 1.0
-    assert float(rows[0]["unmapped_mean"]) < 0.05
+    assert [row["start"] for row in rows] == ["0.5", "2.0"] * 8
+    assert {row["queries"] for row in rows} == {rows[0]["queries"]}
+    assert {row["strength"] for row in rows[8:]} == {"mapped in stage 01"}
