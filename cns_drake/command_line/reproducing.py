@@ -17,11 +17,11 @@ from cns_drake.command_line.options import (
     Task,
     TaskName,
 )
-from evaluation.command_line.options import Costs, Settings, with_protocol
+from evaluation.command_line.options import Costs, Settings, with_named_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
 
 
-@with_protocol
+@with_named_protocol
 def reproduce(
     maps: Maps = None,
     *,

@@ -12,14 +12,14 @@ from cns_drake.base.drives.drive import PlacedDrive, check_same_map
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.options import Jobs, MethodFiles, Results, Scheduler
 from cns_drake.command_line.simulating import family_members
-from evaluation.command_line.options import Settings, with_protocol
+from evaluation.command_line.options import Settings, with_named_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
 
 if TYPE_CHECKING:
     from cns_drake.scenarios.scenario import Scenario
 
 
-@with_protocol
+@with_named_protocol
 def trend(
     *,
     vary: Annotated[

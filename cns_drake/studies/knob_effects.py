@@ -20,6 +20,7 @@ from cns_drake.city.plan.stages import Stage, Stages, load_stages
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import DriveSimulation
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.trend_databases import (
     TrendDatabase,
@@ -78,6 +79,8 @@ def knob_effects(
             Path(scratch) / "study",
             cluster,
             choose_methods(),
+            # Cities were fitted to the paper's numbers.
+            PAPER_PROTOCOL,
         )
     return [
         Effect(

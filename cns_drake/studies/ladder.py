@@ -317,7 +317,7 @@ class _Plan:
         return files.scans, *self._descriptions(files)
 
     def _descriptions(self, files: SurveyFiles) -> tuple[Part, ...]:
-        return tuple(map(files.described, self._methods))
+        return tuple(files.described(one.name) for one in self._methods)
 
     def _describe(
         self,
@@ -368,7 +368,8 @@ def _write(
     extent: Extent,
 ) -> tuple[Path, str]:
     text = ladder_text(rows)
-    _write_text(output / "queries.csv", ladder_query_table(measured).to_csv())
+    queries = ladder_query_table(measured, protocol).to_csv()
+    _write_text(output / "queries.csv", queries)
     draw_ladder(rows, output / "ladder")
     if pairs:
         _write_text(output / "pairs.csv", pair_table(rows, pairs).to_csv())

@@ -22,7 +22,7 @@ from cns_drake.studies.ladder_rungs import (
     Extent,
     plan_rungs,
 )
-from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.report.tables import Table, in_table_order, title
 
 # Causes at the ladder's strengths.
@@ -41,7 +41,7 @@ LEVEL_STRENGTHS = {
 }
 # The seed was drawn before any method was run on it.
 LEVELS_EXTENT = Extent(causes=(ALL,), seeds=(7208,), strengths=LEVEL_STRENGTHS)
-LEVELS_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
+LEVELS_PROTOCOL = replace(FAIR_PROTOCOL, query_spacing=20.0)
 # A level is solved when the interval of the best method begins above this.
 _SOLVED = 0.98
 # Scores differ in their last digits between machines, and ties break either

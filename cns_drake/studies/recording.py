@@ -152,10 +152,9 @@ class Record(Step):
 
         def read(drive: Drive) -> None:
             assert survey is not None
-            methods = survey.methods if survey.roles else ()
             # The survey's own job reports the error again.
             with contextlib.suppress(Exception):
-                found.append(survey.find(drive, methods, Reporter()))
+                found.append(survey.find(drive, Reporter()))
 
         with self._place(is_new) as (folder, overwrite):
             simulate(

@@ -21,7 +21,7 @@ from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
@@ -41,7 +41,7 @@ def reproduce_maps(
     *,
     with_pages: bool = True,
     quick: bool = False,
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     own_methods: Sequence[Path] = (),
     settings: Sequence[str] = (),
     with_costs: bool = False,

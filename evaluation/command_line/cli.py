@@ -26,17 +26,20 @@ from evaluation.command_line.options import (
     LidarName,
     MethodName,
     ModeName,
+    NamedProtocol,
     OwnMethods,
     Parameters,
+    ProtocolName,
     Radius,
     Scheduler,
     SensorHeight,
     Settings,
     overlap_of,
+    with_named_protocol,
     with_protocol,
 )
 from evaluation.command_line.trajectories import drives, trajectory
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
@@ -203,7 +206,6 @@ def pr(
     protocol = replace(
         protocol,
         overlap=overlap_of(truth),
-        place="middle",
         turn_queries=turn_queries,
         tilt_queries=tilt_queries,
         hide_sector=hide_sector,
@@ -285,7 +287,7 @@ def scores(
     parameter: Parameters = None,
     sensor_height: SensorHeight = 1.6,
     gate: Gate = False,
-    radius: Radius = PAPER_PROTOCOL.radius,
+    radius: Radius = DEFAULT_PROTOCOL.radius,
 ) -> None:
     """Scores of all pairs of scans of folders.
 
@@ -319,7 +321,7 @@ app.command(
 
 
 @app.command(epilog=example("cns-eval report drives --output report"))
-@with_protocol
+@with_named_protocol
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
@@ -363,7 +365,7 @@ def report(
         "    --query family/riverside_02 --output trend",
     )
 )
-@with_protocol
+@with_named_protocol
 def trend(
     databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Option(help="The query drive.")],
@@ -413,24 +415,34 @@ def trend(
 def ranking(
     first: Annotated[Path, typer.Argument(metavar="REPORT")],
     second: Annotated[Path, typer.Argument(metavar="REPORT")],
+    protocol: NamedProtocol = ProtocolName.FAIR,
     json: Json = False,
 ) -> None:
     """Whether two reports rank methods alike.
 
     The reports may be of simulated and of real drives. Prints the mean AUC of
-    each method in both, and Kendall's tau with its 95 %
-    interval. A report is a folder with a queries.csv, or that file.
+    each method in both, and Kendall's tau, with their 95 % intervals. A report
+    is a folder with a queries.csv, or that file.
     """
     from evaluation.recognition.rank_agreement import rank_agreement
 
-    found = rank_agreement(first, second)
+    found = rank_agreement(first, second, protocol=protocol.value)
     if json:
         terminal.print_json(found.to_json())
         return
     rows = [
-        (method, f"{one:.4f}  {other:.4f}")
-        for method, one, other in zip(
-            found.methods, found.first, found.second, strict=True
+        (
+            method,
+            f"{one:.4f} {_interval_text(one_interval)}"
+            f"  {other:.4f} {_interval_text(other_interval)}",
+        )
+        for method, one, one_interval, other, other_interval in zip(
+            found.methods,
+            found.first,
+            found.first_intervals,
+            found.second,
+            found.second_intervals,
+            strict=True,
         )
     ]
     low, high = map(terminal.number, (found.interval.low, found.interval.high))

@@ -1,6 +1,6 @@
 """Options that several commands share, such as those of the protocol."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import Enum
 import functools
@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from cns_drake.base.errors import InputError
-from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 
 
 class ModeName(str, Enum):
@@ -20,6 +20,13 @@ class ModeName(str, Enum):
 
     ALL = "all"
     FILTERED = "filtered"
+
+
+class ProtocolName(str, Enum):
+    """How queries are asked."""
+
+    FAIR = "fair"
+    PAPER = "paper"
 
 
 class AlignName(str, Enum):
@@ -30,6 +37,13 @@ class AlignName(str, Enum):
     NEVER = "never"
 
 
+NamedProtocol = Annotated[
+    ProtocolName,
+    typer.Option(
+        "--protocol",
+        help="Queries turned and tilted at random, or as the paper asked.",
+    ),
+]
 Align = Annotated[
     AlignName,
     typer.Option(
@@ -118,10 +132,10 @@ MaxRange = Annotated[
     ),
 ]
 _OPTIONS: dict[str, tuple[object, object]] = {
-    "radius": (Radius, PAPER_PROTOCOL.radius),
-    "query_spacing": (QuerySpacing, PAPER_PROTOCOL.query_spacing),
-    "place_spacing": (PlaceSpacing, PAPER_PROTOCOL.place_spacing),
-    "max_range": (MaxRange, PAPER_PROTOCOL.max_range),
+    "radius": (Radius, DEFAULT_PROTOCOL.radius),
+    "query_spacing": (QuerySpacing, DEFAULT_PROTOCOL.query_spacing),
+    "place_spacing": (PlaceSpacing, DEFAULT_PROTOCOL.place_spacing),
+    "max_range": (MaxRange, DEFAULT_PROTOCOL.max_range),
     "scans_per_place": (
         Annotated[
             int | None,
@@ -144,7 +158,7 @@ _OPTIONS: dict[str, tuple[object, object]] = {
         ],
         None,
     ),
-    "gate": (Gate, PAPER_PROTOCOL.gate),
+    "gate": (Gate, DEFAULT_PROTOCOL.gate),
 }
 
 
@@ -196,14 +210,41 @@ def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
 
     Args:
         command: has a keyword `protocol`, a `RetrievalProtocol`, which the
-            options replace on the command line; the rest is the paper's.
+            options replace on the command line; the rest is the default.
     """
 
     @functools.wraps(command)
     def with_options(**values: Any) -> None:
         chosen = {name: values.pop(name) for name in _OPTIONS}
-        command(**values, protocol=replace(PAPER_PROTOCOL, **chosen))
+        command(**values, protocol=replace(DEFAULT_PROTOCOL, **chosen))
 
+    return _with_parameters(command, with_options, _OPTIONS)
+
+
+def with_named_protocol(command: Callable[..., None]) -> Callable[..., None]:
+    """Gives a command the options of the protocol, and `--protocol`.
+
+    Args:
+        command: likewise; the rest is that of the named protocol.
+    """
+    named = (NamedProtocol, ProtocolName.FAIR)
+
+    @functools.wraps(command)
+    def with_options(**values: Any) -> None:
+        chosen = {name: values.pop(name) for name in _OPTIONS}
+        base = PROTOCOLS[values.pop("named_protocol").value]
+        command(**values, protocol=replace(base, **chosen))
+
+    options = {"named_protocol": named, **_OPTIONS}
+    return _with_parameters(command, with_options, options)
+
+
+def _with_parameters(
+    command: Callable[..., None],
+    wrapper: Callable[..., None],
+    options: Mapping[str, tuple[object, object]],
+) -> Callable[..., None]:
+    """Returns a wrapper of a command, with options instead of `protocol`."""
     signature = inspect.signature(command, eval_str=True)
     own = [p for p in signature.parameters.values() if p.name != "protocol"]
     added = [
@@ -213,13 +254,11 @@ def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
             default=default,
             annotation=annotation,
         )
-        for name, (annotation, default) in _OPTIONS.items()
+        for name, (annotation, default) in options.items()
     ]
     parameters = [
         one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own
     ] + added
-    with_options.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-    with_options.__annotations__ = {
-        one.name: one.annotation for one in parameters
-    }
-    return with_options
+    wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapper.__annotations__ = {one.name: one.annotation for one in parameters}
+    return wrapper

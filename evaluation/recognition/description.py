@@ -2,21 +2,28 @@
 
 from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
+from evaluation.drives.query_sensor import QuerySensor
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.resampling import route_blocks
 
 # The role of a drive.
 Role = Literal["places", "queries"]
 # A frame, with its cloud in each role that it has.
 _Waiting: TypeAlias = "tuple[int, Mapping[Role, np.ndarray]]"
+# A method, the roles that it describes, and the protocol of these.
+Request: TypeAlias = "tuple[Method, Set[Role], RetrievalProtocol]"
+# Number of merged scans of a cloud, of those before its frame, and fields of
+# its points.
+_Kind: TypeAlias = "tuple[int, int, tuple[str, ...]]"
 
 
 @dataclass(frozen=True)
@@ -30,6 +37,8 @@ class DescribedScans:
         descriptors: K descriptors; none if the drive does not have this role.
         clouds: the K described clouds, for methods with a second stage; else
             none.
+        blocks: (K,) block of the route of each, see `route_blocks`; None if
+            the route is unknown.
     """
 
     frames: np.ndarray
@@ -37,6 +46,7 @@ class DescribedScans:
     X_WS: np.ndarray
     descriptors: list = field(default_factory=list)
     clouds: list[np.ndarray] = field(default_factory=list)
+    blocks: np.ndarray | None = None
 
     @property
     def p_WSs(self) -> np.ndarray:
@@ -66,6 +76,7 @@ def describe_drive(
     protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
     track: Track = silent,
     visit: Callable[[int, np.ndarray], None] | None = None,
+    further: Iterable[Request] = (),
 ) -> list[DescribedDrive]:
     """Describes the places and queries of a drive, each cloud once.
 
@@ -81,59 +92,77 @@ def describe_drive(
         visit: also receives each described frame and its single scan (N, 3),
             cropped, in the frame of the sensor: as recorded if the drive has
             places, else as its queries see it.
+        further: descriptions by other protocols.
 
     Returns:
-        The descriptions by each method.
+        The descriptions by each method, then the further ones.
 
     Raises:
         InputError: if the drive cannot be read, it lacks a field that a
             method needs, or no described cloud has a point within range.
     """
-    describing = [_Describing(method, drive, protocol) for method in methods]
-    frames = {role: _frames(drive, role, protocol) for role in roles}
-    wanted = np.unique(np.concatenate([*frames.values()])).tolist()
-    # Number of merged scans of a cloud, of those before its frame, and fields
-    # of its points.
-    kinds = {one.kind for one in describing}
-    single: tuple[int, int, tuple[str, ...]] = (1, 0, ())
-    if visit is not None:
-        kinds.add(single)
+    requests = [*((one, roles, protocol) for one in methods), *further]
+    describing = [_Describing(drive, *request) for request in requests]
+    visited = set().union(
+        *(_frames(drive, role, protocol).tolist() for role in roles)
+    )
+    wanted = sorted(visited.union(*(one.frames for one in describing)))
     num_points = 0
-    members = {role: set(found.tolist()) for role, found in frames.items()}
     for frame in track(wanted, f"describing {drive.name}", len(wanted)):
-        sensors = {
-            role: protocol.query_sensor(frame) if role == "queries" else None
-            for role in sorted(roles)
-            if frame in members[role]
-        }
-        shown = None if "places" in roles else sensors["queries"]
-        needed = dict.fromkeys(sensors.values())
-        if visit is not None:
-            needed[shown] = None
-        clouds = {
-            (sensor, kind): gather(
-                drive,
-                frame,
-                kind[0],
-                protocol.max_range,
-                kind[2],
-                kind[1],
-                sensor,
-            )
-            for sensor in needed
-            for kind in kinds
-        }
-        num_points += max(map(len, clouds.values()))
-        if visit is not None:
-            visit(frame, clouds[shown, single])
+        seen = _Seen(drive, frame)
+        if visit is not None and frame in visited:
+            of_query = "places" not in roles
+            shown = seen.sensor(protocol) if of_query else None
+            cloud = seen.cloud(shown, (1, 0, ()), protocol.max_range)
+            visit(frame, cloud)
         for one in describing:
-            one.add(frame, {r: clouds[s, one.kind] for r, s in sensors.items()})
+            one.add(seen)
+        num_points += seen.most_points
     if num_points == 0:
         raise InputError(
             f"{drive.name}: no finite point within {protocol.max_range:g} m"
             f" of the LiDAR in any of {len(wanted)} scans"
         )
     return [one.finish() for one in describing]
+
+
+class _Seen:
+    """The clouds of a frame, each gathered once."""
+
+    def __init__(self, drive: Drive, frame: int):
+        self.frame = frame
+        self._drive = drive
+        self._sensors: dict[RetrievalProtocol, QuerySensor | None] = {}
+        self._clouds: dict[tuple, np.ndarray] = {}
+
+    def sensor(self, protocol: RetrievalProtocol) -> QuerySensor | None:
+        """Returns the sensor of the frame's query; None for the recorded."""
+        if protocol not in self._sensors:
+            self._sensors[protocol] = protocol.query_sensor(self.frame)
+        return self._sensors[protocol]
+
+    def cloud(
+        self, sensor: QuerySensor | None, kind: _Kind, max_range: float
+    ) -> np.ndarray:
+        """Returns a cloud, the same array for the same arguments."""
+        key = sensor, kind, max_range
+        if key not in self._clouds:
+            number, before, fields = kind
+            self._clouds[key] = gather(
+                self._drive,
+                self.frame,
+                number,
+                max_range,
+                fields,
+                before,
+                sensor,
+            )
+        return self._clouds[key]
+
+    @property
+    def most_points(self) -> int:
+        """Size of the greatest cloud."""
+        return max(map(len, self._clouds.values()), default=0)
 
 
 def _frames(
@@ -150,28 +179,54 @@ class _Describing:
 
     def __init__(
         self,
-        method: Method,
         drive: Drive,
+        method: Method,
+        roles: Set[Role],
         protocol: RetrievalProtocol,
     ):
-        self.kind = (
+        self._kind: _Kind = (
             protocol.scans(method),
             protocol.scans_before(method),
             tuple(method.point_fields),
         )
         self._method = method
+        self._protocol = protocol
         self._waiting: list[_Waiting] = []
+        self._members: dict[Role, set[int]] = {}
         scans = {}
-        for role in ("places", "queries"):
+        for role in get_args(Role):
             frames = _frames(drive, role, protocol)
             X_WS = drive.X_WS[frames]
             if role == "queries":
                 X_WS = protocol.query_poses(X_WS, frames)
-            scans[role] = DescribedScans(frames, drive.stamps_ns[frames], X_WS)
+            scans[role] = DescribedScans(
+                frames,
+                drive.stamps_ns[frames],
+                X_WS,
+                blocks=route_blocks(drive.X_WS[:, :3, 3], frames),
+            )
+            if role in roles:
+                self._members[role] = set(frames.tolist())
         self._drive = DescribedDrive(drive.name, **scans)
 
-    def add(self, frame: int, clouds: Mapping[Role, np.ndarray]) -> None:
-        self._waiting.append((frame, clouds))
+    @property
+    def frames(self) -> set[int]:
+        """All frames that are described."""
+        return set().union(*self._members.values())
+
+    def add(self, seen: _Seen) -> None:
+        """Describes a frame, now or later, in the roles that it has."""
+        clouds = {
+            role: seen.cloud(
+                seen.sensor(self._protocol) if role == "queries" else None,
+                self._kind,
+                self._protocol.max_range,
+            )
+            for role, members in self._members.items()
+            if seen.frame in members
+        }
+        if clouds:
+            self._waiting.append((seen.frame, clouds))
         if len(self._waiting) >= self._method.batch_size:
             self._flush()
 

@@ -6,7 +6,6 @@ import math
 import numpy as np
 from scipy.special import stdtr, stdtrit
 
-from evaluation.drives.sampling import travelled
 from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.resampling import (
@@ -14,9 +13,6 @@ from evaluation.recognition.resampling import (
     resampled_metrics,
     resampled_weights,
 )
-
-# Length of a block of the route [m]. Right and wrong correlate along a drive.
-BLOCK_LENGTH = 100.0
 
 
 @dataclass(frozen=True)
@@ -34,20 +30,7 @@ class Difference:
     p_value: float
 
 
-def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Returns the block (Q,) of the route in which each query lies.
-
-    Args:
-        positions: (N, 3) of the sensor along the drive [m].
-        frames: (Q,) of the queries.
-    """
-    passed = travelled(positions)[frames] / BLOCK_LENGTH
-    return np.floor(passed).astype(np.int64)
-
-
-def auc_difference(
-    first: QueryOutcomes, second: QueryOutcomes, blocks: np.ndarray
-) -> Difference:
+def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
     """Compares two methods on the same queries (mode all).
 
     The bootstrap draws the same blocks for both. Its deviation, corrected for
@@ -56,11 +39,11 @@ def auc_difference(
 
     Args:
         first: outcomes of Q queries.
-        second: outcomes of the same queries.
-        blocks: (Q,) the block of each.
+        second: outcomes of the same queries, in the same blocks.
     """
     value = pr_curve(first).auc - pr_curve(second).auc
-    number = len(np.unique(blocks))
+    blocks = first.blocks
+    number = len(first) if blocks is None else len(np.unique(blocks))
     if number < 2:
         return Difference(value, Interval(math.nan, math.nan), math.nan)
     weights = resampled_weights(len(first), blocks=blocks)

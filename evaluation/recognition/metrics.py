@@ -51,7 +51,7 @@ class PlaceRecognitionMetrics:
         num_with_match: N, the number of queries with a match.
         num_right: TP with every candidate accepted: the queries whose best
             place is right. R@1 = num_right / N.
-        auc_interval: 95 % bootstrap interval over the queries.
+        auc_interval: 95 % interval by bootstrap over blocks of the route.
         recall_at_1_interval: likewise.
 
     Example:

@@ -201,7 +201,9 @@ def judge_retrieval(
             f"{query}: no query lies within {protocol.radius:g} m of a place"
             f" of {database} (the nearest at {nearest:.1f} m)"
         )
-    outcomes = judge(retrieval.scores, retrieval.matches)
+    outcomes = judge(
+        retrieval.scores, retrieval.matches, retrieval.query_blocks
+    )
     metrics = evaluate(outcomes)
     return PlaceRecognition(
         method=method.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 import math
 from typing import TYPE_CHECKING
@@ -26,7 +27,8 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 class RetrievalProtocol:
     """The protocol of a comparison of two drives.
 
-    By default it is the paper's, but for the places of merged scans.
+    By default queries are asked as they were recorded, and all else is the
+    paper's but for the places of merged scans.
 
     Attributes:
         radius: greatest distance of a match from its query [m].
@@ -139,6 +141,14 @@ class RetrievalProtocol:
         return X_WQ
 
     @property
+    def name(self) -> str:
+        """`fair` or `paper` by how queries are asked; `own` for other ways."""
+        for name, known in PROTOCOLS.items():
+            if all(getattr(self, k) == getattr(known, k) for k in _ASKED):
+                return name
+        return "own"
+
+    @property
     def _changes_queries(self) -> bool:
         return any(getattr(self, name) for name in _QUERY_CHANGES)
 
@@ -154,6 +164,11 @@ class RetrievalProtocol:
             scans_per_place=self.scans(method),
             place=method.config.place or self.place,
         )
+
+    def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
+        """Returns the protocol with another's queries, and places of scans."""
+        asked = {name: getattr(other, name) for name in (*_ASKED, "place")}
+        return replace(self, **asked)
 
     def described(self, *, queries: bool = True) -> dict[str, object]:
         """Returns the options that the descriptions of a drive depend on.
@@ -222,12 +237,29 @@ GATE_TEXT = (
 
 DEFAULT_PROTOCOL = RetrievalProtocol()
 
-# That of the paper, and of the tables of a study.
+# The paper's: queries as recorded, and the first of merged scans gives the
+# pose. It serves the comparison with the paper's tables only.
 PAPER_PROTOCOL = RetrievalProtocol(place="first")
 
+# That of all studies. Neither crops along the sensor's axes, nor voxel grids,
+# nor streets at right angles help a method then. The draws are frozen.
+FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
+
+PROTOCOLS = {"fair": FAIR_PROTOCOL, "paper": PAPER_PROTOCOL}
+_ASKED = (*_QUERY_CHANGES, "seed")
+
+
+def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
+    """Raises an InputError if two protocols have different names."""
+    names = sorted({one.name for one in protocols})
+    if len(names) > 1:
+        raise InputError(
+            f"protocol: {' and '.join(names)} in one table; choose one"
+        )
+
+
 # Columns of a table of results: the options of the protocol. Tables are made
-# without matches by overlap, and from queries as they were recorded; a sentence
-# says where merged scans stand.
+# without matches by overlap; a column `protocol` names what else differs.
 PROTOCOL_COLUMNS = tuple(
     one.name
     for one in fields(RetrievalProtocol)

@@ -19,6 +19,8 @@ class QueryOutcomes:
         first_right_ranks: (Q,) rank of the best true match, from 1 on;
             infinite if no candidate is one.
         num_places: size of the database.
+        blocks: (Q,) block of the route in which each query lies, see
+            `route_blocks`; None if each is a block of its own.
 
     Example:
         from evaluation import judge
@@ -31,6 +33,7 @@ class QueryOutcomes:
     has_match: np.ndarray
     first_right_ranks: np.ndarray
     num_places: int
+    blocks: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.best_scores)
@@ -43,6 +46,7 @@ class QueryOutcomes:
             self.has_match[kept],
             self.first_right_ranks[kept],
             self.num_places,
+            None if self.blocks is None else self.blocks[kept],
         )
 
     @property
@@ -82,7 +86,11 @@ class QueryOutcomes:
         return max(1, round(0.01 * self.num_places))
 
 
-def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
+def judge(
+    scores: np.ndarray,
+    matches: np.ndarray,
+    blocks: np.ndarray | None = None,
+) -> QueryOutcomes:
     """Reduces the scores of all pairs to the outcome of each query.
 
     If two places have equal scores, the first one in the database is better.
@@ -90,6 +98,7 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
     Args:
         scores: (Q, D), higher is more similar; NaN is no candidate.
         matches: (Q, D) bool, the truth.
+        blocks: (Q,) see `QueryOutcomes`.
 
     Raises:
         ValueError: scores are complex, masked or not numbers, or the two shapes
@@ -135,6 +144,7 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
         has_match=np.any(matches, axis=1),
         first_right_ranks=first_right,
         num_places=num_places,
+        blocks=blocks,
     )
 
 

@@ -16,16 +16,19 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_number
 from evaluation.recognition.pr_curve import pr_curve
+from evaluation.recognition.protocol import PROTOCOLS
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.resampling import (
     Interval,
     percentile_interval,
     resampled_metrics,
     resampled_weights,
+    route_blocks,
 )
 
 _NEEDED = ("map", "db", "query", "method", "correct", "has_match", "score")
 # Columns of a table of queries that name the pair of drives.
+_POSITION = ("query_x", "query_y", "query_z")
 _KEYS = ("map", "db", "query", "cause", "level", "seed", "gate")
 
 # Pair of drives -> method -> outcomes of its queries.
@@ -40,45 +43,65 @@ class RankAgreement:
         methods: names of the M methods that ran on all pairs of both sets.
         first: (M,) mean AUC over the pairs of the first set.
         second: (M,) of the second set.
+        first_intervals, second_intervals: 95 % interval of each mean, by
+            bootstrap over blocks of the route of each pair; a sample has the
+            same blocks for every method.
         tau: Kendall's tau-b; NaN if all values of a set are equal.
-        interval: 95 % interval by bootstrap over the queries of each pair; a
-            sample has the same queries for every method.
+        interval: its 95 % interval, from the same samples.
     """
 
     methods: tuple[str, ...]
     first: np.ndarray
     second: np.ndarray
+    first_intervals: tuple[Interval, ...]
+    second_intervals: tuple[Interval, ...]
     tau: float
     interval: Interval
 
     def to_json(self) -> dict:
         """Returns all numbers; NaN becomes None."""
-        low, high = self.interval.low, self.interval.high
         return {
             "kendall_tau": json_number(self.tau),
-            "interval_95": [json_number(low), json_number(high)],
+            "interval_95": _limits(self.interval),
             "methods": {
-                method: {"first": float(one), "second": float(other)}
-                for method, one, other in zip(
-                    self.methods, self.first, self.second, strict=True
+                method: {
+                    "first": float(one),
+                    "second": float(other),
+                    "first_interval_95": _limits(one_interval),
+                    "second_interval_95": _limits(other_interval),
+                }
+                for method, one, other, one_interval, other_interval in zip(
+                    self.methods,
+                    self.first,
+                    self.second,
+                    self.first_intervals,
+                    self.second_intervals,
+                    strict=True,
                 )
             },
         }
 
 
-def rank_agreement(first: Path, second: Path, seed: int = 0) -> RankAgreement:
+def _limits(interval: Interval) -> list[float | None]:
+    return [json_number(interval.low), json_number(interval.high)]
+
+
+def rank_agreement(
+    first: Path, second: Path, seed: int = 0, protocol: str = "fair"
+) -> RankAgreement:
     """Compares the ranking of methods in two reports.
 
     Args:
         first: `queries.csv` of a report or of a ladder, or its folder.
         second: another one.
         seed: of the bootstrap.
+        protocol: see `read_answers`.
 
     Raises:
         InputError: a file cannot be read, or the two share fewer than two
             methods.
     """
-    answers = [read_answers(path) for path in (first, second)]
+    answers = [read_answers(path, protocol) for path in (first, second)]
     per_pair = [set(pair) for one in answers for pair in one.values()]
     methods = tuple(sorted(set.intersection(*per_pair)))
     if len(methods) < 2:
@@ -97,26 +120,49 @@ def rank_agreement(first: Path, second: Path, seed: int = 0) -> RankAgreement:
         methods=methods,
         first=one,
         second=other,
+        first_intervals=tuple(
+            map(percentile_interval, np.transpose(one_samples))
+        ),
+        second_intervals=tuple(
+            map(percentile_interval, np.transpose(other_samples))
+        ),
         tau=_tau(one, other),
         interval=percentile_interval(np.array(taus)),
     )
 
 
-def read_answers(path: Path) -> Answers:
+def read_answers(path: Path, protocol: str = "fair") -> Answers:
     """Returns the outcome of each query, by pair of drives and method.
 
     Args:
         path: `queries.csv`, or the folder that holds it.
+        protocol: name of the protocol whose rows count; all rows of a table
+            without a column `protocol` do.
 
     Raises:
-        InputError: it cannot be read, has no query, or has an invalid value.
+        InputError: it cannot be read, has no query by that protocol, or has an
+            invalid value.
     """
     file = path / "queries.csv" if path.is_dir() else path
     groups: dict[tuple[str, ...], dict[str, list[tuple[float, ...]]]] = {}
     for line, row in read_records(file, _NEEDED):
+        if row.get("protocol", protocol) != protocol:
+            if row["protocol"] in (*PROTOCOLS, "own"):
+                continue
+            known = ", ".join(PROTOCOLS)
+            raise InputError(
+                f"{file}: line {line}: protocol: {row['protocol']!r} is unknown"
+                f" (there are: {known}, own)"
+            )
         try:
             score = float(row["score"] or "nan")
-            values = score, _flag(row["correct"]), _flag(row["has_match"])
+            position = [float(row.get(one, "nan")) for one in _POSITION]
+            values = (
+                score,
+                _flag(row["correct"]),
+                _flag(row["has_match"]),
+                *position,
+            )
         except ValueError:
             raise InputError(
                 f"{file}: line {line}: correct, has_match, score: not 0 or 1,"
@@ -126,7 +172,7 @@ def read_answers(path: Path) -> Answers:
         group = groups.setdefault(pair, {})
         group.setdefault(row["method"], []).append(values)
     if not groups:
-        raise InputError(f"{file}: no query")
+        raise InputError(f"{file}: no query (protocol {protocol})")
     return {
         pair: {method: _outcomes(rows) for method, rows in group.items()}
         for pair, group in groups.items()
@@ -138,11 +184,14 @@ def _flag(cell: str) -> int:
 
 
 def _outcomes(rows: list[tuple[float, ...]]) -> QueryOutcomes:
-    scores, right, match = np.array(rows).T
+    scores, right, match, *position = np.array(rows).T
     is_right = right == 1.0
     # Only the first rank matters here.
     ranks = np.where(is_right, 1.0, np.inf)
-    return QueryOutcomes(scores, is_right, match == 1.0, ranks, 0)
+    blocks = None
+    if not np.isnan(position).any():
+        blocks = route_blocks(np.transpose(position), np.arange(len(rows)))
+    return QueryOutcomes(scores, is_right, match == 1.0, ranks, 0, blocks)
 
 
 def _areas(
@@ -155,7 +204,7 @@ def _areas(
         if any(len(pair[method]) != number for method in methods):
             raise InputError("methods of one pair have different queries")
         seed = int(rng.integers(1 << 31))
-        weights = resampled_weights(number, seed)
+        weights = resampled_weights(number, seed, pair[methods[0]].blocks)
         means.append([pr_curve(pair[method]).auc for method in methods])
         samples.append(
             [resampled_metrics(pair[method], weights)[0] for method in methods]

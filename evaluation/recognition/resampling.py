@@ -1,10 +1,15 @@
-"""Confidence intervals by bootstrap over queries."""
+"""Confidence intervals by bootstrap over queries, in blocks of the route.
+
+Right and wrong correlate along a drive: whole blocks of queries are drawn with
+replacement (Kuensch, Annals of Statistics 17, 1989; here they do not overlap).
+"""
 
 from dataclasses import dataclass
 import math
 
 import numpy as np
 
+from evaluation.drives.sampling import travelled
 from evaluation.recognition.pr_curve import (
     areas_under,
     recall_of,
@@ -12,6 +17,8 @@ from evaluation.recognition.pr_curve import (
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
+# Length of a block of the route [m].
+BLOCK_LENGTH = 100.0
 _SAMPLES = 1000
 _CONFIDENCE = 0.95
 
@@ -24,6 +31,17 @@ class Interval:
     high: float
 
 
+def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Returns the block (Q,) of the route in which each query lies.
+
+    Args:
+        positions: (N, 3) of the sensor along the drive [m].
+        frames: (Q,) of the queries.
+    """
+    passed = travelled(positions)[frames] / BLOCK_LENGTH
+    return np.floor(passed).astype(np.int64)
+
+
 def resampled_weights(
     num_queries: int, seed: int = 0, blocks: np.ndarray | None = None
 ) -> np.ndarray:
@@ -33,7 +51,8 @@ def resampled_weights(
         num_queries: Q, one or more.
         seed: of the drawing; equal ones draw the same queries.
         blocks: (Q,) the block of each query; whole blocks are drawn, as many
-            as there are. By default each query is a block.
+            as there are. Each query is a block by default, and on a route
+            that is shorter than two blocks.
 
     Returns:
         (B, Q) float64 counts; without blocks, each row of sum Q.
@@ -42,6 +61,8 @@ def resampled_weights(
     if blocks is not None:
         known, of_query = np.unique(blocks, return_inverse=True)
         number = len(known)
+        if number == 1:
+            return resampled_weights(num_queries, seed)
     rng = np.random.default_rng([seed, number])
     draws = rng.integers(number, size=(_SAMPLES, number))
     return np.stack(
@@ -84,11 +105,11 @@ def percentile_interval(samples: np.ndarray) -> Interval:
 def bootstrap_intervals(
     outcomes: QueryOutcomes, seed: int
 ) -> tuple[Interval, Interval]:
-    """Returns percentile intervals of AUC and R@1 over resampled queries."""
+    """Returns percentile intervals of AUC and R@1 over resampled blocks."""
     if len(outcomes) == 0:
         nothing = Interval(math.nan, math.nan)
         return nothing, nothing
-    weights = resampled_weights(len(outcomes), seed)
+    weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
     areas, recalls = resampled_metrics(outcomes, weights)
     return percentile_interval(areas), percentile_interval(recalls)
 

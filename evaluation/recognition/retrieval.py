@@ -38,6 +38,7 @@ class Retrieval:
         is_known: (Q, D) bool, whether the place is a candidate for the query.
         overlaps: (Q, D) float64, see `overlap_truth`; None if truth is by
             radius.
+        query_blocks: (Q,) see `QueryOutcomes.blocks`.
 
     Example:
         from evaluation import retrieve
@@ -54,6 +55,7 @@ class Retrieval:
     pose_errors: PoseErrors
     is_known: np.ndarray
     overlaps: np.ndarray | None = None
+    query_blocks: np.ndarray | None = None
 
     @property
     def best_places(self) -> np.ndarray:
@@ -224,6 +226,7 @@ def _compare(
             pose_errors=error,
             is_known=is_known,
             overlaps=overlaps,
+            query_blocks=queries.blocks,
         )
         for kept, error in zip(scores, errors, strict=True)
     ]

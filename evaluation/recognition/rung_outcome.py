@@ -81,7 +81,9 @@ class RungOutcome:
         return cls(
             method=method,
             is_gated=is_gated,
-            outcomes=judge(retrieval.scores, retrieval.matches),
+            outcomes=judge(
+                retrieval.scores, retrieval.matches, retrieval.query_blocks
+            ),
             query_frames=retrieval.query_frames,
             stamps_ns=query.queries.stamps_ns,
             p_WQs=query.queries.p_WSs,

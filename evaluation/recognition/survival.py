@@ -30,9 +30,9 @@ class Kept:
     Attributes:
         unchanged: the number without the change; NaN without a control.
         changed: the number with the change.
-        interval: 95 % interval of the share by bootstrap over queries; a sample
-            has the same queries with and without the change. NaN if control and
-            pair have different numbers of queries.
+        interval: 95 % interval of the share by bootstrap over blocks of the
+            route; a sample has the same ones with and without the change. NaN
+            if control and pair have different numbers of queries.
     """
 
     unchanged: float
@@ -102,6 +102,17 @@ class Survival:
         return curve.recall_at_full_precision
 
     @property
+    def auc_strict(self) -> tuple[float, float]:
+        """AUC with recall = TP / N, without the change and with it.
+
+        The former is NaN without a control.
+        """
+        before = math.nan
+        if self.unchanged is not None:
+            before = self.unchanged.metrics["all"].auc_strict
+        return before, self.changed.metrics["all"].auc_strict
+
+    @property
     def protocol(self) -> RetrievalProtocol:
         """The protocol of both results."""
         return self.changed.outcome.protocol
@@ -124,7 +135,8 @@ def paired_intervals(
 
     Args:
         unchanged: of Q queries without the change.
-        changed: of the same queries with it, in the same order.
+        changed: of the same queries with it, in the same order; its blocks
+            of the route are drawn.
         seed: of the bootstrap.
 
     Returns:
@@ -134,7 +146,7 @@ def paired_intervals(
     if len(unchanged) != len(changed) or len(changed) == 0:
         unknown = Interval(math.nan, math.nan)
         return unknown, unknown
-    weights = resampled_weights(len(changed), seed)
+    weights = resampled_weights(len(changed), seed, changed.blocks)
     before = resampled_metrics(unchanged, weights)
     after = resampled_metrics(changed, weights)
     auc, recall = (

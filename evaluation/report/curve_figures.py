@@ -69,11 +69,11 @@ def draw_auc_over_change(
         stem: path to write, without ending.
         reference: published values to draw beside ours.
     """
-    with_reference = any(map(reference.covers, results))
+    methods = in_table_order(result.method for result in results)
+    with_reference = any(map(reference.auc_over_change, methods))
     count = len(MODES) + with_reference
     figure = Figure(figsize=(3.4 * count, 3.7), layout="constrained")
     panels = figure.subplots(1, count, sharex=True, sharey=True)
-    methods = in_table_order(result.method for result in results)
     with_line = set()
     for axes, mode in zip(panels, MODES, strict=False):
         for index, method in enumerate(methods):

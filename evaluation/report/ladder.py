@@ -104,8 +104,8 @@ class LadderRow:
         drives: fingerprint of the drives of all draws.
         draws: outcome of each draw.
         unchanged: those on the rung `none` of the same map.
-        auc_interval: 95 % interval of AUC by bootstrap over queries; a sample
-            has the same queries in each draw.
+        auc_interval: 95 % interval of AUC by bootstrap over blocks of the
+            route; a sample has the same ones in each draw.
         kept: share of the AUC on the rung `none`.
     """
 
@@ -181,7 +181,7 @@ def _row(
     draws: Sequence[RungOutcome],
 ) -> LadderRow:
     num_queries = len(draws[0].outcomes)
-    weights = resampled_weights(num_queries)
+    weights = resampled_weights(num_queries, blocks=draws[0].outcomes.blocks)
     samples = _sampled_auc(draws, weights)
     share = Interval(math.nan, math.nan)
     if len(unchanged[0].outcomes) == num_queries:
@@ -306,8 +306,17 @@ def ladder_table(
         {name: name for name in _OPTIONS},
         lambda row, name: getattr(protocol, name),
     )
-    options |= {"viewpoint": lambda _: viewpoint}
+    options |= {
+        "viewpoint": lambda _: viewpoint,
+        "protocol": lambda _: protocol.name,
+        "auc_strict": lambda row: row.mean(_strict_auc),
+    }
     return Table.of(rows, {**_ROW_COLUMNS, **options})
+
+
+def _strict_auc(one: RungOutcome) -> float:
+    number = int(one.outcomes.has_match.sum())
+    return pr_curve(one.outcomes).strict_auc(number)
 
 
 def strongest_causes(rows: Sequence[LadderRow]) -> list[str]:
@@ -377,7 +386,9 @@ def crossed_rows(
             strongest[(*key, cause)] for cause in pair.rung.cause.split("+")
         )
         draws = (pair.unchanged, one.draws, other.draws, pair.draws)
-        weights = resampled_weights(len(pair.outcomes))
+        weights = resampled_weights(
+            len(pair.outcomes), blocks=pair.outcomes.blocks
+        )
         interval = Interval(math.nan, math.nan)
         if len({len(part[0].outcomes) for part in draws}) == 1:
             none, *kept = (_sampled_auc(part, weights) for part in draws)
@@ -439,14 +450,17 @@ def pair_text(rows: Sequence[LadderRow], pairs: Iterable[LadderRow]) -> str:
     return "\n- ".join(lines)
 
 
-def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:
+def ladder_query_table(
+    measured: Iterable[MeasuredRung], protocol: RetrievalProtocol
+) -> Table:
     """Returns one row for each rung, draw, method, gate and query."""
     answers = (
         _Answers(one.rung, one.seed, outcome)
         for one in measured
         for outcome in one.outcomes
     )
-    return Table.of(answers, _ANSWER_COLUMNS)
+    named: Columns[_Answers] = {"protocol": lambda answers: protocol.name}
+    return Table.of(answers, {**_ANSWER_COLUMNS, **named})
 
 
 def ladder_text(rows: Sequence[LadderRow]) -> str:

@@ -6,7 +6,7 @@ The page needs neither a network nor other files.
 import base64
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import functools
 from importlib import resources
 import itertools
@@ -101,6 +101,8 @@ class Report:
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
         reference: published numbers and claims.
+        repeated: results by the protocol of the published numbers, if that is
+            another one.
     """
 
     changes: list[ChangeResult] = field(default_factory=list)
@@ -114,11 +116,13 @@ class Report:
     notes: Sequence[str] = ()
     pages: Mapping[str, str] = field(default_factory=dict)
     reference: Reference = NO_REFERENCE
+    repeated: list[RecognitionResult] = field(default_factory=list)
 
     @property
-    def has_published(self) -> bool:
-        """Whether the reference has numbers beside ours."""
-        return any(map(self.reference.covers, self.recognitions))
+    def compared(self) -> list[RecognitionResult]:
+        """The results beside which the reference has numbers."""
+        known = filter(self.reference.covers, self.recognitions)
+        return [*known, *self.repeated]
 
 
 def write_report(report: Report, folder: Path) -> Path:
@@ -133,18 +137,22 @@ def write_report(report: Report, folder: Path) -> Path:
     """
     results, controls = report.recognitions, report.survivals
     tables = _shown_tables(report)
+    every = [*results, *report.repeated]
+    asked = [(one.pair, one) for one in results]
+    queries = query_table(asked, report.tracks, report.evidence)
+    # Evidence is of the queries that the other results got wrong.
+    again = [(one.pair, one) for one in report.repeated]
     numbers = {
         "survival": survival_numbers(report.survivals),
         "tcr": change_table(report.changes, report.reference, report.evidence),
-        "place_recognition": audit_table(results, report.reference),
+        "place_recognition": audit_table(every, report.reference),
         "poses": pose_numbers(results),
-        "metrics": metric_numbers(results),
-        "differences": difference_numbers(results, report.tracks),
+        "metrics": metric_numbers(every),
+        "differences": difference_numbers(results),
         "why": fault_numbers(results, report.evidence),
-        "queries": query_table(
-            [(one.pair, one) for one in results],
-            report.tracks,
-            report.evidence,
+        "queries": replace(
+            queries,
+            rows=queries.rows + query_table(again, report.tracks, {}).rows,
         ),
         "queries_unchanged": query_table(
             [(one.pair, one.unchanged) for one in controls if one.unchanged],
@@ -190,7 +198,10 @@ def write_page(path: Path, report: Report) -> None:
     for one in report.illustrations:
         illustrations[one.section].append(one)
     drives_of_maps = _drives_of_maps(report)
-    others = tables["place_recognition"][1:]
+    forms = [f"All methods in mode {mode}" for mode in MODES]
+    if report.compared:
+        forms.append(f"Beside {report.reference.title}")
+    forms_of_table = zip(forms, tables["place_recognition"], strict=True)
     # A section without an entry is always there.
     has_section = {
         "survival": bool(report.survivals),
@@ -212,7 +223,7 @@ def write_page(path: Path, report: Report) -> None:
         survivals_by_pair=by_pair(report.survivals),
         facts=_facts(report),
         drives_of_maps=drives_of_maps,
-        modes=list(zip(MODES[-len(others) :], others, strict=True)),
+        other_forms=list(forms_of_table)[1:],
         fault_kinds=FAULT_KINDS,
         style=_read_asset("page.css"),
         script=Markup("\n").join(map(_read_asset, _SCRIPTS)),
@@ -229,12 +240,16 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
         "survival": [survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
         "place_recognition": recognition_tables(
-            results, report.changes, report.reference, report.evidence
+            results,
+            report.changes,
+            report.reference,
+            report.compared,
+            report.evidence,
         ),
         "why": [fault_table(results, report.evidence)],
         "poses": [pose_table(results)],
         "costs": [cost_table(report.costs)],
-        "audit": [audit_table(results, report.reference)],
+        "audit": [audit_table([*results, *report.repeated], report.reference)],
     }
 
 
@@ -245,9 +260,7 @@ def _content(
     return {
         "report": report,
         "tables": tables,
-        "judgements": report.reference.judge(
-            report.recognitions, report.changes
-        ),
+        "judgements": report.reference.judge(report.compared, report.changes),
         "survival_summary": survival_summary(report.survivals),
     }
 

@@ -92,6 +92,21 @@ class Reference:
         """Returns `further`, for a report on one of the source's maps."""
         return () if self.city_names.isdisjoint(map_names) else self.further
 
+    def protocol_of(
+        self, map_name: str, database: str, query: str, method: str
+    ) -> RetrievalProtocol | None:
+        """Returns the protocol of a method's numbers of a pair, if published.
+
+        Args:
+            map_name: name of the map.
+            database, query: the two stages.
+            method: its name.
+        """
+        key = map_name, database, query, method
+        if not any(known[:4] == key for known in self.recognitions):
+            return None
+        return self.protocols[method]
+
     def covers(self, result: RecognitionResult) -> bool:
         """Returns whether map, method and protocol are the source's."""
         return result.pair[0] in self.city_names and self._ran(result)

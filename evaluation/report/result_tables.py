@@ -22,7 +22,6 @@ from evaluation.recognition.differences import (
     Difference,
     auc_difference,
     holm,
-    route_blocks,
 )
 from evaluation.recognition.fault_kinds import (
     FAULT_KINDS,
@@ -32,6 +31,10 @@ from evaluation.recognition.fault_kinds import (
 from evaluation.recognition.metrics import MODES, Mode, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import RADII, RecognitionResult
 from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.protocol import (
+    PROTOCOL_COLUMNS,
+    check_one_protocol,
+)
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.report.tables import (
@@ -52,8 +55,9 @@ _CHANGE_CAPTION = (
     " its matches does not show, mean over the queries that have one."
 )
 _AUDIT_CAPTION = (
-    "All numbers with 95 % intervals (bootstrap over queries) and the counts"
-    " they are made of: R@1 = TP / N, F1max = 2 TP / (TP + T). AUC strict: the"
+    "All numbers with 95 % intervals (bootstrap over blocks of 100 m of the"
+    " route) and the counts they are made of: R@1 = TP / N,"
+    " F1max = 2 TP / (TP + T). AUC strict: the"
     " area with recall = TP / N, which wrong accepted answers lower, too."
 )
 _FAULT_CAPTION = (
@@ -82,8 +86,11 @@ _COST_CAPTION = (
     " time of the processor, medians over some scans. This table alone"
     " differs from run to run (--no-costs leaves it out)."
 )
-# Name in Table II -> attribute of our metrics and of published numbers.
-_MEASURES = {"AUC": "auc", "R@1": "recall_at_1", "F1": "f1_max"}
+# Name in Table II -> attribute of our metrics and of published numbers, which
+# may lack it.
+_MEASURES = {"AUC": "auc", "strict": "auc_strict", "R@1": "recall_at_1"}
+# The reference has this, too.
+_PUBLISHED = {**_MEASURES, "F1": "f1_max"}
 # Frame, time and pose of a sensor, as columns of files.
 _MOMENT = ("frame", "stamp_ns", "x", "y", "z", "qx", "qy", "qz", "qw")
 
@@ -201,20 +208,23 @@ def recognition_tables(
     results: Sequence[RecognitionResult],
     changes: Sequence[ChangeResult],
     reference: Reference = NO_REFERENCE,
+    compared: Sequence[RecognitionResult] = (),
     evidence: Evidence = MappingProxyType({}),
 ) -> list[Table]:
     """Returns Table II in its forms.
 
-    The first form counts as the reference does, if it has such numbers; one
-    form for each mode follows.
+    One form for each mode; then, if there are any, that of the results to
+    compare with the reference, counted as it does.
     """
-    modes: list[Mode | None] = list(MODES)
-    if any(map(reference.covers, results)):
-        modes.insert(0, None)
-    return [
-        recognition_table(results, changes, mode, reference, evidence)
-        for mode in modes
+    tables = [
+        recognition_table(results, changes, mode, evidence=evidence)
+        for mode in MODES
     ]
+    if compared:
+        tables.append(
+            recognition_table(compared, changes, None, reference, evidence)
+        )
+    return tables
 
 
 def recognition_table(
@@ -224,7 +234,9 @@ def recognition_table(
     reference: Reference = NO_REFERENCE,
     evidence: Evidence = MappingProxyType({}),
 ) -> Table:
-    """Returns Table II: a row for each pair, three columns for each method.
+    """Returns Table II: a row for each pair, some columns for each method.
+
+    F1 is only in the form that is compared with the reference.
 
     Args:
         results: for all pairs and methods.
@@ -233,8 +245,13 @@ def recognition_table(
             reference used for each.
         reference: its values stand beside ours.
         evidence: for the visible change of the pairs.
+
+    Raises:
+        InputError: results of two protocols.
     """
+    check_one_protocol(result.outcome.protocol for result in results)
     methods = in_table_order(result.method for result in results)
+    measures = _PUBLISHED if mode is None else _MEASURES
     tcr = symmetric_changes(changes)
     by_pair: dict[tuple, dict[str, _Counted]] = {}
     for one in results:
@@ -250,7 +267,7 @@ def recognition_table(
                 [one and getattr(one.metrics, name) for one in found],
                 [one and getattr(one.printed, name, None) for one in found],
             )
-            for name in _MEASURES.values()
+            for name in measures.values()
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
         outcome = next(iter(of_method.values())).result.outcome
@@ -260,8 +277,7 @@ def recognition_table(
     captions = {
         None: f", {reference.counting[0]}",
         "all": ", all queries counted (mode all)",
-        "filtered": ", only queries counted that have a match (mode filtered;"
-        " F1 then says no more than R@1)",
+        "filtered": ", only queries counted that have a match (mode filtered)",
     }
     protocol = beside = ""
     if results:
@@ -275,12 +291,16 @@ def recognition_table(
     return Table(
         (
             *("map", "DB → query", "TCR_sym", "visible change"),
-            *tuple(_MEASURES) * len(methods),
+            *tuple(measures) * len(methods),
         ),
         tuple(rows),
-        groups=(("", 4), *((title(method), 3) for method in methods)),
+        groups=(
+            ("", 4),
+            *((title(method), len(measures)) for method in methods),
+        ),
         caption=f"Place recognition{captions[mode]}. {protocol}{beside}"
-        " Bold: best of a row; underlined: second.",
+        " Strict: the AUC with recall = TP / N, which wrong accepted answers"
+        " lower, too. Bold: best of a row; underlined: second.",
     )
 
 
@@ -380,28 +400,19 @@ class _Difference(NamedTuple):
     p_value: float
 
 
-def difference_numbers(
-    results: Sequence[RecognitionResult], tracks: Mapping[str, DriveTrack]
-) -> Table:
+def difference_numbers(results: Sequence[RecognitionResult]) -> Table:
     """Returns AUC differences of methods, as `differences.csv` has them.
 
     Args:
         results: for all pairs and methods.
-        tracks: drive -> its track, for all query drives.
     """
-    ordered = _by_pair_and_method(results)
-    both = [
-        (one, other)
-        for one, other in itertools.combinations(ordered, 2)
-        if one.pair == other.pair
-    ]
-    found = []
-    for one, other in both:
-        track = tracks[one.outcome.query].X_WS[:, :3, 3]
-        blocks = route_blocks(track, one.outcome.retrieval.query_frames)
-        found.append(
-            auc_difference(one.outcome.outcomes, other.outcome.outcomes, blocks)
-        )
+    both, found = [], []
+    for one, other in itertools.combinations(_by_pair_and_method(results), 2):
+        if one.pair == other.pair:
+            both.append((one, other))
+            found.append(
+                auc_difference(one.outcome.outcomes, other.outcome.outcomes)
+            )
     corrected = holm(np.array([one.p_value for one in found])).tolist()
     return Table.of(
         [
@@ -417,6 +428,7 @@ def difference_numbers(
             "low": lambda d: d.difference.interval.low,
             "high": lambda d: d.difference.interval.high,
             "p": lambda d: d.p_value,
+            "protocol": lambda d: d.result.outcome.protocol.name,
         },
     )
 
@@ -659,7 +671,10 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     "distance": lambda q: q.distances,
     "translation_error": lambda q: q.errors.translation,
     "rotation_error_deg": lambda q: q.errors.rotation_deg,
-    **protocol_columns("result.outcome.protocol"),
+    **keyed(
+        {name: name for name in PROTOCOL_COLUMNS},
+        lambda q, name: getattr(q.result.outcome.protocol, name),
+    ),
     "why": lambda q: q.evidence and fault_kinds(q.result, q.evidence),
     "overlap": lambda q: q.evidence and q.evidence.overlaps,
     "hidden": lambda q: q.evidence and q.evidence.hidden,
@@ -668,6 +683,7 @@ _QUERY_COLUMNS: Columns[_Queries] = {
     "right_fit": lambda q: q.evidence and q.evidence.right_fits,
     "wrong_fit": lambda q: q.evidence and q.evidence.fits[q.result.method],
     "visible_change": lambda q: q.evidence and q.evidence.visible_changes,
+    "protocol": attrgetter("result.outcome.protocol.name"),
 }
 
 

@@ -16,6 +16,7 @@ from evaluation.report.tables import (
     Columns,
     Table,
     in_table_order,
+    keyed,
     protocol_columns,
     title,
 )
@@ -26,8 +27,10 @@ SURVIVAL_CAPTION = (
     " (mode all), also those without a match. Without change: a control drive"
     " takes the place of one drive of the pair. It follows the same route, but"
     " in the stage of the other drive. Kept: the value with the change, divided"
-    " by the value without, and its 95 % interval (bootstrap over queries, the"
-    " same ones with and without the change). Recall at full precision: the"
+    " by the value without, and its 95 % interval (bootstrap over blocks of"
+    " 100 m of the route, the same ones with and without the change). AUC"
+    " strict has recall = TP / N, which wrong accepted answers lower, too."
+    " Recall at full precision: the"
     " part of the queries with a match that a method finds, best scores first,"
     " before its first wrong place. Where it is small, a user cannot rely on"
     " single answers, even of a method that keeps its AUC."
@@ -90,6 +93,8 @@ def survival_numbers(survivals: Sequence[Survival]) -> Table:
             "recall_at_full_precision": lambda s: s.recall_at_full_precision,
             "control": lambda s: s.control,
             **protocol_columns("protocol"),
+            "auc_strict_unchanged": lambda s: s.auc_strict[0],
+            "auc_strict_changed": lambda s: s.auc_strict[1],
         },
     )
 
@@ -103,6 +108,7 @@ def survival_table(survivals: Sequence[Survival]) -> Table:
             "DB → query": lambda s: " → ".join(s.pair[1:]),
             "method": lambda s: title(s.method),
             **_shown("AUC", lambda s: s.auc),
+            **_strict_columns(),
             **_shown("R@1", lambda s: s.recall_at_1),
             ("recall at full precision", "with change"): lambda s: (
                 s.recall_at_full_precision
@@ -129,6 +135,14 @@ def _shown(group: str, number: Callable[[Survival], Kept]) -> Columns[Survival]:
         (group, "with change"): lambda one: number(one).changed,
         (group, "kept"): kept,
     }
+
+
+def _strict_columns() -> Columns[Survival]:
+    names = "without change", "with change"
+    return keyed(
+        {("AUC strict", name): k for k, name in enumerate(names)},
+        lambda one, k: one.auc_strict[k],
+    )
 
 
 def survival_summary(survivals: Sequence[Survival]) -> str:

@@ -251,12 +251,13 @@ def keyed(
 
 
 def protocol_columns(path: str) -> Columns[Any]:
-    """Returns columns for the options of an item's protocol.
+    """Returns columns for the options of an item's protocol, then its name.
 
     Args:
         path: attributes that lead from the item to its protocol.
     """
-    return {name: attrgetter(f"{path}.{name}") for name in PROTOCOL_COLUMNS}
+    options = {name: attrgetter(f"{path}.{name}") for name in PROTOCOL_COLUMNS}
+    return {**options, "protocol": attrgetter(f"{path}.name")}
 
 
 def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from cns_drake.base.files import make_folder
 from evaluation.change.drive_change import symmetric_changes
 from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.survival import Survival
 from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
 from evaluation.report.page import Report, write_report
@@ -35,7 +35,7 @@ def assemble(
     methods: Sequence[MethodChoice] | None = None,
     pages: Mapping[str, str] | None = None,
     *,
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     with_costs: bool = False,
     reference: Reference = NO_REFERENCE,
     on_note: Callable[[str], None] = lambda text: None,
@@ -81,11 +81,14 @@ def assemble(
     for note in report.notes:
         on_note(note)
     if report.recognitions:
-        title = reference.title if report.has_published else ""
+        title = reference.title if report.compared else ""
         shown = auc_illustration(files.figures, title)
         changes = symmetric_changes(report.changes)
         draw_auc_over_change(
-            report.recognitions, changes, shown.stem, reference
+            report.recognitions,
+            changes,
+            shown.stem,
+            reference if report.compared else NO_REFERENCE,
         )
         report.illustrations.insert(0, shown)
     if any(one.unchanged is not None for one in report.survivals):
@@ -114,7 +117,7 @@ def _collect(
     for pair in pairs:
         control = city.unchanged_pair(*pair)
         for method in methods:
-            changed = _read_recognition(pair, method, files)
+            changed = _read_recognition(pair, method.name, files)
             if pair[0] is pair[1]:
                 if changed is not None:
                     closures.append(changed)
@@ -122,8 +125,12 @@ def _collect(
             assert changed is not None  # Only loops may be missing.
             unchanged = None
             if control is not None:
-                unchanged = _read_recognition(control, method, files)
+                unchanged = _read_recognition(control, method.name, files)
             survivals.append(Survival.of(changed, unchanged))
+        for again in city.repetitions(pair, methods, protocol):
+            found = _read_recognition(pair, again.key, files)
+            assert found is not None
+            report.repeated.append(found)
         names = pair[0].name, pair[1].name
         evidence = files.recognition(*names).evidence.read()
         if evidence is not None:
@@ -147,10 +154,16 @@ def _collect(
 
 def _read_recognition(
     pair: tuple[RecordingInfo, RecordingInfo],
-    method: MethodChoice,
+    key: str,
     files: StudyFiles,
 ) -> RecognitionResult | None:
-    """Returns a result; None for a drive that closes no loop."""
+    """Returns a result; None for a drive that closes no loop.
+
+    Args:
+        pair: database and query.
+        key: name of the method, or a `described_key`.
+        files: those of the study.
+    """
     database, query = pair
     results = files.recognition(database.name, query.name)
-    return results.result(method).read()
+    return results.result(key).read()

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 import re
 
 from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError, one_line
 from evaluation.drives import open_drive
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.study.surveys import DriveSource, RecordedDrive
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.surveys import (
+    DriveSource,
+    RecordedDrive,
+    described_key,
+)
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
 _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
@@ -47,6 +53,31 @@ class RecordingInfo:
     def drives_like(self, other: RecordingInfo) -> bool:
         """Returns whether both drives have a route, and the same one."""
         return self.way is not None and self.way == other.way
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """A method on a pair by the protocol of published numbers.
+
+    Attributes:
+        method: the method.
+        protocol: that of the published numbers.
+        shares_places: whether the study's own protocol describes places alike.
+    """
+
+    method: MethodChoice
+    protocol: RetrievalProtocol
+    shares_places: bool
+
+    @property
+    def key(self) -> str:
+        """The `described_key` of the repetition."""
+        return described_key(self.method.name, self.protocol)
+
+    @property
+    def places_key(self) -> str:
+        """That of its places."""
+        return self.method.name if self.shares_places else self.key
 
 
 @dataclass(frozen=True)
@@ -92,6 +123,39 @@ class City:
         if with_itself:
             pairs += [(one, one) for one in self.stages.values()]
         return pairs
+
+    def repetitions(
+        self,
+        pair: tuple[RecordingInfo, RecordingInfo],
+        methods: Iterable[MethodChoice],
+        protocol: RetrievalProtocol,
+    ) -> list[Repetition]:
+        """Returns the methods to compare with published numbers of a pair.
+
+        Args:
+            pair: database and query.
+            methods: those of the study.
+            protocol: that of the study.
+        """
+        database, query = (one.stage for one in pair)
+        found = []
+        for choice in methods:
+            published = self.reference.protocol_of(
+                self.name, database, query, choice.name
+            )
+            if published is None:
+                continue
+            method = choice.make()
+            ours = replace(protocol.of(method), exclude_recent=None)
+            if (
+                published != ours
+                and ours.asked_like(published).of(method) == published
+            ):
+                same = ours.described(queries=False) == published.described(
+                    queries=False
+                )
+                found.append(Repetition(choice, published, same))
+        return found
 
     def control(
         self, first: RecordingInfo, second: RecordingInfo

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, is_dataclass
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import zstandard
 
@@ -21,9 +21,6 @@ from cns_drake.base.files import completing, file_name, make_folder
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter, Step
 from evaluation.study.plain_values import decode, encode
-
-if TYPE_CHECKING:
-    from evaluation.study.chosen_methods import MethodChoice
 
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
@@ -212,9 +209,13 @@ class SurveyFiles:
         """The scans of places and queries: a `KeptScans`, or a list."""
         return Part(self.folder / "scans.data")
 
-    def described(self, method: MethodChoice) -> Part:
-        """Returns the part with (`PlacedDrive`, `DescribedDrive`)."""
-        return Part(self.folder / f"described_{file_name(method.name)}.data")
+    def described(self, key: str) -> Part:
+        """Returns the part with (`PlacedDrive`, `DescribedDrive`).
+
+        Args:
+            key: name of the method, or a `described_key`.
+        """
+        return Part(self.folder / f"described_{file_name(key)}.data")
 
 
 @dataclass(frozen=True)
@@ -227,9 +228,13 @@ class RecognitionFiles:
 
     folder: Path
 
-    def result(self, method: MethodChoice) -> Part:
-        """Returns the part with the `RecognitionResult` of a method."""
-        return Part(self.folder / f"{file_name(method.name)}.data")
+    def result(self, key: str) -> Part:
+        """Returns the part with the `RecognitionResult` of a method.
+
+        Args:
+            key: name of the method, or a `described_key`.
+        """
+        return Part(self.folder / f"{file_name(key)}.data")
 
     @property
     def evidence(self) -> Part:

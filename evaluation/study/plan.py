@@ -8,13 +8,14 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
 from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
     RecordingInfo,
+    Repetition,
     find_recordings,
     group_cities,
 )
@@ -32,7 +33,7 @@ from evaluation.study.measurements import (
     recognise_places,
 )
 from evaluation.study.parts import MakePart, StudyFiles
-from evaluation.study.surveys import Survey
+from evaluation.study.surveys import Description, Survey
 
 # Expected seconds to start a process with its imports, and for the maps of a
 # drive of 3000 scans with 250 places and 150 queries.
@@ -57,7 +58,7 @@ def plan_study(
     recordings: Iterable[RecordingInfo],
     output: Path,
     methods: Sequence[MethodChoice] | None = None,
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     *,
     with_costs: bool = False,
     reference: Reference = NO_REFERENCE,
@@ -100,7 +101,7 @@ def write_report(
     output: Path,
     cluster: Cluster,
     own_methods: Iterable[Path] = (),
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     on_note: Callable[[str], None] = lambda text: None,
     *,
     settings: Iterable[str] = (),
@@ -172,6 +173,10 @@ def _plan_city(
         if name == _pair_name(city, pair)
         for one in pair
     }
+    repeated = [
+        (pair, city.repetitions(pair, methods, protocol))
+        for pair in city.recognition_pairs()
+    ]
     jobs = [
         Job(
             name=f"survey {recording.name}",
@@ -182,6 +187,7 @@ def _plan_city(
                 protocol,
                 files.survey(recording.name),
                 with_scans=recording.name in explained,
+                further=_further(recording, repeated),
             ),
             needs=recording.needs,
             cost=_START_COST
@@ -240,6 +246,26 @@ def _compared_pairs(
 def _pair_name(city: City, pair: tuple[RecordingInfo, RecordingInfo]) -> str:
     database, query = pair
     return f"{city.name} {database.stage} > {query.stage}"
+
+
+def _further(
+    recording: RecordingInfo,
+    repeated: Iterable[
+        tuple[tuple[RecordingInfo, RecordingInfo], Sequence[Repetition]]
+    ],
+) -> tuple[Description, ...]:
+    """Returns what repetitions describe of a drive."""
+    roles: dict[Repetition, set[Role]] = {}
+    for (database, query), found in repeated:
+        for one in found:
+            if query is recording:
+                roles.setdefault(one, set()).add("queries")
+            if database is recording and not one.shares_places:
+                roles.setdefault(one, set()).add("places")
+    return tuple(
+        Description(one.method, frozenset(needed), one.protocol)
+        for one, needed in roles.items()
+    )
 
 
 def _roles(
@@ -313,14 +339,15 @@ def _recognition_job(
     )
     surveys = files.survey(database.name), files.survey(query.name)
     results = files.recognition(database.name, query.name)
+    stages = database.stage, query.stage
     steps = tuple(
         MakePart(
-            results.result(method),
+            results.result(method.name),
             recognise_places,
             (
                 city.name,
-                (database.stage, query.stage),
-                tuple(survey.described(method) for survey in surveys),
+                stages,
+                tuple(survey.described(method.name) for survey in surveys),
                 method,
                 protocol,
             ),
@@ -335,11 +362,28 @@ def _recognition_job(
             (
                 tuple((survey.drive, survey.scans) for survey in surveys),
                 methods,
-                tuple(map(results.result, methods)),
+                tuple(results.result(method.name) for method in methods),
                 protocol,
             ),
         )
-        steps = (*steps, evidence)
+        repeated = (
+            MakePart(
+                results.result(one.key),
+                recognise_places,
+                (
+                    city.name,
+                    stages,
+                    (
+                        surveys[0].described(one.places_key),
+                        surveys[1].described(one.key),
+                    ),
+                    one.method,
+                    one.protocol,
+                ),
+            )
+            for one in city.repetitions(pair, methods, protocol)
+        )
+        steps = (*steps, evidence, *repeated)
     return Job(
         name=name,
         step=Steps(results.folder, steps),
@@ -359,7 +403,7 @@ def _cost_job(
     query = pair[1]
     surveys = tuple(files.survey(one.name) for one in pair)
     described = tuple(
-        tuple(survey.described(method) for survey in surveys)
+        tuple(survey.described(method.name) for survey in surveys)
         for method in methods
     )
     return Job(

@@ -5,7 +5,7 @@ before or after the drive is recorded. The job therefore has the source of the
 drive, not the drive.
 """
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 import io
 import os
@@ -21,17 +21,18 @@ from cns_drake.base.points import xyz
 from cns_drake.base.progress import Track, silent
 from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import MovedDrive, RecentScans
-from evaluation.drives.sampling import within_range
+from evaluation.drives.sampling import cropped, within_range
 from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.description import (
     DescribedDrive,
+    Request,
     Role,
     describe_drive,
 )
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
 
@@ -201,7 +202,8 @@ class RecordingSurvey:
         drive: with its map on the grid of the TCR.
         fine: (K, 3) cloud for pictures, in W [m].
         described: method -> its descriptions of the drive; empty if the
-            recording has no role.
+            recording has no role. Those by another protocol are under a
+            `described_key`.
         scans: those of the places and queries; None unless they are kept.
     """
 
@@ -211,14 +213,20 @@ class RecordingSurvey:
     scans: KeptScans | None = None
 
 
+def described_key(method: str, protocol: RetrievalProtocol) -> str:
+    """Returns the name of a method's descriptions by a second protocol."""
+    return f"{method},{protocol.name}"
+
+
 def survey_recording(
     recording: Drive,
     roles: Set[Role],
     methods: Sequence[Method],
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     track: Track = silent,
     *,
     with_scans: bool = False,
+    further: Sequence[Request] = (),
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
@@ -231,37 +239,52 @@ def survey_recording(
         protocol: sets the places and queries.
         track: reports progress.
         with_scans: whether to keep the scans of places and queries, too.
+        further: descriptions by another protocol; none without a role.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
     """
     frames, thumbnails = [], []
-    mapped = MappedDrive(
-        recording,
-        kept=max(map(protocol.scans, methods), default=1),
-    )
+    scans_per_place = [
+        *map(protocol.scans, methods),
+        *(other.scans(method) for method, _, other in further),
+    ]
+    mapped = MappedDrive(recording, kept=max(scans_per_place, default=1))
 
     scans = None
     if with_scans:
         instances = recording.instances
         scans = KeptScans(instances=instances and dict(instances))
 
-    def keep(frame: int, cloud: np.ndarray) -> None:
+    def keep(frame: int, _: np.ndarray) -> None:
+        # Pictures show the scan as recorded, whatever its query sees.
         frames.append(frame)
+        scan = mapped.scan(frame)
         if scans is not None:
-            scans.keep(frame, mapped.scan(frame), protocol.max_range)
+            scans.keep(frame, scan, protocol.max_range)
         height = MethodConfig().sensor_height
+        cloud = cropped(scan, protocol.max_range)
         thumbnails.append(thumbnail(cloud, height, seed=frame))
 
     described = {}
     if roles:
         drives = describe_drive(
-            mapped, methods, roles, protocol, track, visit=keep
+            mapped,
+            methods,
+            roles,
+            protocol,
+            track,
+            visit=keep,
+            further=further,
         )
-        described = {
-            method.name: drive
-            for method, drive in zip(methods, drives, strict=True)
-        }
+        keys = [
+            *(method.name for method in methods),
+            *(
+                described_key(method.name, other)
+                for method, _, other in further
+            ),
+        ]
+        described = dict(zip(keys, drives, strict=True))
     coarse, fine = mapped.finish(track)
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
@@ -277,6 +300,30 @@ def survey_recording(
 
 
 @dataclass(frozen=True)
+class Description:
+    """What a method describes of a drive by a second protocol.
+
+    Attributes:
+        method: the method.
+        roles: the roles of the drive that are described.
+        protocol: sets the places and queries.
+    """
+
+    method: MethodChoice
+    roles: frozenset[Role]
+    protocol: RetrievalProtocol
+
+    @property
+    def key(self) -> str:
+        """The `described_key`."""
+        return described_key(self.method.name, self.protocol)
+
+    def request(self) -> Request:
+        """Returns it as `describe_drive` takes it."""
+        return self.method.make(), self.roles, self.protocol
+
+
+@dataclass(frozen=True)
 class Survey(Step):
     """Writes the survey of a drive, or its missing parts.
 
@@ -287,6 +334,7 @@ class Survey(Step):
         protocol: sets the places and queries.
         files: the parts to write.
         with_scans: whether to keep the scans of places and queries, too.
+        further: descriptions by a second protocol; none without a role.
     """
 
     source: DriveSource
@@ -295,6 +343,7 @@ class Survey(Step):
     protocol: RetrievalProtocol
     files: SurveyFiles
     with_scans: bool = False
+    further: tuple[Description, ...] = ()
 
     @property
     def output(self) -> Path:
@@ -305,32 +354,44 @@ class Survey(Step):
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
-        methods = [m for m in self._describing() if self._file(m) in missing]
-        self._write(self.find(self.source(), methods, reporter), missing)
+        found = self.find(self.source(), reporter, missing)
+        self._write(found, missing)
 
     def find(
         self,
         drive: Drive,
-        methods: Iterable[MethodChoice],
         reporter: Reporter,
+        missing: Collection[Part] | None = None,
     ) -> RecordingSurvey:
-        """Returns the survey of a drive, described by some of the methods.
+        """Returns the survey of a drive.
 
         Args:
             drive: that of the source, or the same drive while it is being made.
-            methods: to describe it; none if it has no role.
             reporter: takes the progress.
+            missing: parts that are needed; all by default.
 
         Raises:
             InputError: see `survey_recording`.
         """
+        wanted = self._described()
+        if missing is not None:
+            wanted = {p: one for p, one in wanted.items() if p in missing}
         return survey_recording(
             drive,
             self.roles,
-            [method.make() for method in methods],
+            [
+                one.make()
+                for one in wanted.values()
+                if isinstance(one, MethodChoice)
+            ],
             self.protocol,
             reporter.track,
             with_scans=self.with_scans,
+            further=[
+                one.request()
+                for one in wanted.values()
+                if isinstance(one, Description)
+            ],
         )
 
     def write(self, found: RecordingSurvey) -> None:
@@ -341,20 +402,23 @@ class Survey(Step):
         """
         self._write(found, self._missing())
 
-    def _describing(self) -> tuple[MethodChoice, ...]:
-        return self.methods if self.roles else ()
-
-    def _file(self, method: MethodChoice) -> Part:
-        return self.files.described(method)
+    def _described(self) -> dict[Part, MethodChoice | Description]:
+        """Returns the part of each description."""
+        if not self.roles:
+            return {}
+        return {
+            **{self.files.described(one.name): one for one in self.methods},
+            **{self.files.described(one.key): one for one in self.further},
+        }
 
     def _write(
         self, found: RecordingSurvey, missing: Mapping[Part, Mapping]
     ) -> None:
-        for method in self._describing():
-            part = self._file(method)
-            if part in missing and method.name in found.described:
+        for part, one in self._described().items():
+            key = one.key if isinstance(one, Description) else one.name
+            if part in missing and key in found.described:
                 # Each value is dropped when it is written.
-                value = found.drive.placed, found.described.pop(method.name)
+                value = found.drive.placed, found.described.pop(key)
                 part.write(missing[part], value)
         for part, one in (
             (self.files.scans, found.scans),
@@ -366,25 +430,33 @@ class Survey(Step):
 
     def _missing(self) -> dict[Part, Mapping]:
         """Returns the missing parts, each with its inputs."""
-        inputs = self.made_of(
-            {
-                "drive": self.source.identity(),
-                "roles": sorted(self.roles),
-                "protocol": (
-                    self.protocol.described(queries="queries" in self.roles)
-                    if self.roles
-                    else None
-                ),
-            }
-        )
-        expected = {
-            self._file(method): {**inputs, "method": method.identity()}
-            for method in self._describing()
-        }
+        drive = self.source.identity()
+
+        def inputs(
+            roles: Set[Role], protocol: RetrievalProtocol
+        ) -> dict[str, object]:
+            options = protocol.described(queries="queries" in roles)
+            return self.made_of(
+                {
+                    "drive": drive,
+                    "roles": sorted(roles),
+                    "protocol": options if roles else None,
+                }
+            )
+
+        own = inputs(self.roles, self.protocol)
+        expected = {}
+        for part, one in self._described().items():
+            if isinstance(one, Description):
+                made_of = inputs(one.roles, one.protocol)
+                identity = one.method.identity()
+            else:
+                made_of, identity = own, one.identity()
+            expected[part] = {**made_of, "method": identity}
         others = [self.files.fine, self.files.drive]
         if self.with_scans:
             others.append(self.files.scans)
-        return _stale({**expected, **dict.fromkeys(others, inputs)})
+        return _stale({**expected, **dict.fromkeys(others, own)})
 
 
 @dataclass(frozen=True)
@@ -419,7 +491,7 @@ class DescribeDrive(Step):
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
-        files = {one: self.files.described(one) for one in self.methods}
+        files = {one: self.files.described(one.name) for one in self.methods}
         methods = [one for one in self.methods if files[one] in missing]
         scans: list[np.ndarray] | None = [] if self.with_scans else None
         found = describe(
@@ -444,7 +516,7 @@ class DescribeDrive(Step):
             }
         )
         expected = {
-            self.files.described(method): {
+            self.files.described(method.name): {
                 **inputs,
                 "method": method.identity(),
             }

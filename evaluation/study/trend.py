@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from cns_drake.base.files import completing, make_folder
+from evaluation.recognition.protocol import check_one_protocol
 from evaluation.report.drawing import method_entry, method_style, save
 from evaluation.report.tables import (
     Columns,
@@ -64,15 +65,20 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
         The path of `trend.csv`.
 
     Raises:
-        InputError: a file cannot be written.
+        InputError: a file cannot be written, or points are of two protocols.
     """
     make_folder(folder)
     path = folder / "trend.csv"
+    check_one_protocol(point.protocol for point in points)
     numbers: Columns[TrendPoint] = keyed(
         {name: name for name in _NUMBERS},
         lambda point, name: _rounded(getattr(point, name)),
     )
-    table = Table.of(points, {**numbers, **protocol_columns("protocol")})
+    strict: Columns[TrendPoint] = {
+        "auc_strict": lambda point: _rounded(point.auc_strict)
+    }
+    columns = {**numbers, **protocol_columns("protocol"), **strict}
+    table = Table.of(points, columns)
     for name, one in (
         (path.name, table),
         ("correlations.csv", correlation_table(points)),

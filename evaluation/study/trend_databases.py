@@ -22,7 +22,7 @@ from evaluation.drives.sampling import gather
 from evaluation.recognition.fault_kinds import mean_visible_change
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_recognition import judge_retrieval
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
@@ -47,11 +47,13 @@ class TrendPoint:
         database: name of the drive.
         method: its name.
         tcr_sym: between database and query.
-        auc, auc_low, auc_high: with its 95 % interval over queries.
+        auc, auc_low, auc_high: with its 95 % interval over blocks of the
+            route.
         recall_at_1: over queries with a match.
         queries, with_match: numbers of queries, and of those with a match.
         protocol: that of place recognition.
-        auc_unchanged: that of the database's control; NaN without one.
+        auc_strict: with recall = TP / N.
+        auc_unchanged: AUC of the database's control; NaN without one.
         visible_change: mean over queries, see `PairEvidence`.
     """
 
@@ -65,6 +67,7 @@ class TrendPoint:
     queries: int
     with_match: int
     protocol: RetrievalProtocol
+    auc_strict: float
     auc_unchanged: float = math.nan
     visible_change: float = math.nan
 
@@ -101,7 +104,7 @@ def measure_trend(
     output: Path,
     cluster: Cluster,
     own_methods: Iterable[Path] = (),
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     controls: Sequence[Path] = (),
     lidar: str | None = None,
     settings: Iterable[str] = (),
@@ -180,7 +183,7 @@ def measure_drives(
     output: Path,
     cluster: Cluster,
     methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
 ) -> list[TrendPoint]:
     """Returns the points of drives that need not be recorded.
 
@@ -221,7 +224,7 @@ def measure_drives(
                 (
                     sources[name],
                     (survey.drive, survey.scans),
-                    tuple(survey.described(one) for one in methods),
+                    tuple(survey.described(one.name) for one in methods),
                     methods,
                     protocol,
                 ),
@@ -308,6 +311,7 @@ def measure_database(
                 queries=metrics.num_queries,
                 with_match=metrics.num_with_match,
                 protocol=found.protocol,
+                auc_strict=float(metrics.auc_strict),
                 visible_change=visible_change,
             )
         )

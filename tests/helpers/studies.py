@@ -13,7 +13,7 @@ from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.pictures.stage_scene import StageScene
 from evaluation.paper import reference_for
-from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import find_recordings
 from evaluation.study.plan import plan_study
@@ -33,7 +33,7 @@ def do(jobs):
     return done
 
 
-def report(recordings, output, methods=None, protocol=PAPER_PROTOCOL):
+def report(recordings, output, methods=None, protocol=FAIR_PROTOCOL):
     """Returns the path of the report on a folder of recordings."""
     found = find_recordings(recordings)
     reference = reference_for({one.map_name for one in found})

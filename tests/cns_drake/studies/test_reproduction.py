@@ -16,7 +16,7 @@ from cns_drake.studies import reproduction
 from cns_drake.studies.recording import Record
 from cns_drake.studies.reproduction import control_drives, recording_info
 from evaluation.methods import method
-from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.study.collection import find_recordings, group_cities
 
 pytestmark = pytest.mark.slow
@@ -47,7 +47,7 @@ def planned(monkeypatch):
     def assemble(recordings, output, methods, pages, **options):
         del options["reference"]  # None is there for this town.
         assert callable(options.pop("on_note"))
-        assert options == {"protocol": PAPER_PROTOCOL, "with_costs": False}
+        assert options == {"protocol": FAIR_PROTOCOL, "with_costs": False}
         runs[-1]["recordings"] = {one.name: one for one in recordings}
         runs[-1]["pages"] = pages
         return output / "report.html"

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from evaluation.paper.paper_reference import MET, MISSED, aims, paper
+from evaluation.recognition.metrics import MODES
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 
 
@@ -21,13 +22,16 @@ def make_results(change=lambda key: 0.0):
     results = []
     for key, value in paper().recognitions.items():
         metrics = SimpleNamespace(
-            auc=value.auc + change(key), recall_at_1=0.0, f1_max=0.0
+            auc=value.auc + change(key),
+            auc_strict=0.0,
+            recall_at_1=0.0,
+            f1_max=0.0,
         )
         results.append(
             SimpleNamespace(
                 pair=key[:3],
                 method=key[3],
-                metrics={key[4]: metrics},
+                metrics=dict.fromkeys(MODES, metrics),
                 outcome=asked(key[3]),
             )
         )

@@ -1,31 +1,36 @@
 """Differences between methods, by paired bootstrap over blocks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from evaluation.recognition.differences import (
-    auc_difference,
-    holm,
+from evaluation.recognition.differences import auc_difference, holm
+from evaluation.recognition.query_outcomes import judge
+from evaluation.recognition.resampling import (
+    bootstrap_intervals,
+    resampled_weights,
     route_blocks,
 )
-from evaluation.recognition.query_outcomes import judge
-from evaluation.recognition.resampling import resampled_weights
 
 
-def outcomes_of(scores, is_right):
+def outcomes_of(scores, is_right, blocks=None):
     matches = np.stack([is_right, ~is_right], axis=1)
-    return judge(np.stack([scores, scores - 10.0], axis=1), matches)
+    places = np.stack([scores, scores - 10.0], axis=1)
+    return judge(places, matches, blocks)
 
 
 def equal_methods(rng, num_blocks, size=5):
     """Returns two methods that are equally good, and wrong in stretches."""
     number = num_blocks * size
+    blocks = np.repeat(np.arange(num_blocks), size)
     return [
         outcomes_of(
             rng.normal(size=number),
             rng.normal(size=number)
             + np.repeat(rng.normal(size=num_blocks), size)
             > 0.0,
+            blocks,
         )
         for _ in range(2)
     ]
@@ -58,10 +63,9 @@ def test_blocks_follow_the_route():
 
 def test_equal_methods_differ_at_the_nominal_level():
     rng = np.random.default_rng(8)
-    blocks = np.repeat(np.arange(20), 5)
     runs = 200
     wrong = sum(
-        auc_difference(*equal_methods(rng, 20), blocks).p_value < 0.05
+        auc_difference(*equal_methods(rng, 20)).p_value < 0.05
         for _ in range(runs)
     )
     # Within 2.6 deviations of the binomial distribution.
@@ -71,18 +75,43 @@ def test_equal_methods_differ_at_the_nominal_level():
 def test_a_difference_has_a_sign_and_an_interval():
     rng = np.random.default_rng(2)
     scores, blocks = rng.normal(size=100), np.repeat(np.arange(20), 5)
-    good = outcomes_of(scores, rng.random(100) < 0.9)
-    poor = outcomes_of(scores, rng.random(100) < 0.2)
+    good, poor = (
+        outcomes_of(scores, rng.random(100) < share, blocks)
+        for share in (0.9, 0.2)
+    )
     one, other = (
-        auc_difference(*both, blocks) for both in ((good, poor), (poor, good))
+        auc_difference(*both) for both in ((good, poor), (poor, good))
     )
     assert one.value == -other.value > 0.3
     assert 0.0 < one.interval.low < one.value < one.interval.high
     assert one.p_value == pytest.approx(other.p_value)
     assert one.p_value < 1e-6
-    same = auc_difference(good, good, blocks)
+    same = auc_difference(good, good)
     assert (same.value, same.p_value) == (0.0, 1.0)
-    assert np.isnan(auc_difference(good, poor, 0 * blocks).p_value)
+    alone = [replace(one, blocks=0 * blocks) for one in (good, poor)]
+    assert np.isnan(auc_difference(*alone).p_value)
+
+
+def test_intervals_by_blocks():
+    """Where whole blocks are right or wrong, only their number counts."""
+    rng = np.random.default_rng(5)
+    scores, blocks = rng.normal(size=100), np.repeat(np.arange(20), 5)
+    is_right = np.repeat(rng.random(20) < 0.6, 5)
+    in_blocks = outcomes_of(scores, is_right, blocks)
+    plain = outcomes_of(scores, is_right)
+    each = outcomes_of(scores, is_right, np.arange(100))
+    assert bootstrap_intervals(each, 0) == bootstrap_intervals(plain, 0)
+    wide, narrow = (
+        recall.high - recall.low
+        for _, recall in (
+            bootstrap_intervals(one, 0) for one in (in_blocks, plain)
+        )
+    )
+    # Standard errors of a share are as the roots of the numbers.
+    assert wide / narrow == pytest.approx(np.sqrt(5.0), rel=0.15)
+    # A short route is resampled query by query.
+    short = replace(plain, blocks=np.zeros(100))
+    assert bootstrap_intervals(short, 0) == bootstrap_intervals(plain, 0)
 
 
 def test_holm_by_hand():

@@ -26,6 +26,7 @@ def make(method, database, before, after, interval=(0.25, 0.75)):
         unchanged=SimpleNamespace() if has_control else None,
         control=f"town_{database}_stage_03" if has_control else None,
         auc=kept,
+        auc_strict=(before, 0.5 * after),
         recall_at_full_precision=0.125,
         recall_at_1=Kept(before, before, Interval(*interval)),
         protocol=RetrievalProtocol(radius=5.0, scans_per_place=10),
@@ -51,11 +52,11 @@ def test_numbers():
     assert rows[0]["r1_kept"] == 1.0
     first, last = table.to_csv().splitlines()[1:]
     assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
-    protocol = "5.0,10.0,5.0,100.0,10,,0"
-    assert first.endswith(f",0.125,town_01_stage_03,{protocol}")
+    protocol = "5.0,10.0,5.0,100.0,10,,0,paper"
+    assert first.endswith(f",0.125,town_01_stage_03,{protocol},0.8,0.2")
     # Without a control, only the measured values stand there.
     assert last.startswith("town,00,03,btc,,0.5,,,,,")
-    assert last.endswith(f",,{protocol}")
+    assert last.endswith(f",,{protocol},,0.25")
 
 
 def test_table_for_print():

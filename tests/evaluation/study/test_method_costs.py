@@ -41,7 +41,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
         assert row["scans_per_place"] == ("10" if name == "btc" else "1")
         (job,) = (j for j in jobs if j.name == "survey town_01")
         (choice,) = (m for m in job.step.methods if m.name == name)
-        _, described = files.survey("town_01").described(choice).read()
+        _, described = files.survey("town_01").described(choice.name).read()
         places = described.places.descriptors
         sizes = [len(pickle.dumps(one, protocol=5)) for one in places]
         assert float(row["place_bytes"]) == sum(sizes) / len(sizes)

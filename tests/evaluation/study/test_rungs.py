@@ -60,7 +60,7 @@ def described(folder, name, role):
     )
     if not step.is_done():
         step.run(Reporter())
-    return (files.scans, *map(files.described, METHODS))
+    return (files.scans, *(files.described(one.name) for one in METHODS))
 
 
 def rung(folder, part, **changes):

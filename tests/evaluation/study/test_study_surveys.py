@@ -137,7 +137,7 @@ def test_stored_surveys_equal_computed_ones(recorded, source, files):
     assert_equal(files.fine.read(), found.fine)
     direct = describe_drive(recorded, methods, BOTH, PAPER_PROTOCOL)
     for choice, expected in zip(choices, direct, strict=True):
-        placed, described = files.described(choice).read()
+        placed, described = files.described(choice.name).read()
         assert_equal(described, expected)
         assert placed == found.drive.placed
     assert len(source.opened) == 1
@@ -178,7 +178,7 @@ def test_only_missing_or_stale_parts_are_computed(source, files):
     survey(source, (*others, btc), files)
     assert len(source.opened) == 2
     for method in others:
-        path = files.described(method).path
+        path = files.described(method.name).path
         assert path.stat().st_mtime_ns == stamps[path]
     survey(source, (*others, btc), files, frozenset())
     assert len(source.opened) == 3
@@ -215,7 +215,7 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     other = Source(Elsewhere(recorded))
     survey(other, (solid,), surveys[1])
     part = Part(tmp_path / "results" / "solid.data")
-    described = tuple(survey.described(solid) for survey in surveys)
+    described = tuple(survey.described(solid.name) for survey in surveys)
     arguments = "metropolis", ("01", "04"), described, solid, PAPER_PROTOCOL
     step = MakePart(part, recognise_places, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):

@@ -16,7 +16,7 @@ from evaluation.drives import open_drive
 from evaluation.methods import known_methods, make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study import trend, trend_databases
 from evaluation.study.trend import smooth, smooth_band, write_trend
 from evaluation.study.trend_databases import measure_trend
@@ -66,6 +66,7 @@ def test_the_numbers_are_those_of_the_single_commands(folder, points):
                     open_drive(folder / name),
                     open_drive(query),
                     make_method(point.method, {}),
+                    protocol=FAIR_PROTOCOL,
                 )
                 assert point.tcr_sym == change.symmetric
                 assert point.auc == outcome.metrics.auc
