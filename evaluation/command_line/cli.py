@@ -26,10 +26,8 @@ from evaluation.command_line.options import (
     LidarName,
     MethodName,
     ModeName,
-    NamedProtocol,
     OwnMethods,
     Parameters,
-    ProtocolName,
     Radius,
     Scheduler,
     SensorHeight,
@@ -415,7 +413,14 @@ def trend(
 def ranking(
     first: Annotated[Path, typer.Argument(metavar="REPORT")],
     second: Annotated[Path, typer.Argument(metavar="REPORT")],
-    protocol: NamedProtocol = ProtocolName.FAIR,
+    protocol: Annotated[
+        str | None,
+        typer.Option(
+            metavar="fair|paper|recorded",
+            help="Protocol of the queries that count; by default fair, or the "
+            "only one there is.",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Whether two reports rank methods alike.
@@ -426,7 +431,7 @@ def ranking(
     """
     from evaluation.recognition.rank_agreement import rank_agreement
 
-    found = rank_agreement(first, second, protocol=protocol.value)
+    found = rank_agreement(first, second, protocol=protocol)
     if json:
         terminal.print_json(found.to_json())
         return

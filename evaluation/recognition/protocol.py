@@ -142,11 +142,20 @@ class RetrievalProtocol:
 
     @property
     def name(self) -> str:
-        """`fair` or `paper` by how queries are asked; `own` for other ways."""
-        for name, known in PROTOCOLS.items():
-            if all(getattr(self, k) == getattr(known, k) for k in _ASKED):
-                return name
-        return "own"
+        """How queries are asked: `fair`, `paper`, `recorded` or `own`.
+
+        The paper asks as recorded, and merged scans stand at their first one;
+        `recorded` is with any other place of merged scans.
+        """
+        if self._asked == FAIR_PROTOCOL._asked:
+            return "fair"
+        if self._asked != PAPER_PROTOCOL._asked:
+            return "own"
+        return "recorded" if self.place == "middle" else "paper"
+
+    @property
+    def _asked(self) -> dict[str, object]:
+        return {name: getattr(self, name) for name in _ASKED}
 
     @property
     def _changes_queries(self) -> bool:
@@ -167,8 +176,7 @@ class RetrievalProtocol:
 
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
         """Returns the protocol with another's queries, and places of scans."""
-        asked = {name: getattr(other, name) for name in (*_ASKED, "place")}
-        return replace(self, **asked)
+        return replace(self, place=other.place, **other._asked)
 
     def described(self, *, queries: bool = True) -> dict[str, object]:
         """Returns the options that the descriptions of a drive depend on.
@@ -246,16 +254,23 @@ PAPER_PROTOCOL = RetrievalProtocol(place="first")
 FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
 
 PROTOCOLS = {"fair": FAIR_PROTOCOL, "paper": PAPER_PROTOCOL}
+PROTOCOL_NAMES = (*PROTOCOLS, "recorded", "own")
 _ASKED = (*_QUERY_CHANGES, "seed")
 
 
 def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
-    """Raises an InputError if two protocols have different names."""
-    names = sorted({one.name for one in protocols})
-    if len(names) > 1:
-        raise InputError(
-            f"protocol: {' and '.join(names)} in one table; choose one"
-        )
+    """Checks that queries were asked in one way.
+
+    Raises:
+        InputError: otherwise.
+    """
+    first = None
+    for one in protocols:
+        first = first or one
+        if one._asked != first._asked:
+            raise InputError(
+                f"protocol: {first.name} and {one.name} in one table"
+            )
 
 
 # Columns of a table of results: the options of the protocol. Tables are made

@@ -4,7 +4,7 @@ The measure is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
 methods have the same order on both sets, -1 if the opposite one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 import warnings
@@ -16,7 +16,7 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_number
 from evaluation.recognition.pr_curve import pr_curve
-from evaluation.recognition.protocol import PROTOCOLS
+from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.resampling import (
     Interval,
@@ -87,7 +87,7 @@ def _limits(interval: Interval) -> list[float | None]:
 
 
 def rank_agreement(
-    first: Path, second: Path, seed: int = 0, protocol: str = "fair"
+    first: Path, second: Path, seed: int = 0, protocol: str | None = None
 ) -> RankAgreement:
     """Compares the ranking of methods in two reports.
 
@@ -131,29 +131,25 @@ def rank_agreement(
     )
 
 
-def read_answers(path: Path, protocol: str = "fair") -> Answers:
+def read_answers(path: Path, protocol: str | None = None) -> Answers:
     """Returns the outcome of each query, by pair of drives and method.
 
     Args:
         path: `queries.csv`, or the folder that holds it.
-        protocol: name of the protocol whose rows count; all rows of a table
-            without a column `protocol` do.
+        protocol: name of the protocol whose rows count; by default `fair` if
+            there are any, else the only one. Rows without one always count.
 
     Raises:
         InputError: it cannot be read, has no query by that protocol, or has an
             invalid value.
     """
     file = path / "queries.csv" if path.is_dir() else path
+    rows = list(read_records(file, _NEEDED))
+    protocol = _chosen_protocol(file, rows, protocol)
     groups: dict[tuple[str, ...], dict[str, list[tuple[float, ...]]]] = {}
-    for line, row in read_records(file, _NEEDED):
+    for line, row in rows:
         if row.get("protocol", protocol) != protocol:
-            if row["protocol"] in (*PROTOCOLS, "own"):
-                continue
-            known = ", ".join(PROTOCOLS)
-            raise InputError(
-                f"{file}: line {line}: protocol: {row['protocol']!r} is unknown"
-                f" (there are: {known}, own)"
-            )
+            continue
         try:
             score = float(row["score"] or "nan")
             position = [float(row.get(one, "nan")) for one in _POSITION]
@@ -172,11 +168,45 @@ def read_answers(path: Path, protocol: str = "fair") -> Answers:
         group = groups.setdefault(pair, {})
         group.setdefault(row["method"], []).append(values)
     if not groups:
-        raise InputError(f"{file}: no query (protocol {protocol})")
+        raise InputError(f"{file}: no query")
     return {
         pair: {method: _outcomes(rows) for method, rows in group.items()}
         for pair, group in groups.items()
     }
+
+
+def _chosen_protocol(
+    file: Path,
+    rows: Iterable[tuple[int, Mapping[str, str]]],
+    wanted: str | None,
+) -> str | None:
+    """Returns the protocol whose rows count; None if rows have no protocol."""
+    names = ", ".join(PROTOCOL_NAMES)
+    if wanted is not None and wanted not in PROTOCOL_NAMES:
+        raise InputError(
+            f"--protocol: {wanted!r} is unknown (there are: {names})"
+        )
+    lines: dict[str, int] = {}
+    for line, row in rows:
+        if "protocol" in row:
+            lines.setdefault(row["protocol"], line)
+    for name, line in lines.items():
+        if name not in PROTOCOL_NAMES:
+            raise InputError(
+                f"{file}: line {line}: protocol: {name!r} is unknown (there"
+                f" are: {names})"
+            )
+    known = " and ".join(lines)
+    if lines and wanted is not None and wanted not in lines:
+        raise InputError(f"{file}: no query by protocol {wanted} (but {known})")
+    if wanted is None and "fair" in lines:
+        return "fair"
+    if wanted is None and len(lines) > 1:
+        raise InputError(
+            f"{file}: protocol: {known} in one table; choose one with"
+            " --protocol"
+        )
+    return wanted or next(iter(lines), None)
 
 
 def _flag(cell: str) -> int:

@@ -13,7 +13,9 @@ from evaluation.recognition.protocol import PAPER_PROTOCOL
 def asked(method):
     scans = 10 if method == "btc" else 1
     return SimpleNamespace(
-        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans)
+        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans),
+        database="a",
+        query="b",
     )
 
 

@@ -25,7 +25,9 @@ def metrics(auc):
 def asked(method):
     scans = 10 if method == "btc" else 1
     return SimpleNamespace(
-        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans)
+        protocol=replace(PAPER_PROTOCOL, scans_per_place=scans),
+        database="a",
+        query="b",
     )
 
 

@@ -52,7 +52,7 @@ def test_numbers():
     assert rows[0]["r1_kept"] == 1.0
     first, last = table.to_csv().splitlines()[1:]
     assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
-    protocol = "5.0,10.0,5.0,100.0,10,,0,paper"
+    protocol = "5.0,10.0,5.0,100.0,10,,0,recorded"
     assert first.endswith(f",0.125,town_01_stage_03,{protocol},0.8,0.2")
     # Without a control, only the measured values stand there.
     assert last.startswith("town,00,03,btc,,0.5,,,,,")
