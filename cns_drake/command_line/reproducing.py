@@ -83,7 +83,7 @@ def reproduce(
     typer.echo(report)
 
 
-@with_protocol
+@with_named_protocol
 def fresh(
     maps: Annotated[
         list[str] | None,
