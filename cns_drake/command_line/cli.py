@@ -6,7 +6,7 @@ at once. Interrupts wait during imports.
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
-from cns_drake.command_line.laddering import ladder, levels
+from cns_drake.command_line.laddering import ladder, levels, size
 from cns_drake.command_line.maps import city, import_city, list_drives
 from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
@@ -68,6 +68,11 @@ app.command(
     epilog=example("cns-drake ladder metropolis --output ladder --quick")
 )(ladder)
 app.command(epilog=example("cns-drake levels ours.csv theirs.csv"))(levels)
+app.command(
+    epilog=example(
+        "cns-drake size metropolis --places 0 --places 1000 --output size"
+    )
+)(size)
 app.command(
     "import",
     epilog=example(

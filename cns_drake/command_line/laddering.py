@@ -1,4 +1,4 @@
-"""The command `cns-drake ladder`."""
+"""The commands `cns-drake ladder`, `levels` and `size`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -176,3 +176,45 @@ def levels(
 
     table = level_table(read_results(results, frozen_levels()))
     typer.echo(table.to_markdown())
+
+
+def size(
+    map_name: Annotated[
+        str,
+        typer.Argument(metavar="MAP", help="The map that is asked about."),
+    ],
+    *,
+    output: Results,
+    places: Annotated[
+        list[int] | None,
+        typer.Option(
+            metavar="N",
+            help="Number of places of other cities, up to 100000; may be "
+            "repeated. By default 0, 1000, 10000 and 100000.",
+        ),
+    ] = None,
+    method: MethodFiles = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """AUC and time among many places.
+
+    The database has the query's own route and more and more places of other
+    cities: the other shipped ones, twin blocks, redrawn ones. A method that
+    would take over an hour for all queries has its time only. Writes size.csv.
+    After an interruption the same command goes on where it was.
+    """
+    with uninterrupted():
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.studies.size import measure_sizes
+        from evaluation.study.chosen_methods import choose_methods
+
+    path = measure_sizes(
+        map_name,
+        places or (0, 1000, 10_000, 100_000),
+        output,
+        choose_cluster(jobs, scheduler),
+        choose_methods(method or ()),
+        on_note=note,
+    )
+    typer.echo(path)

@@ -58,7 +58,7 @@ def measure_cost(
         query: with queries; as many are used as there are clouds.
         gate_radius: see `score_places`.
     """
-    describing = [_cpu_ms(method.describe, cloud) for cloud in clouds]
+    describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
     places, queries = database.places, query.queries
     indexed = method.build_database(places.descriptors)
     is_known = np.ones(len(places.frames), dtype=bool)
@@ -78,7 +78,7 @@ def measure_cost(
             best = int(ranking(found)[0])
             method.relative_pose(queries.descriptors[row], indexed, best)
 
-    query_times = [_cpu_ms(ask, row) for row in rows.tolist()]
+    query_times = [cpu_ms(ask, row) for row in rows.tolist()]
     sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
     return Cost(
         method=method.name,
@@ -91,7 +91,7 @@ def measure_cost(
     )
 
 
-def _cpu_ms(function: Callable[[Any], object], argument: object) -> float:
+def cpu_ms(function: Callable[[Any], object], argument: object) -> float:
     """Returns the processor time of a call [ms]."""
     start = process_time_ns()
     function(argument)

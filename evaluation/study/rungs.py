@@ -4,21 +4,27 @@ Each method has two results, without the gate and with it.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+import math
 from typing import TypeAlias
 
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
+from evaluation.methods import Method
+from evaluation.recognition.costs import cpu_ms
 from evaluation.recognition.description import (
     DescribedDrive,
     DescribedScans,
     Role,
 )
 from evaluation.recognition.overlap_truth import best_overlaps
+from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import compare_both_ways
+from evaluation.recognition.query_outcomes import judge
+from evaluation.recognition.retrieval import compare, compare_both_ways
 from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.recognition.scoring import score_places
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource, describe
@@ -30,6 +36,10 @@ DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 # Distance between a city and the next distracting one [m]. No scan reaches so
 # far.
 _APART = 1e5
+# Queries whose time is measured, and the longest time for all queries at a size
+# [ms].
+_TIMED = 9
+_LONGEST_MS = 3.6e6
 
 
 def measure_rung(
@@ -130,3 +140,106 @@ def joined_places(
         descriptors=[d for one in drives for d in one.descriptors][:end],
         clouds=[cloud for one in drives for cloud in one.clouds][:end],
     )
+
+
+@dataclass(frozen=True)
+class SizePoint:
+    """A method in a database with places of other cities.
+
+    Times are of the processor.
+
+    Attributes:
+        method: its name.
+        others: number of places of other cities.
+        places: number of all places.
+        queries: number of queries.
+        auc: without the gate; NaN if all queries would take over an hour.
+        r1: R@1, likewise.
+        query_ms: of one query, the median of some [ms].
+        build_ms: to build the database from descriptions [ms].
+    """
+
+    method: str
+    others: int
+    places: int
+    queries: int
+    auc: float
+    r1: float
+    query_ms: float
+    build_ms: float
+
+
+def measure_size(
+    reporter: Reporter,
+    database: Part,
+    query: Part,
+    distractors: tuple[Part, ...],
+    num_distractors: int,
+    choice: MethodChoice,
+    protocol: RetrievalProtocol,
+) -> SizePoint:
+    """Returns the point of a method.
+
+    Args:
+        reporter: takes the progress.
+        database: the method's description of the drive of the places.
+        query: likewise of the drive of the queries.
+        distractors: likewise of drives through other cities.
+        num_distractors: number of their places in the database.
+        choice: the method.
+        protocol: that of place recognition.
+    """
+    method = choice.make()
+    mapped, asked = database.read(), query.read()
+    known = [mapped.places]
+    for part in distractors:
+        if sum(len(one.frames) for one in known[1:]) >= num_distractors:
+            break
+        known.append(part.read().places)
+    places = joined_places(known, num_distractors)
+    number = len(asked.queries.frames)
+    build_ms = cpu_ms(method.build_database, places.descriptors)
+    query_ms = _query_ms(method, places, asked.queries)
+    auc = r1 = math.nan
+    if query_ms * number <= _LONGEST_MS:
+        found = compare(
+            method,
+            replace(mapped, places=places),
+            asked,
+            replace(protocol, gate=False),
+            reporter.track,
+        )
+        outcomes = judge(found.scores, found.matches)
+        auc, r1 = pr_curve(outcomes).auc, float(outcomes.recall_at(1))
+    return SizePoint(
+        method.name,
+        len(places.frames) - len(mapped.places.frames),
+        len(places.frames),
+        number,
+        float(auc),
+        r1,
+        query_ms,
+        build_ms,
+    )
+
+
+def _query_ms(
+    method: Method, places: DescribedScans, queries: DescribedScans
+) -> float:
+    """Returns the median time of some queries; the first does not count."""
+    indexed = method.build_database(places.descriptors)
+    is_known = np.ones(len(places.frames), dtype=bool)
+    rows = np.linspace(0, len(queries.frames) - 1, _TIMED + 1).astype(int)
+
+    def ask(row: int) -> None:
+        score_places(
+            method,
+            queries.descriptors[: row + 1],
+            queries.clouds[row] if queries.clouds else None,
+            indexed,
+            places.clouds,
+            is_known,
+        )
+
+    times = [cpu_ms(ask, row) for row in rows.tolist()]
+    return float(np.median(times[1:]))

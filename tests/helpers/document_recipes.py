@@ -692,6 +692,9 @@ NOT_RUN = {
     "drives, for minutes; test_cli scans with calibrated returns",
     "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
     "script of another project; test_traffic_recording records traffic",
+    "cns-drake size": "describes shipped drives, for many minutes; test_size "
+    "has small ones",
+    ".venv/bin/cns-drake size": "likewise",
     "cns-drake fresh": "draws shipped cities and drives through them, for many "
     "minutes; test_fresh_cities draws a small one",
     ".venv/bin/cns-drake fresh": "likewise",

@@ -11,10 +11,12 @@ from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
+from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.study import rungs
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import MakePart, Part, SurveyFiles
-from evaluation.study.rungs import measure_rung
+from evaluation.study.rungs import measure_rung, measure_size
 from evaluation.study.surveys import DescribeDrive, RecordedDrive
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
@@ -164,3 +166,38 @@ def test_another_database_is_another_rung(folder, tmp_path):
     )
     assert step.is_done()
     assert not other.is_done()
+
+
+def test_a_size_has_the_numbers_of_its_rung(folder, tmp_path, monkeypatch):
+    others = described(folder, "suburbia_01", "places")[1:]
+    expected = _done(
+        rung(
+            folder,
+            tmp_path / "rung.data",
+            distractors=(others,),
+            num_distractors=5,
+        )
+    )
+    database = described(folder, "metropolis_01", "places")[1:]
+    query = described(folder, "metropolis_04", "queries")[1:]
+    for k, choice in enumerate(METHODS):
+        arguments = (
+            Reporter(),
+            database[k],
+            query[k],
+            (others[k],),
+            5,
+            choice,
+            PROTOCOL,
+        )
+        point = measure_size(*arguments)
+        outcomes = expected[2 * k].outcomes
+        assert (point.method, point.others) == (choice.name, 5)
+        assert point.places == outcomes.num_places
+        assert point.queries == len(outcomes)
+        assert point.auc == pr_curve(outcomes).auc
+        assert point.r1 == outcomes.recall_at(1)
+        assert point.query_ms > 0.0
+        with monkeypatch.context() as patch:
+            patch.setattr(rungs, "_LONGEST_MS", 0.0)
+            assert np.isnan(measure_size(*arguments).auc)

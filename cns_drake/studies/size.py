@@ -1,0 +1,169 @@
+"""Size: what more and more places of other cities cost each method.
+
+The drives are those of the ladder's rung `none`; all other places are of other
+cities. Each method has its AUC and the time of a query at each size.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+import math
+from pathlib import Path
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing, make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.ladder import distracting_drives
+from cns_drake.studies.ladder_rungs import plain_drives
+from cns_drake.studies.reproduction import recordable_map
+from evaluation.recognition.description import Role
+from evaluation.recognition.protocol import (
+    DEFAULT_PROTOCOL,
+    RetrievalProtocol,
+)
+from evaluation.report.tables import Table, in_table_order, keyed
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
+from evaluation.study.rungs import SizePoint, measure_size
+from evaluation.study.surveys import DescribeDrive
+
+# More would not be drawn within days.
+MOST_PLACES = 100_000
+# Expected seconds: to describe a drive, and to measure a method at a size.
+_DESCRIPTION_COST = 30.0
+_SIZE_COST = 60.0
+
+
+def measure_sizes(
+    map_name: str,
+    sizes: Iterable[int],
+    output: Path,
+    cluster: Cluster,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
+    on_note: Callable[[str], None] = lambda text: None,
+) -> Path:
+    """Measures methods with more and more places of other cities.
+
+    Finished work is not repeated.
+
+    Args:
+        map_name: name or folder of the map whose last drive asks.
+        sizes: numbers of places of other cities.
+        output: the folder for everything.
+        cluster: where the work is done.
+        methods: to measure.
+        protocol: that of place recognition, without the gate.
+        on_note: receives notes on the work.
+
+    Returns:
+        The path of `size.csv`.
+
+    Raises:
+        InputError: the map is unknown, a number is not from 0 to 100,000, or a
+            step failed.
+    """
+    numbers = sorted(set(sizes))
+    for number in numbers:
+        if not 0 <= number <= MOST_PLACES:
+            raise InputError(
+                f"--places: {number} is not from 0 to {MOST_PLACES}"
+            )
+    folder = MapFolder(recordable_map(map_name))
+    drive = load_scenario(folder.recordable_drives()[-1])
+    plain = plain_drives(drive)
+    files = StudyFiles(output.absolute())
+    make_folder(output)
+    on_note(f"{drive.name}: looking for {numbers[-1]} places elsewhere")
+    others = distracting_drives(
+        plain.database,
+        numbers[-1],
+        protocol.place_spacing,
+        output / "cities",
+        cluster,
+    )
+    jobs: list[Job] = []
+
+    def describe(one: Scenario, role: Role) -> SurveyFiles:
+        found = files.survey(f"{one.name} {role}")
+        step = DescribeDrive(
+            DriveSimulation(one), role, methods, protocol, found
+        )
+        jobs.append(Job(f"describe {one.name}", step, cost=_DESCRIPTION_COST))
+        return found
+
+    places = [describe(one, "places") for one in (plain.database, *others)]
+    asking = describe(plain.query, "queries")
+    needs = tuple(job.name for job in jobs)
+    parts: list[Part] = []
+    for number in numbers:
+        for method in methods:
+            name = f"size {number} {method.name}"
+            part = files.rung(name)
+            first, *rest = (one.described(method) for one in places)
+            step = MakePart(
+                part,
+                measure_size,
+                (
+                    first,
+                    asking.described(method),
+                    tuple(rest) if number else (),
+                    number,
+                    method,
+                    protocol,
+                ),
+            )
+            jobs.append(Job(name, step, needs, _SIZE_COST))
+            parts.append(part)
+    run_jobs(jobs, cluster)
+    path = output / "size.csv"
+    table = size_table(folder.name, [part.read() for part in parts])
+    with completing(path) as unfinished:
+        unfinished.write_text(table.to_csv(), encoding="utf-8")
+    return path
+
+
+def size_table(map_name: str, points: Sequence[SizePoint]) -> Table:
+    """Returns a row for each method and size.
+
+    `growth` is the exponent with which the time of a query grows with the
+    number of all places, from the size before.
+
+    Args:
+        map_name: name of the map.
+        points: those of all methods.
+    """
+    rows = []
+    for method in in_table_order(one.method for one in points):
+        before = None
+        for one in sorted(
+            (one for one in points if one.method == method),
+            key=lambda point: point.places,
+        ):
+            growth = math.nan
+            if before is not None and before.places < one.places:
+                growth = math.log(one.query_ms / before.query_ms) / math.log(
+                    one.places / before.places
+                )
+            rows.append((one, growth))
+            before = one
+    return Table.of(
+        rows,
+        {
+            "map": lambda _: map_name,
+            **keyed(
+                {
+                    name: name
+                    for name in (
+                        *("method", "others", "places", "queries"),
+                        *("auc", "r1", "query_ms", "build_ms"),
+                    )
+                },
+                lambda row, name: getattr(row[0], name),
+            ),
+            "growth": lambda row: row[1],
+        },
+    )
