@@ -694,15 +694,15 @@ NOT_RUN = {
     "script of another project; test_traffic_recording records traffic",
     "cns-drake size": "describes shipped drives, for many minutes; test_size "
     "has small ones",
-    ".venv/bin/cns-drake size": "likewise",
+    ".venv/bin/cns-drake size": "for the same reason",
     "cns-drake fresh": "draws shipped cities and drives through them, for many "
     "minutes; test_fresh_cities draws a small one",
-    ".venv/bin/cns-drake fresh": "likewise",
+    ".venv/bin/cns-drake fresh": "as the command without a path",
     "cns-drake levels mine": "needs these hours; test_levels has such tables",
-    "cns-drake levels ours": "likewise",
+    "cns-drake levels ours": "needs the same hours",
     "cns-eval pr --method map-closures": "needs an extra",
     "pip install '.[map-closures]'": "installs that extra",
-    "pip install '.[kiss-matcher]'": "likewise",
+    "pip install '.[kiss-matcher]'": "installs another extra",
     "python -m pydrake.visualization.meldis": "a server, which does not end; "
     "test_example_diagrams runs the scenario",
     "lidars: typing.Mapping": "lines of an example of Drake's",
