@@ -81,7 +81,7 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
             around.editing.add(
                 f"scaffold_{building.name}",
                 "other-structure",
-                _scaffold(length, height, rng),
+                scaffold(length, height, rng),
                 RigidTransform([0.0, 0.0, foot]) @ X_WF,
                 "scaffolds",
             )
@@ -108,7 +108,7 @@ def _front(
     return RigidTransform(RollPitchYaw(0, 0, yaw), [*middles[k], 0.0]), length
 
 
-def _scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
+def scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
     """Returns a scaffold along x: standards, ledgers, decks, perhaps a net."""
     lifts = max(int(height / _LIFT), 1)
     bays = max(round(length / _BAY), 1)

@@ -49,7 +49,11 @@ def younger(model: Model, height: float) -> Model:
     )
     if top <= height:
         return model
-    share = round(height / float(top), 4)
+    return scaled(model, round(height / float(top), 4))
+
+
+def scaled(model: Model, share: float) -> Model:
+    """Returns a plant of another size, alike in all its proportions."""
     parts = tuple(_scaled(part, share) for part in model.parts)
     return replace(model, parts=parts)
 

@@ -1,0 +1,812 @@
+"""The history of a city: what happens to it, year after year.
+
+The city of a year follows from that of the year before. Each thing has random
+numbers of its own for each year and event, so that a longer history begins as
+a shorter one does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+import math
+import re
+
+import numpy as np
+import shapely
+from shapely import affinity
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.ageing import plots
+from cns_drake.ageing.old_world import OldThing, OldWorld
+from cns_drake.ageing.plots import Plot
+from cns_drake.ageing.rates import Tally
+from cns_drake.base.errors import InputError
+from cns_drake.city.geometry.polygons import polygons_of
+from cns_drake.city.geometry.structures import Structure, assemble, block
+from cns_drake.city.growth.stage_structures import (
+    lot_objects,
+    scaled,
+    use_by_size,
+)
+from cns_drake.city.placement.frontage import lines_along, lot_at
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.plants.vegetation import SPECIES
+from cns_drake.imports.foreign_city import random_generator, random_share
+
+# Part of the demolished buildings that others replace.
+_REPLACED = 0.85
+# Part of the sites that take two years, and of those of one year.
+_TWO_YEARS = 0.7
+# Part of the renewed fronts that stand behind a scaffold on the day of a stage.
+_SCAFFOLDED = 0.4
+_INSULATED, _WITH_BALCONIES = 0.5, 0.35
+# Heights of buildings that get another storey, or balconies [m].
+_HIGHEST_RAISED, _LEAST_BALCONIES = 40.0, 8.0
+# Listed buildings stay as they are.
+_LISTED = re.compile(
+    "church|chapel|museum|town_hall|observation_tower|station|mill"
+)
+_DWELLING = re.compile("flats|block|house|terrace|walk_up|slab|building")
+# Trees: growth a year and height when planted [m], and age that counts as old.
+_GROWTH = (0.3, 0.5)
+_PLANTED = (2.6, 3.6)
+_YOUNG_YEARS = 10
+_LEAST_TREE = 3.0
+# A crown keeps this part of its reach off walls.
+_CROWN_PART = 0.8
+# Furniture moves by up to this [m], as its new foundation allows.
+_FARTHEST = 2.0
+_TURN = 0.1
+_TRIES = 6
+_KERB = 0.1
+# Sizes of new plots along streets: width, depth and setback [m].
+_PLOT_WIDTHS, _PLOT_DEPTH, _SETBACKS = (22.0, 16.0, 11.0), 14.0, (3.0, 22.0)
+_STEEPEST = 0.6
+# On small plots no towers are built [m].
+_HIGHEST_NEW = 20.0
+_GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
+_PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
+
+
+@dataclass(frozen=True)
+class Event:
+    """A row of `history.csv`.
+
+    Attributes:
+        year: of the event; 0 is today.
+        event: what happened.
+        structure: to which structure.
+        successor: the structure in its place, if any.
+        detail: words.
+    """
+
+    year: int
+    event: str
+    structure: str
+    successor: str = ""
+    detail: str = ""
+
+
+@dataclass
+class _Lot:
+    """A plot and what stands on it.
+
+    Attributes:
+        number: of the lot in the city.
+        plot: its ground.
+        height: that of the buildings usual there [m].
+        building: name of its building.
+        parts: names of annexes, storeys, balconies.
+        finished: year in which the coming building will stand.
+        coming: the coming building.
+        old: the building that it replaces, if any.
+    """
+
+    number: int
+    plot: Plot
+    height: float
+    building: str | None
+    parts: list[str]
+    finished: int = 0
+    coming: Structure | None = None
+    old: str = ""
+
+
+@dataclass
+class _Tree:
+    """A tree that stands or was felled.
+
+    Attributes:
+        name: of the tree today.
+        whole: the tree at the height `full`.
+        full: that height [m].
+        height: the present one; 0 if felled [m].
+        size: greatest height [m].
+        planted: year of planting.
+        replanted: year of its successor's planting.
+    """
+
+    name: str
+    whole: Structure
+    full: float
+    height: float
+    size: float
+    planted: int
+    replanted: int = 0
+
+    def structure(self) -> Structure:
+        share = round(self.height / self.full, 4)
+        model = scaled(self.whole.model, share)
+        return replace(self.whole, name=self.name, model=model)
+
+
+class City:
+    """A city at the end of a year.
+
+    Attributes:
+        year: the years since today.
+        standing: name -> structure; None for one that is as today.
+        events: all events so far.
+        new: structures that are not of today, in the order of their coming.
+    """
+
+    def __init__(
+        self,
+        world: OldWorld,
+        rates: Mapping[str, float],
+        seed: int,
+        kept_free: BaseGeometry,
+    ):
+        """Begins today.
+
+        Args:
+            world: the city of today.
+            rates: event -> rate a year.
+            seed: the seed of all draws.
+            kept_free: the ways of drives, where nothing is put up, in W [m].
+
+        Raises:
+            InputError: the city has no lots.
+        """
+        self._world, self._rates, self._seed = world, rates, seed
+        self._kept_free = kept_free
+        self.tally = Tally(rates)
+        self.year = 0
+        self.standing: dict[str, Structure | None] = dict.fromkeys(
+            world.visuals
+        )
+        self.events: list[Event] = []
+        self.new: dict[str, Structure] = {}
+        self._feet = {name: t.foot for name, t in world.things.items()}
+        self._tree = shapely.STRtree(list(self._feet.values()))
+        self._names = list(self._feet)
+        self._added: dict[str, BaseGeometry] = {}
+        self._lots = list(self._lots_of_buildings())
+        if not self._lots:
+            raise InputError(
+                f"{world.path}: no structure of class building: a map without "
+                "lots does not age"
+            )
+        self._lots += self._free_lots()
+        self._trees = list(self._trees_of_today())
+        self._furniture = {
+            name: kind
+            for name, one in world.things.items()
+            if (kind := _furniture_kind(one)) is not None
+        }
+        self._places = {name: name for name in self._furniture}
+        self._junctions = world.junctions()
+        self._kerbs: dict[str, str] = {}
+        self._passing: list[str] = []
+
+    # Random numbers.
+
+    def _rng(self, purpose: str, name: str) -> np.random.Generator:
+        return random_generator(self._seed, f"{purpose}/{self.year}", name)
+
+    def _share(self, purpose: str, name: str) -> float:
+        return random_share(self._seed, f"{purpose}/{self.year}", name)
+
+    def _meets(self, event: str, name: str) -> bool:
+        rate = self._rates[event]
+        hit = self._share(event, name) < rate
+        self.tally.count(event, rate, hit, 1)
+        return hit
+
+    # Bookkeeping.
+
+    def _tell(
+        self, event: str, structure: str, successor: str = "", detail: str = ""
+    ) -> None:
+        self.events.append(
+            Event(self.year, event, structure, successor, detail)
+        )
+
+    def _put(self, one: Structure, foot: BaseGeometry | None = None) -> None:
+        self.standing[one.name] = one
+        self.new.setdefault(one.name, one)
+        self._added[one.name] = one.footprint_W if foot is None else foot
+
+    def _remove(self, name: str) -> None:
+        self.standing.pop(name, None)
+        self._added.pop(name, None)
+
+    def near(
+        self, area: BaseGeometry, ignored: Sequence[str] = ()
+    ) -> list[str]:
+        """Returns the names of what stands on an area of W, but for ground."""
+        found = [
+            self._names[k]
+            for k in sorted(self._tree.query(area, predicate="intersects"))
+        ]
+        found = [name for name in found if name in self.standing]
+        found = [name for name in found if name not in self._added]
+        found += [n for n, foot in self._added.items() if foot.intersects(area)]
+        return [
+            name
+            for name in found
+            if name not in ignored and not self._is_ground(name)
+        ]
+
+    def _is_ground(self, name: str) -> bool:
+        return self._class(name) in _GROUND
+
+    def _class(self, name: str) -> str:
+        one = self.new.get(name)
+        if one is not None:
+            return one.semantic_class
+        return self._world.things[name].semantic_class
+
+    def _foot(self, name: str) -> BaseGeometry:
+        return self._added.get(name, self._feet.get(name, Polygon()))
+
+    def _structure(self, name: str) -> Structure:
+        return self.standing.get(name) or self._world.structure(name)
+
+    def _ground_height(self, area: BaseGeometry, default: float) -> float:
+        return self._world.ground.lowest(area, default)
+
+    # What there is today.
+
+    def _lots_of_buildings(self) -> Iterator[_Lot]:
+        world = self._world
+        buildings = world.of_class("building")
+        feet = [one.foot for one in buildings]
+        tree = shapely.STRtree(feet)
+        for number, one in enumerate(buildings):
+            others = [
+                feet[k]
+                for k in tree.query(one.foot, predicate="intersects")
+                if k != number
+            ]
+            ways = shapely.intersection(world.streets, one.foot.buffer(1.0))
+            blocked = shapely.union_all([*others, ways, self._kept_free])
+            pieces = polygons_of(one.foot.difference(blocked.buffer(0.02)))
+            pieces = [p for p in pieces if p.area > 0.3 * one.foot.area]
+            if not pieces:
+                continue
+            area = max(pieces, key=lambda p: p.area).simplify(0.05)
+            plot = Plot.facing(area, world.streets, one.bottom)
+            z = self._front_height(plot, one.bottom)
+            yield _Lot(
+                number, replace(plot, z=z), one.top - z, one.name, []
+            )
+
+    def _front_height(self, plot: Plot, default: float) -> float:
+        """Returns the height of the ground before the front of a plot [m].
+
+        A building may reach into the ground.
+        """
+        x0, y0, x1, _ = plot.inside(plot.area).bounds
+        at = plots.place(plot, (x0 + x1) / 2, y0 - 1.0)
+        z = self._world.ground.heights(np.array([at]))[0]
+        is_known = np.isfinite(z) and z > default - 0.5
+        return round(float(z), 3) if is_known else default
+
+    def _free_lots(self) -> list[_Lot]:
+        """Returns rectangles of open ground along streets.
+
+        Trees and furniture may stand there.
+        """
+        world, taken = self._world, []
+        streets = world.streets
+        solid = [
+            one.foot.buffer(plots.PARTY_WALL)
+            for one in world.things.values()
+            if one.semantic_class in ("building", "other-structure")
+        ]
+        open_ground = world.open_ground.difference(shapely.union_all(solid))
+        open_ground = open_ground.difference(self._kept_free.buffer(2.0))
+        heights = [lot.height for lot in self._lots]
+        usual = shapely.STRtree([lot.plot.area for lot in self._lots])
+        lots: list[_Lot] = []
+        if open_ground.is_empty:
+            return lots
+        shapely.prepare(open_ground)
+        lines = [
+            line
+            for setback in _SETBACKS
+            for line in lines_along(streets, open_ground, setback)
+        ]
+        for line in lines:
+            start = 0.0
+            while start < line.length - _PLOT_WIDTHS[-1]:
+                area = _fitting_plot(line, start, open_ground, taken)
+                if area is None:
+                    start += 4.0
+                    continue
+                z = world.ground.heights(shapely.get_coordinates(area))
+                if np.isfinite(z).all() and np.ptp(z) < _STEEPEST:
+                    plot = Plot.facing(area, streets, float(z.min()))
+                    taken.append(area)
+                    near = min(heights[int(usual.nearest(area))], _HIGHEST_NEW)
+                    number = len(self._lots) + len(lots)
+                    lots.append(_Lot(number, plot, near, None, []))
+                start += 24.0
+        return lots
+
+    def _trees_of_today(self) -> Iterator[_Tree]:
+        walls = [t.foot for t in self._world.of_class("building")]
+        tree = shapely.STRtree(walls)
+        for one in self._world.of_class("vegetation"):
+            height = one.top - one.bottom
+            is_tree = one.name.startswith("tree") or height > 4.0
+            if height < _LEAST_TREE or not is_tree:
+                continue
+            whole = self._world.structure(one.name)
+            kinds = [
+                kind
+                for part in whole.model.parts
+                for name, kind in SPECIES.items()
+                if getattr(part.shape, "mesh", "").startswith(name)
+            ]
+            low, high = kinds[0].height_range if kinds else (8.0, 11.0)
+            if kinds and "young" in whole.model.parts[0].shape.mesh:  # type: ignore
+                low, high = 7.0, 9.0
+            rng = random_generator(self._seed, "size", one.name)
+            middle = one.foot.centroid
+            wall = float(middle.distance(walls[int(tree.nearest(middle))]))
+            reach = _reach(self._world.triangles(one.name), middle)
+            fits = wall / (_CROWN_PART * reach) * height
+            size = min(float(rng.uniform(low, high)), fits)
+            age = -int(rng.integers(_YOUNG_YEARS, 60))
+            if height < size - 1.0:  # It has not grown up yet.
+                age = -round((height - _PLANTED[0]) / np.mean(_GROWTH))
+            yield _Tree(
+                one.name, whole, height, height, max(size, height), age
+            )
+
+    # A year.
+
+    def live(self) -> None:
+        """Lets a year pass."""
+        self.year += 1
+        for name in self._passing:
+            self._remove(name)
+        self._passing = []
+        for lot in self._lots:
+            if lot.finished:
+                self._go_on(lot)
+            elif lot.building is not None:
+                self._meet(lot)
+        self._build_on_free_lots()
+        self._grow_trees()
+        for place in self._furniture:
+            event = self._furniture[place]
+            if self._places[place] in self.standing and self._meets(
+                event, place
+            ):
+                self._move(place)
+        for name, area in self._junctions.items():
+            if self._meets("junctions", name):
+                self._rebuild_junction(name, area)
+        self._paint_markings()
+
+    def _meet(self, lot: _Lot) -> None:
+        name = lot.building
+        assert name is not None
+        if _LISTED.search(name):
+            return
+        if self._meets("demolished", name):
+            self._demolish(lot)
+        elif self._meets("extended", name):
+            self._extend(lot)
+        elif self._meets("renewed", name):
+            self._renew(lot)
+
+    def _clear(self, area: BaseGeometry) -> None:
+        """Takes away what stands on a plot."""
+        for name in self.near(area):
+            kind = self._class(name)
+            foot = self._foot(name)
+            inside = foot.intersection(area).area > 0.5 * foot.area
+            if kind in ("building", "other-structure") or not inside:
+                continue
+            self._remove(name)
+            trees = [tree for tree in self._trees if tree.name == name]
+            for tree in trees:
+                tree.height, tree.replanted = 0.0, 0
+            event = "felled" if kind == "vegetation" else "removed"
+            self._tell(event, name, detail="for a building site")
+
+    def _demolish(self, lot: _Lot) -> None:
+        name = lot.building
+        assert name is not None
+        self._tell("demolished", name)
+        self._remove(name)
+        self._empty(lot)
+        old, lot.building = name, None
+        rng = self._rng("replaced", old)
+        banned = self._archetype(old)
+        if rng.uniform() < _REPLACED:
+            height = lot.height * float(rng.uniform(1.0, 1.7))
+            self._open_site(lot, height, banned, rng, old)
+        if lot.coming is None:
+            self._leave_empty(lot)
+
+    def _archetype(self, name: str) -> str:
+        row = self._world.rows.get(name, {})
+        words = [*row.get("tags", "").split(), re.sub(r"_\d.*", "", name)]
+        return words[-2] if len(words) > 2 else words[-1]
+
+    def _open_site(
+        self,
+        lot: _Lot,
+        height: float,
+        banned: str,
+        rng: np.random.Generator,
+        old: str = "",
+    ) -> None:
+        """Opens a site on a lot, if a building fits there."""
+        plot = lot.plot
+        near = [
+            self._foot(name)
+            for name in self.near(plot.area.buffer(plots.PARTY_WALL))
+            if self._class(name) == "building"
+        ]
+        ending = f"{self.year:03d}y_{lot.number:03d}"
+        coming = plots.new_building(plot, height, banned, near, rng, ending)
+        if coming is None:
+            return
+        self._clear(plot.area.buffer(0.5))
+        self._empty(lot)
+        lot.coming, lot.old = coming, old
+        lot.finished = self.year + 1 + int(rng.uniform() < _TWO_YEARS)
+        for one in plots.site(plot, f"site_{ending}", rng):
+            if not self.near(one.footprint_W.buffer(-0.05)):
+                self._put(one)
+                lot.parts.append(one.name)
+        self._tell("site", coming.name, f"site_{ending}")
+
+    def _empty(self, lot: _Lot) -> None:
+        for part in lot.parts:
+            self._remove(part)
+        lot.parts = []
+
+    def _leave_empty(self, lot: _Lot) -> None:
+        """Uses an empty lot as a car park, a market, a yard or a garden."""
+        name = f"lot_{self.year:03d}y_{lot.number:03d}"
+        bare = lot.plot.thing(
+            name,
+            "building",
+            replace(
+                assemble(),
+                footprint=lot.plot.inside(lot.plot.area.buffer(-0.5)),
+            ),
+        )
+        cars = {"hatchback": 3.0, "saloon": 3.0, "estate": 2.0, "van": 1.0}
+        cars = {k: v for k, v in cars.items() if k in OBJECTS}
+        rng = self._rng("lot", name)
+        for one in lot_objects(bare, use_by_size(bare), cars, rng):
+            if not self.near(one.footprint_W):
+                self._put(one)
+                lot.parts.append(one.name)
+
+    def _go_on(self, lot: _Lot) -> None:
+        """Builds on, or finishes the coming building."""
+        coming = lot.coming
+        assert coming is not None
+        self._empty(lot)
+        if self.year < lot.finished:
+            model = plots.frame(coming, seed=lot.number)
+            one = replace(coming, name=f"{coming.name}_frame", model=model)
+            self._put(one)
+            lot.parts.append(one.name)
+            plot = plots.building_plot(coming)
+            height = 0.5 * lot.height
+            self._scaffold(plot, height, one.name, lot.parts)
+            self._tell("frame", coming.name, one.name)
+            return
+        self._put(coming)
+        plot = plots.building_plot(coming)
+        lot.building, lot.coming, lot.finished = coming.name, None, 0
+        lot.plot = replace(plot, area=plot.area)
+        lot.height = float(plots.top_of(coming.model))
+        if lot.old:
+            self._tell("replaced", lot.old, coming.name)
+        else:
+            self._tell("built", coming.name)
+
+    def _scaffold(
+        self, plot: Plot, height: float, name: str, parts: list[str]
+    ) -> None:
+        rng = self._rng("scaffold", name)
+        one = plots.scaffold_before(plot, height, f"scaffold_{name}", rng)
+        area = one.footprint_W
+        blocked = [
+            n
+            for n in self.near(area)
+            if self._class(n) in ("building", "other-structure", *_PASSING)
+            and self._foot(n).intersection(area).area > 0.2
+        ]
+        free = not area.intersects(self._world.ground.carriageway)
+        if free and not blocked and height > 3.5:
+            self._put(one)
+            parts.append(one.name)
+
+    def _build_on_free_lots(self) -> None:
+        free = [lot for lot in self._lots if not (lot.building or lot.finished)]
+        if not free:
+            return
+        stock = sum(lot.building is not None for lot in self._lots)
+        share = min(1.0, self._rates["built"] * stock / len(free))
+        for k, lot in enumerate(free):
+            name = f"lot_{lot.number:03d}"
+            if self._share("built", name) < share:
+                rng = self._rng("building", name)
+                height = lot.height * float(rng.uniform(0.8, 1.5))
+                self._open_site(lot, height, "", rng)
+            hit = lot.coming is not None
+            self.tally.count("built", share, hit, stock if k == 0 else 0)
+
+    def _extend(self, lot: _Lot) -> None:
+        name = lot.building
+        assert name is not None
+        rng = self._rng("extended", name)
+        triangles = self._triangles(name)
+        makers: list[Callable[[], Structure | None]] = [
+            lambda: plots.annex_to(
+                lot.plot,
+                triangles,
+                f"{name}_annex_{self.year:03d}y",
+                lambda area: self._is_free(area, name),
+                rng,
+            ),
+        ]
+        is_raised = any("_storey_" in part for part in lot.parts)
+        if lot.height < _HIGHEST_RAISED and not is_raised:
+            makers.insert(
+                int(rng.integers(2)),
+                lambda: plots.storey_on(
+                    lot.plot, triangles, f"{name}_storey_{self.year:03d}y", rng
+                ),
+            )
+        one = next((one for make in makers if (one := make())), None)
+        if one is None:
+            self._tell("extended", name, detail="within its walls")
+            return
+        self._put(one)
+        lot.parts.append(one.name)
+        self._tell("extended", name, one.name)
+
+    def _is_free(self, area: BaseGeometry, building: str) -> bool:
+        if area.intersects(self._world.streets):
+            return False
+        if area.intersects(self._kept_free):
+            return False
+        return not self.near(area, (building,))
+
+    def _triangles(self, name: str) -> np.ndarray:
+        if name in self._world.things and self.standing[name] is None:
+            return self._world.triangles(name)
+        one = self._structure(name)
+        return plots.structure_triangles(one)
+
+    def _renew(self, lot: _Lot) -> None:
+        name = lot.building
+        assert name is not None
+        rng = self._rng("renewed", name)
+        foot = self._foot(name)
+        alone = not [
+            n
+            for n in self.near(foot.buffer(0.4), (name, *lot.parts))
+            if self._class(n) in ("building", "other-structure", "fence")
+        ]
+        insulated = alone and rng.uniform() < _INSULATED
+        triangles = self._triangles(name)
+        self.standing[name] = plots.renewed(
+            self._structure(name), insulated, rng
+        )
+        words = ["colour", *(["insulation"] if insulated else [])]
+        has = any("_balconies_" in part for part in lot.parts)
+        has = has or not _DWELLING.search(name) or lot.height < _LEAST_BALCONIES
+        added = ""
+        if rng.uniform() < _WITH_BALCONIES and not has:
+            one = plots.balconies_on(
+                lot.plot, triangles, f"{name}_balconies_{self.year:03d}y", rng
+            )
+            if one is not None and not one.footprint_W.intersects(
+                self._world.ground.carriageway
+            ):
+                self._put(one, Polygon())
+                lot.parts.append(one.name)
+                added = one.name
+                words.append("balconies")
+        if rng.uniform() < _SCAFFOLDED:
+            self._scaffold(lot.plot, lot.height, name, self._passing)
+        self._tell("renewed", name, added, " ".join(words))
+
+    # Trees and furniture.
+
+    def _grow_trees(self) -> None:
+        for tree in self._trees:
+            if tree.height == 0.0:
+                if tree.replanted == self.year:
+                    self._plant(tree)
+                continue
+            is_young = self.year - tree.planted < _YOUNG_YEARS
+            event = "felled_young" if is_young else "felled"
+            if self._meets(event, tree.name):
+                self._remove(tree.name)
+                self._tell("felled", tree.name)
+                tree.height = 0.0
+                rng = self._rng("replanted", tree.name)
+                tree.replanted = self.year + int(rng.integers(1, 3))
+            elif tree.height < tree.size - 0.05:
+                by = self._rng("grown", tree.name).uniform(*_GROWTH)
+                tree.height = round(min(tree.height + by, tree.size), 2)
+                self.standing[tree.name] = tree.structure()
+                self._tell("grown", tree.name, detail=f"{tree.height:g} m")
+
+    def _plant(self, tree: _Tree) -> None:
+        area = self._feet.get(tree.name, self._added.get(tree.name))
+        place = shapely.Point(tree.whole.xyz[:2]).buffer(0.4)
+        if area is not None and tree.whole.xyz[:2] == (0.0, 0.0):
+            place = area.centroid.buffer(0.4)
+        if self.near(place):
+            return
+        old = tree.name
+        tree.name = f"{re.sub('_[0-9]+y$', '', old)}_{self.year:03d}y"
+        tree.height = round(
+            float(self._rng("planted", old).uniform(*_PLANTED)), 2
+        )
+        tree.planted = self.year
+        self._put(tree.structure(), place)
+        self._tell("planted", old, tree.name, f"{tree.height:g} m")
+
+    def _move(self, place: str) -> None:
+        """Replaces a thing of the street within 2 m, at the same kerb."""
+        old = self._places[place]
+        rng, foot = self._rng("moved", place), self._foot(old)
+        middle = np.array(foot.centroid.coords[0])
+        ground = self._world.ground
+        offset, turn, rise = np.zeros(2), 0.0, 0.0
+        for _ in range(_TRIES):
+            angle = rng.uniform(-np.pi, np.pi)
+            by = float(rng.uniform(0.2, _FARTHEST))
+            step = by * np.array([math.cos(angle), math.sin(angle)])
+            up = ground.rise(middle, middle + step)
+            area = affinity.translate(foot, *step)
+            if (
+                abs(up) < _KERB
+                and not self.near(area, (old,))
+                and not area.intersects(ground.carriageway)
+                and not area.intersects(self._kept_free)
+            ):
+                turn = float(rng.uniform(-_TURN, _TURN))
+                offset, rise = step, up
+                break
+        whole = self._structure(old)
+        x, y = _turned(np.array(whole.xyz[:2]) - middle, turn)
+        xyz = (
+            round(float(middle[0] + offset[0] + x), 3),
+            round(float(middle[1] + offset[1] + y), 3),
+            round(whole.xyz[2] + rise, 3),
+        )
+        name = f"{place}_{self.year:03d}y"
+        new = replace(
+            whole, name=name, xyz=xyz, yaw=round(whole.yaw + turn, 5)
+        )
+        self._remove(old)
+        foot = affinity.rotate(foot, turn, use_radians=True)
+        self._put(new, affinity.translate(foot, *offset))
+        self._places[place] = name
+        by = math.hypot(*offset)
+        self._tell("furniture", old, name, f"moved by {by:.1f} m")
+
+    def _rebuild_junction(self, name: str, area: BaseGeometry) -> None:
+        """Gives a junction new kerb stones, poles and signs."""
+        around = area.buffer(8.0)
+        for place in self._furniture:
+            old = self._places[place]
+            near = self._foot(old).intersects(around)
+            if near and old in self.standing:
+                if self._furniture[place] != "benches":
+                    self._move(place)
+        self._remove(self._kerbs.get(name, ""))
+        stones, ground = [], self._world.ground
+        for kerb in ground.kerbs(1.0):
+            for k in range(len(kerb.points) - 1):
+                a, b = kerb.points[k : k + 2]
+                line = LineString([a, b])
+                if not around.contains(line) or line.length > 1.5:
+                    continue
+                if line.buffer(0.4).intersects(self._kept_free):
+                    continue
+                middle = (a + b) / 2 - 0.15 * kerb.outwards[k]
+                z = ground.heights(middle[None], of_road=True)[0]
+                if np.isfinite(z):
+                    yaw = math.atan2(*(b - a)[::-1])
+                    size = (line.length + 0.05, 0.3, 0.3)
+                    at = (*middle, z - 0.02)
+                    stones.append(
+                        block(f"stone_{len(stones)}", size, at, yaw, _STONE)
+                    )
+        successor = ""
+        if stones:
+            successor = f"kerb_{name}_{self.year:03d}y"
+            model = assemble(*stones)
+            one = Structure(successor, "sidewalk", model, (0.0, 0.0, 0.0))
+            self._put(one, Polygon())
+            self._kerbs[name] = successor
+        self._tell("junction", name, successor)
+
+    def _paint_markings(self) -> None:
+        for one in self._world.of_class("road"):
+            if "mark" in one.name and self._meets("markings", one.name):
+                tint = float(self._rng("tint", one.name).uniform(0.75, 1.0))
+                whole = self._world.structure(one.name)
+                parts = tuple(
+                    replace(p, rgb=(round(0.9 * tint, 3),) * 3)
+                    for p in whole.model.parts
+                )
+                model = replace(whole.model, parts=parts)
+                self.standing[one.name] = replace(whole, model=model)
+                self._tell("markings", one.name, detail=f"{tint:.2f}")
+
+
+_STONE = (0.8, 0.8, 0.78)
+
+
+def _furniture_kind(one: OldThing) -> str | None:
+    """Returns the event that replaces a thing of the street."""
+    name = one.name.lower()
+    if one.semantic_class == "traffic-sign":
+        return "signs"
+    if one.semantic_class == "pole":
+        is_signal = "traffic_light" in name or "signal" in name
+        return "signals" if is_signal else "lamps"
+    small = one.foot.area < 6.0 and one.top - one.bottom < 4.0
+    is_site = "_lot_" in name or "market" in name
+    if one.semantic_class == "other-object" and small and not is_site:
+        return "benches"
+    return None
+
+
+def _reach(triangles: np.ndarray, middle: BaseGeometry) -> float:
+    xy = triangles[:, :, :2].reshape(-1, 2) - middle.coords[0]
+    return float(np.hypot(*xy.T).max(initial=0.5))
+
+
+def _turned(xy: np.ndarray, angle: float) -> tuple[float, float]:
+    c, s = math.cos(angle), math.sin(angle)
+    return c * xy[0] - s * xy[1], s * xy[0] + c * xy[1]
+
+
+def _fitting_plot(
+    line: LineString,
+    start: float,
+    within: BaseGeometry,
+    taken: Sequence[BaseGeometry],
+) -> Polygon | None:
+    """Returns the widest rectangle along a line that is free."""
+    for width in _PLOT_WIDTHS:
+        lot = lot_at(line, start, width, min(_PLOT_DEPTH, width))
+        if lot is None or not within.contains(lot.footprint_W):
+            continue
+        room = lot.footprint_W.buffer(plots.PARTY_WALL)
+        if not any(room.intersects(one) for one in taken):
+            return lot.footprint_W
+    return None

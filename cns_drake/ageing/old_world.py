@@ -1,0 +1,276 @@
+"""The city of today: a stage of a map, with all that ageing must see of it."""
+
+from collections.abc import Callable, Sequence
+import csv
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import user_errors
+from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
+from cns_drake.city.geometry.mesh import read_mesh
+from cns_drake.city.geometry.structures import (
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    Model,
+    Part,
+    Shape,
+    SphereShape,
+    Structure,
+    ground_footprint,
+    triple,
+)
+from cns_drake.city.geometry.upper_sides import from_above
+from cns_drake.roads.network import load_road_network
+from cns_drake.scene.world import load_world
+from cns_drake.transient import world_structures
+from cns_drake.transient.world_structures import (
+    GroundSurface,
+    read_structures,
+    triangle_corners,
+)
+
+# The ground is known this far around buildings [m].
+_AROUND = 40.0
+# A column of `structures.csv` with the year in which a building was built.
+YEAR_COLUMN = "built"
+
+
+@dataclass(frozen=True)
+class OldThing:
+    """A structure of today.
+
+    Attributes:
+        name: its name.
+        semantic_class: a key of `CLASS_IDS`.
+        foot: the convex hull of what stands near its foot, in W [m].
+        bottom, top: heights of its ends [m].
+        built: year in which it was built, if the map's file has it.
+    """
+
+    name: str
+    semantic_class: str
+    foot: BaseGeometry
+    bottom: float
+    top: float
+    built: int | None
+
+
+class OldWorld:
+    """A stage of a map.
+
+    Attributes:
+        folder: the map.
+        path: the stage's file.
+        rows: the rows of the map's table of structures, by name.
+        columns: the columns of that table.
+        things: name -> thing, in the order of names.
+        visuals: name -> the SDF text of its visuals.
+        today: the year of the stage, where buildings have years.
+    """
+
+    def __init__(self, folder: MapFolder):
+        """Reads the last stage of a map.
+
+        Raises:
+            InputError: there is none, it cannot be loaded, or it is no world
+                of one link with visuals <structure>/<part>.
+        """
+        stages = list(folder.stages().values())
+        if not stages:
+            raise InputError(f"{folder.path}: no stage_NN.sdf: not a map")
+        self.folder, self.path = folder, stages[-1]
+        self._read_table()
+        self.visuals, self._elements = _read_visuals(self.path)
+        self._world = load_world(self.path)
+        self._seen = read_structures(self._world)
+        years = {
+            name: int(row[YEAR_COLUMN])
+            for name, row in self.rows.items()
+            if row.get(YEAR_COLUMN, "").isdecimal()
+        }
+        self.today = max(years.values(), default=None)
+        self.things = {
+            name: OldThing(
+                name,
+                one.semantic_class,
+                one.footprint,
+                one.bottom,
+                float(one.p_WPs[:, 2].max(initial=one.bottom)),
+                years.get(name),
+            )
+            for name, one in self._seen.items()
+            if name in self.visuals
+        }
+
+    def _read_table(self) -> None:
+        path = self.folder.structures
+        with user_errors(path):
+            with path.open(encoding="utf-8", newline="") as file:
+                self.columns = next(csv.reader(file), [])
+        needed = ("instance", "name", "class", "label", "x", "y", "z", "yaw")
+        records = read_records(path, needed)
+        self.rows = {row["name"]: row for _, row in records}
+
+    def of_class(self, *classes: str) -> list[OldThing]:
+        """Returns the things of some classes, in the order of names."""
+        return [t for t in self.things.values() if t.semantic_class in classes]
+
+    def structure(self, name: str) -> Structure:
+        """Returns a structure as the city generator has it.
+
+        Its footprint is the hull of what is near the ground.
+
+        Raises:
+            InputError: a shape or a mesh is of another kind.
+        """
+        row = self.rows[name]
+        xyz = triple(float(row[axis]) for axis in "xyz")
+        yaw = float(row["yaw"])
+        X_SW = RigidTransform(RollPitchYaw(0, 0, yaw), xyz).inverse()
+        parts, meshes = [], {}
+        for visual in self._elements[name]:
+            pose = np.array(visual.findtext("pose", "").split(), float)
+            X_SP = X_SW @ RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
+            rgb = visual.findtext("material/diffuse", "0.6 0.6 0.6 1").split()
+            shape = _shape(visual, self.path)
+            if isinstance(shape, MeshShape):
+                file = self.folder.path / MESH_FOLDER / f"{shape.mesh}.obj"
+                with user_errors(file):
+                    meshes[shape.mesh] = read_mesh(file.resolve())
+            parts.append(
+                Part(
+                    visual.attrib["name"].partition("/")[2],
+                    shape,
+                    triple(X_SP.translation().round(4)),
+                    triple(X_SP.rotation().ToRollPitchYaw().vector().round(5)),
+                    triple(map(float, rgb[:3])),
+                )
+            )
+        model = Model(tuple(parts), meshes, ground_footprint(parts, meshes))
+        tags = tuple(row.get("tags", "").split())
+        return Structure(name, row["class"], model, xyz, yaw, tags)
+
+    def triangles(self, name: str) -> np.ndarray:
+        """Returns the (M, 3, 3) triangles of a structure in the world [m]."""
+        found = [triangle_corners(part) for part in self._seen[name].parts]
+        return np.concatenate([np.zeros((0, 3, 3)), *found])
+
+    @cached_property
+    def ground(self) -> GroundSurface:
+        """The ground below and around buildings."""
+        feet = [t.foot for t in self.of_class("building", "pole")]
+        near = shapely.union_all(feet).convex_hull.buffer(_AROUND)
+        return GroundSurface(self._seen, near)
+
+    @cached_property
+    def streets(self) -> BaseGeometry:
+        """Carriageways, car parks beside them and sidewalks, in W [m]."""
+        return shapely.union_all(
+            [self.ground.carriageway, self.area(self._is_street)]
+        )
+
+    @cached_property
+    def open_ground(self) -> BaseGeometry:
+        """Ground beside streets that is neither park nor water, in W [m]."""
+        return self.area(_is_open).difference(self.streets)
+
+    def area(
+        self, wanted: Callable[[world_structures.Structure], bool]
+    ) -> BaseGeometry:
+        """Returns the area of some structures, seen from above [m]."""
+        found = [
+            from_above(triangle_corners(part))
+            for one in self._seen.values()
+            if wanted(one)
+            for part in one.parts
+        ]
+        joined = shapely.union_all(np.concatenate([[], *found]), grid_size=0.01)
+        return joined.buffer(0.05).buffer(-0.05)
+
+    @staticmethod
+    def _is_street(one: world_structures.Structure) -> bool:
+        is_bay = one.semantic_class == "parking" and "bay" in one.name
+        return one.semantic_class == "sidewalk" or is_bay
+
+    def junctions(self) -> dict[str, BaseGeometry]:
+        """Returns the areas of junctions in W by name; none without roads."""
+        if not self.folder.roads.is_file():
+            return {}
+        network = load_road_network(self.folder.roads)
+        return {n: network.junction_area(n) for n in sorted(network.junctions)}
+
+
+_PUBLIC = re.compile(
+    "park(?!ing)|plaza|square|church|museum|wood|promenade|river|water|harbour"
+    "|roundabout|slope|station|sport|play|grave|cemetery|school|pitch|bank"
+    "|green|median|forest|bridge|quay|rail|allotment"
+)
+
+
+def _is_open(one: world_structures.Structure) -> bool:
+    kinds = ("terrain", "other-ground", "parking")
+    return one.semantic_class in kinds and not _PUBLIC.search(one.name.lower())
+
+
+def _read_visuals(
+    path: Path,
+) -> tuple[dict[str, list[str]], dict[str, list[ElementTree.Element]]]:
+    with user_errors(path):
+        text = path.read_text(encoding="utf-8")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise InputError(f"{path}: {error}") from None
+    visuals = root.findall("world/model/link/visual")
+    if len(root.findall("world/model")) != 1 or not all(
+        "/" in one.get("name", "") for one in visuals
+    ):
+        raise InputError(
+            f"{path}: not one model with visuals named <structure>/<part>, as "
+            "`cns-drake city` and `import` write it"
+        )
+    lines: dict[str, list[str]] = {}
+    elements: dict[str, list[ElementTree.Element]] = {}
+    for one in visuals:
+        name = one.attrib["name"].partition("/")[0]
+        elements.setdefault(name, []).append(one)
+        line = ElementTree.tostring(one, encoding="unicode").strip()
+        lines.setdefault(name, []).append(line)
+    return lines, elements
+
+
+def _shape(visual: ElementTree.Element, path: Path) -> Shape:
+    def numbers(tag: str, default: str = "") -> Sequence[float]:
+        text = visual.findtext(f"geometry/{tag}", default)
+        return [float(value) for value in text.split()]
+
+    mesh = visual.findtext("geometry/mesh/uri")
+    if mesh is not None and mesh.startswith(f"{MESH_FOLDER}/"):
+        scale = triple(numbers("mesh/scale", "1 1 1"))
+        return MeshShape(Path(mesh).stem, scale)
+    for kind, make in (
+        ("box", lambda: BoxShape(triple(numbers("box/size")))),
+        (
+            "cylinder",
+            lambda: CylinderShape(
+                *numbers("cylinder/radius"), *numbers("cylinder/length")
+            ),
+        ),
+        ("sphere", lambda: SphereShape(*numbers("sphere/radius"))),
+    ):
+        if visual.find(f"geometry/{kind}") is not None:
+            return make()
+    raise InputError(
+        f"{path}: {visual.get('name')}: a shape that ageing cannot change"
+    )

@@ -1,0 +1,126 @@
+"""The rates of a city's events, and how often these came about."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from scipy.stats import poisson
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.yaml_files import parse_yaml, read_yaml
+
+# The events that a seed draws -> their rate a year, see rates.yaml.
+DEFAULT_RATES: Mapping[str, float] = {
+    event: values["rate"]
+    for event, values in parse_yaml(
+        Path(__file__).with_name("rates.yaml").read_bytes()
+    ).items()
+}
+LAST_YEAR = 200
+
+
+def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
+    """Returns event -> rate a year.
+
+    Args:
+        path: a YAML file of event: rate, from 0 to 1; all others keep theirs.
+        factor: for all rates.
+
+    Raises:
+        InputError: the file cannot be read; it names an unknown event, or a
+            rate, or the factor, is out of range.
+    """
+    found: object = {} if path is None else read_yaml(path)
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: not a mapping of event: rate")
+    for event, rate in found.items():
+        if event not in DEFAULT_RATES:
+            raise InputError(
+                f"{path}: {event}: unknown event (there are: "
+                f"{', '.join(DEFAULT_RATES)})"
+            )
+        is_number = isinstance(rate, int | float) and not isinstance(rate, bool)
+        if not (is_number and 0.0 <= rate <= 1.0):
+            raise InputError(f"{path}: {event}: {rate!r} is no rate, 0 to 1")
+    rates = {e: factor * r for e, r in {**DEFAULT_RATES, **found}.items()}
+    for event, rate in rates.items():
+        if not 0.0 <= rate <= 1.0:
+            raise InputError(
+                f"--rate: {factor:g} times the rate of {event} is {rate:g}, "
+                "not from 0 to 1"
+            )
+    return rates
+
+
+def check_years(years: Iterable[int]) -> tuple[int, ...]:
+    """Returns years, if they ascend and are within reach.
+
+    Raises:
+        InputError: they do not, or one is beyond 200.
+    """
+    found = tuple(years)
+    text = " ".join(map(str, found))
+    if not found or any(a >= b for a, b in zip(found, found[1:], strict=False)):
+        raise InputError(f"--years: {text or 'none'}: not in ascending order")
+    if max(map(abs, found)) > LAST_YEAR:
+        raise InputError(
+            f"--years: {text}: none may be beyond {LAST_YEAR} years"
+        )
+    return found
+
+
+@dataclass
+class Tally:
+    """Counts how often events met the things of a city.
+
+    Attributes:
+        rates: event -> its rate a year.
+        expected: event -> expected number.
+        exposure: event -> things at risk, summed over the years.
+        number: event -> how often it came about.
+    """
+
+    rates: Mapping[str, float]
+    expected: dict[str, float] = field(default_factory=dict)
+    exposure: dict[str, int] = field(default_factory=dict)
+    number: dict[str, int] = field(default_factory=dict)
+
+    def count(self, event: str, share: float, hit: bool, things: int) -> None:
+        """Counts a draw.
+
+        Args:
+            event: its name.
+            share: its probability.
+            hit: whether it came about.
+            things: things at risk.
+        """
+        for values, value in (
+            (self.expected, share),
+            (self.exposure, things),
+            (self.number, int(hit)),
+        ):
+            values[event] = values.get(event, 0) + value  # type: ignore
+
+    def to_csv(self) -> str:
+        """Returns the rates asked and those that came about.
+
+        `p` is the probability of a Poisson number as far from the expected
+        one, or farther.
+        """
+        lines = ["event,rate,exposure,expected,events,rate_came_about,p\n"]
+        for event, rate in self.rates.items():
+            exposure = self.exposure.get(event, 0)
+            expected = self.expected.get(event, 0.0)
+            number = self.number.get(event, 0)
+            share = number / exposure if exposure else float("nan")
+            lines.append(
+                f"{event},{rate:.6g},{exposure},{expected:.3f},{number},"
+                f"{share:.6f},{poisson_p(number, expected):.4f}\n"
+            )
+        return "".join(lines)
+
+
+def poisson_p(number: int, expected: float) -> float:
+    """Returns the two-sided p-value of a Poisson number."""
+    tails = poisson.cdf(number, expected), poisson.sf(number - 1, expected)
+    return min(1.0, 2.0 * float(min(tails)))
