@@ -34,7 +34,11 @@ from cns_drake.scene.semantics import CLASS_IDS, CLASS_RGB
 # Meshes are named relative to the SDF file, so that a stage needs no package
 # map: it parses from wherever the world's folder lies.
 def stage_sdf(
-    world: str, structures: Iterable[Structure], *, comment: str
+    world: str,
+    structures: Iterable[Structure],
+    *,
+    comment: str,
+    before: Iterable[str] = (),
 ) -> str:
     """Returns a world with all structures as visuals of one static link.
 
@@ -47,6 +51,7 @@ def stage_sdf(
         world: the name of the world and of its model.
         structures: what stands at this stage.
         comment: one line for the reader of the file.
+        before: SDF text of other visuals.
     """
     lines = [
         '<?xml version="1.0"?>',
@@ -56,6 +61,7 @@ def stage_sdf(
         f"<model name={quoteattr(world)}>",
         "<static>true</static>",
         '<link name="city">',
+        *before,
     ]
     for structure in structures:
         lines.extend(_visual(structure, part) for part in structure.model.parts)

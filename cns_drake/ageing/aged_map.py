@@ -1,0 +1,398 @@
+"""The map folder of a city that ages: a stage for today and for each year."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+import csv
+from dataclasses import astuple, dataclass, fields, replace
+import io
+import os
+from pathlib import Path
+import re
+import shutil
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+import yaml
+
+from cns_drake.ageing.history import City, Event
+from cns_drake.ageing.old_world import YEAR_COLUMN, OldWorld
+from cns_drake.ageing.rates import check_years
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import user_errors
+from cns_drake.base.map_folder import (
+    LANES_NAME,
+    MESH_FOLDER,
+    ROADS_NAME,
+    STRUCTURES_NAME,
+    MapFolder,
+    stage_name,
+)
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.city.generation.generate import MAX_STRUCTURES, stage_sdf
+from cns_drake.city.geometry.structures import BoxShape, MeshShape, Structure
+from cns_drake.city.growth.stage_structures import (
+    lot_objects,
+    use_by_size,
+    younger,
+)
+from cns_drake.imports.map_files import OF_BOX, map_draft, triangles_in
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.scenarios.drive_table import write_table
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario_files import (
+    describe_scenario,
+    load_scenario,
+)
+from cns_drake.scene.semantics import CLASS_IDS
+
+HISTORY_NAME = "history.csv"
+RATES_NAME = "rates.csv"
+_MAX_SEED = 2**63
+# The car and its mirrors need this from its line [m].
+_HALF_CAR = 1.3
+_SPACING = 0.5
+# In the past a tree was lower by this each year, at least so high [m].
+_GROWTH, _LEAST_TREE = 0.4, 2.0
+
+
+@dataclass(frozen=True)
+class AgedMap:
+    """What ageing a map made.
+
+    Attributes:
+        years: stage -> year; 0 is today.
+        structures: stage -> number of structures.
+        events: event -> number of rows of the history.
+        changed: (N, 3) places of buildings that changed [m].
+        trajectory: of the last drive.
+    """
+
+    years: Mapping[str, int]
+    structures: Mapping[str, int]
+    events: Mapping[str, int]
+    changed: np.ndarray
+    trajectory: Trajectory
+
+
+def age_map(
+    source: Path,
+    years: Sequence[int],
+    seed: int,
+    rates: Mapping[str, float],
+    output: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    finish: Callable[[Path, AgedMap], None] = lambda folder, aged: None,
+) -> AgedMap:
+    """Writes the map folder of a city that ages.
+
+    Args:
+        source: the folder of the map; its last stage is today.
+        years: ascending years from today, at most 200; years before today
+            need buildings with years (column `built` of `structures.csv`).
+        seed: the seed of all draws, not negative.
+        rates: event -> rate a year, see `read_rates`.
+        output: the folder to write; it must not be there.
+        progress: takes one line at a time.
+        finish: completes the folder before it gets its name.
+
+    Returns:
+        What was made.
+
+    Raises:
+        InputError: an argument or the map cannot be used.
+    """
+    wanted = check_years(years)
+    if not 0 <= seed < _MAX_SEED:
+        raise InputError(f"--seed: {seed}: not from 0 to {_MAX_SEED - 1}")
+    if os.path.lexists(output):
+        raise InputError(
+            f"{output}: the folder is there already; give another one"
+        )
+    name = output.resolve().name
+    if not re.fullmatch(r"\w+", name, re.ASCII):
+        raise InputError(
+            f"--output: {name!r}: the folder's name may have letters, digits "
+            "and underscores only"
+        )
+    folder = MapFolder(source.resolve())
+    drives = folder.recordable_drives()
+    if not drives:
+        raise InputError(
+            f"{source}: no sequence_NN.yaml whose stage_NN.sdf is there"
+        )
+    progress(f"reading {folder.name}")
+    ways = [plan_drive(load_scenario(path)) for path in drives]
+    world = OldWorld(folder)
+    if min(wanted) < 0 and world.today is None:
+        raise InputError(
+            f"{source}: --years: {min(wanted)}: no building has a year in "
+            f"column {YEAR_COLUMN} of {STRUCTURES_NAME}, as the past needs"
+        )
+    progress("looking for lots")
+    city = City(world, rates, seed, shapely.union_all([*map(_swept, ways)]))
+    # Today comes first.
+    stages = {f"{k + 1:02d}": y for k, y in enumerate([0, *_others(wanted)])}
+    with map_draft(output) as draft:
+        _copy_inputs(folder, drives, draft)
+        writing = _Writing(world, draft, seed)
+        shutil.copyfile(world.path, draft / stage_name("01"))
+        writing.count("01", dict.fromkeys(world.visuals))
+        events: list[Event] = []
+        for stage, year in stages.items():
+            if year < 0:
+                standing, passed = past(world, year)
+                events += passed if year == min(wanted) else []
+                writing.stage(stage, year, standing)
+            while city.year < year:
+                city.live()
+            if year > 0:
+                progress(f"year {year}")
+                writing.stage(stage, year, city.standing)
+        events += city.events
+        writing.table(city.new)
+        (draft / HISTORY_NAME).write_text(_history(events), "utf-8")
+        (draft / RATES_NAME).write_text(city.tally.to_csv(), "utf-8")
+        _write_drives(folder, drives, draft, stages, seed)
+        write_table(draft, sizes=writing.sizes)
+        counts: dict[str, int] = {}
+        for one in events:
+            counts[one.event] = counts.get(one.event, 0) + 1
+        aged = AgedMap(
+            stages,
+            {stage: number for stage, (number, _) in writing.sizes.items()},
+            counts,
+            _changed(city, world),
+            ways[-1],
+        )
+        finish(draft, aged)
+    return aged
+
+
+def _others(years: Iterable[int]) -> list[int]:
+    return [year for year in years if year != 0]
+
+
+def _swept(trajectory: Trajectory) -> BaseGeometry:
+    """Returns the way of a drive, as wide as the car, in W [m]."""
+    number = max(2, int(trajectory.length / _SPACING))
+    times = np.linspace(0.0, trajectory.duration, number)
+    _, p_WB = trajectory.poses(times)
+    return shapely.LineString(p_WB[:, :2]).buffer(_HALF_CAR)
+
+
+def past(
+    world: OldWorld, year: int
+) -> tuple[dict[str, Structure | None], list[Event]]:
+    """Returns what stood some years ago, and the buildings built since.
+
+    Buildings of later years were not there, and their lots were in another
+    use. Trees were younger.
+
+    Args:
+        world: the city of today.
+        year: negative.
+    """
+    assert world.today is not None  # The caller has checked it.
+    standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)
+    events = []
+    for name, thing in world.things.items():
+        since = None if thing.built is None else thing.built - world.today
+        if since is not None and since > year:
+            events.append(Event(since, "built", name))
+            del standing[name]
+            lot = world.structure(name)
+            rng = np.random.default_rng(thing.built)
+            for one in lot_objects(lot, use_by_size(lot), {"hatchback": 1}, rng):
+                standing[one.name] = one
+        elif thing.semantic_class == "vegetation":
+            height = thing.top - thing.bottom
+            if height > _LEAST_TREE and name.startswith("tree"):
+                young = max(height + _GROWTH * year, _LEAST_TREE)
+                standing[name] = younger_plant(world, name, young)
+    events.sort(key=lambda one: one.year)
+    return standing, events
+
+
+def younger_plant(world: OldWorld, name: str, height: float) -> Structure:
+    """Returns a plant of today when it was lower."""
+    whole = world.structure(name)
+    return replace(whole, model=younger(whole.model, height))
+
+
+class _Writing:
+    """Writes stages, the meshes they need, and the table of structures."""
+
+    def __init__(self, world: OldWorld, draft: Path, seed: int):
+        self._world, self._draft, self._seed = world, draft, seed
+        self.sizes: dict[str, tuple[int, int]] = {}
+        self._triangles: dict[str, int] = {}
+        self._past: dict[str, Structure] = {}
+
+    def stage(
+        self, stage: str, year: int, standing: Mapping[str, Structure | None]
+    ) -> None:
+        """Writes the stage of a year."""
+        world = self._world
+        new = [one for one in standing.values() if one is not None]
+        old = [
+            line
+            for name, one in standing.items()
+            if one is None
+            for line in world.visuals[name]
+        ]
+        text = stage_sdf(
+            f"{world.folder.name}_year_{year}",
+            new,
+            comment=f"{world.folder.name} in year {year}, aged by cns-drake "
+            f"with seed {self._seed}.",
+            before=old,
+        )
+        path = self._draft / stage_name(stage)
+        path.write_text(text, "utf-8")
+        if year < 0:
+            known = world.visuals
+            self._past |= {o.name: o for o in new if o.name not in known}
+        self.count(stage, standing)
+
+    def count(
+        self, stage: str, standing: Mapping[str, Structure | None]
+    ) -> None:
+        """Counts structures and triangles; writes meshes at first use."""
+        total = 0
+        for name, one in standing.items():
+            if one is None:
+                text = "".join(self._world.visuals[name])
+                found = re.findall(rf"<uri>{MESH_FOLDER}/(.*?)\.obj", text)
+                total += OF_BOX * text.count("<box>")
+                total += sum(self._copied(mesh) for mesh in found)
+                continue
+            for part in one.model.parts:
+                if isinstance(part.shape, MeshShape):
+                    total += self._written(part.shape.mesh, one)
+                elif isinstance(part.shape, BoxShape):
+                    total += OF_BOX
+        self.sizes[stage] = len(standing), total
+
+    def _copied(self, mesh: str) -> int:
+        if mesh not in self._triangles:
+            file = Path(MESH_FOLDER) / f"{mesh}.obj"
+            path = self._world.folder.path / file
+            with user_errors(path):
+                text = path.read_text("utf-8")
+                (self._draft / file).write_text(text, "utf-8")
+            self._triangles[mesh] = triangles_in(text)
+        return self._triangles[mesh]
+
+    def _written(self, mesh: str, one: Structure) -> int:
+        if mesh not in self._triangles:
+            file = self._world.folder.path / MESH_FOLDER / f"{mesh}.obj"
+            if file.is_file():
+                return self._copied(mesh)
+            text = one.model.meshes[mesh].to_obj()
+            path = self._draft / MESH_FOLDER / f"{mesh}.obj"
+            path.write_text(text, "utf-8")
+            self._triangles[mesh] = triangles_in(text)
+        return self._triangles[mesh]
+
+    def table(self, new: Mapping[str, Structure]) -> None:
+        """Writes the table of structures: today's, then the others.
+
+        Those of a shorter history have the same instance ids in a longer one.
+        """
+        world = self._world
+        out = io.StringIO()
+        table = csv.DictWriter(out, world.columns, "", lineterminator="\n")
+        table.writeheader()
+        table.writerows(world.rows.values())
+        ids = [int(row["instance"]) for row in world.rows.values()]
+        others = {n: o for n, o in self._past.items() if n not in new}
+        first = max(ids, default=0) + 1
+        if first + len(new) + len(others) > MAX_STRUCTURES:
+            raise InputError(
+                f"{world.path}: {first + len(new)} structures are more than "
+                f"instance ids can count ({MAX_STRUCTURES})"
+            )
+        for k, one in enumerate((*new.values(), *others.values())):
+            row = {
+                "instance": first + k,
+                "name": one.name,
+                "class": one.semantic_class,
+                "label": CLASS_IDS[one.semantic_class],
+                **{a: f"{v:.3f}" for a, v in zip("xyz", one.xyz, strict=True)},
+                "yaw": f"{one.yaw:.5f}",
+                "tags": " ".join(one.tags),
+            }
+            table.writerow({k: v for k, v in row.items() if k in world.columns})
+        path = self._draft / STRUCTURES_NAME
+        path.write_text(out.getvalue(), "utf-8")
+
+
+def _history(events: Iterable[Event]) -> str:
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(field.name for field in fields(Event))
+    table.writerows(map(astuple, events))
+    return out.getvalue()
+
+
+def _copy_inputs(folder: MapFolder, drives: Iterable[Path], draft: Path) -> None:
+    """Copies roads, views and ways of drives."""
+    names = {ROADS_NAME, LANES_NAME, folder.views.name}
+    for path in drives:
+        way = load_scenario(path).waypoints
+        if way is not None:
+            names.add(Path(way).name)
+            shutil.copyfile(way, draft / Path(way).name)
+    for name in sorted(names):
+        if (folder.path / name).is_file():
+            shutil.copyfile(folder.path / name, draft / name)
+
+
+def _write_drives(
+    folder: MapFolder,
+    drives: Sequence[Path],
+    draft: Path,
+    stages: Mapping[str, int],
+    seed: int,
+) -> None:
+    """Writes a drive through each stage.
+
+    Today's is on the route of the map's first drive, the others on that of its
+    last, which asks.
+    """
+    for stage, year in stages.items():
+        path = drives[0] if stage == "01" else drives[-1]
+        values = read_yaml(path)
+        if "base" in values:
+            scenario = load_scenario(path)
+            values = describe_scenario(scenario, folder.path)
+        kept = {
+            key: value
+            for key, value in values.items()
+            if key not in ("name", "map", "stage", "title", "without", "base")
+        }
+        if "waypoints" in kept:
+            kept["waypoints"] = Path(kept["waypoints"]).name
+        when = "today" if year == 0 else f"in year {year} of seed {seed}"
+        text = yaml.safe_dump(
+            {
+                "map": ".",
+                "stage": stage,
+                "title": f"{folder.name.capitalize()} {when}",
+                **kept,
+            },
+            sort_keys=False,
+        )
+        MapFolder(draft).drive(stage).write_text(text, "utf-8")
+
+
+def _changed(city: City, world: OldWorld) -> np.ndarray:
+    """Returns the (N, 3) places of new buildings and additions [m]."""
+    places = [
+        one.xyz
+        for one in city.new.values()
+        if one.semantic_class == "building" and one.name in city.standing
+    ]
+    return np.array(places, float).reshape(-1, 3)

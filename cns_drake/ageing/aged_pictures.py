@@ -1,0 +1,97 @@
+"""Pictures of a city that ages, from the air and from three streets."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from matplotlib.figure import Figure
+import matplotlib.image
+import numpy as np
+
+from cns_drake.ageing.aged_map import AgedMap
+from cns_drake.base.map_folder import stage_name
+from cns_drake.pictures.stage_scene import StageScene, View
+
+PICTURES = "pictures"
+_WIDTH, _HEIGHT = 480, 270
+_STREETS = 3
+# Height of the camera on the street, and distance of its target [m].
+_EYE, _AHEAD = 2.4, 30.0
+# Stations along the drive are this far apart, and chosen ones three times [m].
+_SPACING = 25.0
+# Changes within this distance ahead are seen [m].
+_SEEN = 60.0
+
+
+def street_views(aged: AgedMap, number: int = _STREETS) -> dict[str, View]:
+    """Returns views along the last drive where most is built.
+
+    Args:
+        aged: the city.
+        number: of views.
+    """
+    way = aged.trajectory
+    times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]
+    R_WBs, p_WBs = way.poses(times)
+    ahead = np.array(R_WBs)[:, :, 0]
+    seen = []
+    for p, d in zip(p_WBs, ahead, strict=True):
+        to = aged.changed - p
+        far = np.linalg.norm(to[:, :2], axis=1)
+        is_seen = (far < _SEEN) & (to @ d > 0.5 * far)
+        seen.append(int(is_seen.sum()))
+    chosen: list[int] = []
+    for k in np.argsort(-np.array(seen), kind="stable"):
+        apart = [np.linalg.norm(p_WBs[k] - p_WBs[j]) for j in chosen]
+        if min(apart, default=np.inf) > 3 * _SPACING and len(chosen) < number:
+            chosen.append(int(k))
+    views = {}
+    for n, k in enumerate(sorted(chosen), start=1):
+        x, y, z = p_WBs[k]
+        u, v, w = p_WBs[k] + _AHEAD * ahead[k]
+        views[f"street_{n}"] = View(
+            position=(x, y, z + _EYE), target=(u, v, w + _EYE + 1.0), fov_y=60
+        )
+    return views
+
+
+def air_view(aged: AgedMap) -> View:
+    """Returns a view of the last drive's surroundings from the air."""
+    _, p = aged.trajectory.poses(np.linspace(0.0, aged.trajectory.duration, 99))
+    x, y, z = (p.min(axis=0) + p.max(axis=0)) / 2
+    half = float(np.ptp(p, axis=0)[:2].max()) / 2
+    up = (x - 0.9 * half, y - 1.1 * half, z + 0.9 * half)
+    return View(position=up, target=(x, y, z), fov_y=52)
+
+
+def draw_pictures(
+    folder: Path,
+    aged: AgedMap,
+    progress: Callable[[str], None] = lambda line: None,
+) -> None:
+    """Writes a picture of each view for each year, and a film strip of all.
+
+    Args:
+        folder: of the map; `pictures/year_<y>_<view>.jpg` and `film.jpg` are
+            written.
+        aged: the city.
+        progress: takes one line at a time.
+    """
+    views = {"air": air_view(aged), **street_views(aged)}
+    years = sorted(aged.years, key=lambda stage: aged.years[stage])
+    (folder / PICTURES).mkdir()
+    figure = Figure(
+        figsize=(len(views) * 3.2, len(years) * 1.85), layout="constrained"
+    )
+    panels = figure.subplots(len(years), len(views), squeeze=False)
+    for row, stage in zip(panels, years, strict=True):
+        year = aged.years[stage]
+        progress(f"picturing year {year}")
+        scene = StageScene(folder / stage_name(stage))
+        for axes, (name, view) in zip(row, views.items(), strict=True):
+            picture = scene.photograph(view, _WIDTH, _HEIGHT)
+            file = folder / PICTURES / f"year_{year:03d}_{name}.jpg"
+            matplotlib.image.imsave(file, picture)
+            axes.imshow(picture)
+            axes.set_axis_off()
+        row[0].set_title(f"year {year}" if year else "today", loc="left")
+    figure.savefig(folder / PICTURES / "film.jpg", dpi=110)
