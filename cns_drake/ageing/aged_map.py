@@ -17,13 +17,12 @@ from shapely.geometry.base import BaseGeometry
 import yaml
 
 from cns_drake.ageing.history import City, Event
-from cns_drake.ageing.old_world import YEAR_COLUMN, OldWorld
+from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import (
     LANES_NAME,
-    MESH_FOLDER,
     ROADS_NAME,
     STRUCTURES_NAME,
     MapFolder,
@@ -31,13 +30,19 @@ from cns_drake.base.map_folder import (
 )
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.generate import MAX_STRUCTURES, stage_sdf
-from cns_drake.city.geometry.structures import BoxShape, MeshShape, Structure
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.stage_structures import (
     lot_objects,
     use_by_size,
     younger,
 )
-from cns_drake.imports.map_files import OF_BOX, map_draft, triangles_in
+from cns_drake.imports.map_files import (
+    YEAR_COLUMN,
+    map_draft,
+    stage_size,
+    triangles_in,
+)
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
@@ -138,7 +143,7 @@ def age_map(
         _copy_inputs(folder, drives, draft)
         writing = _Writing(world, draft, seed)
         shutil.copyfile(world.path, draft / stage_name("01"))
-        writing.count("01", dict.fromkeys(world.visuals))
+        writing.finish("01", world.path.read_text("utf-8"), {})
         events: list[Event] = []
         for stage, year in stages.items():
             if year < 0:
@@ -166,6 +171,8 @@ def age_map(
             _changed(city, world),
             ways[-1],
         )
+        # Pictures need the memory.
+        del world, city, writing, events
         finish(draft, aged)
     return aged
 
@@ -204,7 +211,9 @@ def past(
             del standing[name]
             lot = world.structure(name)
             rng = np.random.default_rng(thing.built)
-            for one in lot_objects(lot, use_by_size(lot), {"hatchback": 1}, rng):
+            for one in lot_objects(
+                lot, use_by_size(lot), {"hatchback": 1}, rng
+            ):
                 standing[one.name] = one
         elif thing.semantic_class == "vegetation":
             height = thing.top - thing.bottom
@@ -249,52 +258,30 @@ class _Writing:
             f"with seed {self._seed}.",
             before=old,
         )
-        path = self._draft / stage_name(stage)
-        path.write_text(text, "utf-8")
+        (self._draft / stage_name(stage)).write_text(text, "utf-8")
         if year < 0:
             known = world.visuals
             self._past |= {o.name: o for o in new if o.name not in known}
-        self.count(stage, standing)
+        meshes: dict[str, Mesh] = {}
+        for one in new:
+            meshes |= one.model.meshes
+        self.finish(stage, text, meshes)
 
-    def count(
-        self, stage: str, standing: Mapping[str, Structure | None]
-    ) -> None:
-        """Counts structures and triangles; writes meshes at first use."""
-        total = 0
-        for name, one in standing.items():
-            if one is None:
-                text = "".join(self._world.visuals[name])
-                found = re.findall(rf"<uri>{MESH_FOLDER}/(.*?)\.obj", text)
-                total += OF_BOX * text.count("<box>")
-                total += sum(self._copied(mesh) for mesh in found)
-                continue
-            for part in one.model.parts:
-                if isinstance(part.shape, MeshShape):
-                    total += self._written(part.shape.mesh, one)
-                elif isinstance(part.shape, BoxShape):
-                    total += OF_BOX
-        self.sizes[stage] = len(standing), total
+    def finish(self, stage: str, text: str, meshes: Mapping[str, Mesh]) -> None:
+        """Writes the meshes of a stage that are not there yet; counts it."""
+        for place in re.findall("<uri>([^<]+)</uri>", text):
+            if place not in self._triangles:
+                obj = self._obj(place, meshes)
+                (self._draft / place).write_text(obj, "utf-8")
+                self._triangles[place] = triangles_in(obj)
+        self.sizes[stage] = stage_size(text, self._triangles)
 
-    def _copied(self, mesh: str) -> int:
-        if mesh not in self._triangles:
-            file = Path(MESH_FOLDER) / f"{mesh}.obj"
-            path = self._world.folder.path / file
+    def _obj(self, place: str, meshes: Mapping[str, Mesh]) -> str:
+        path = self._world.folder.path / place
+        if path.is_file():
             with user_errors(path):
-                text = path.read_text("utf-8")
-                (self._draft / file).write_text(text, "utf-8")
-            self._triangles[mesh] = triangles_in(text)
-        return self._triangles[mesh]
-
-    def _written(self, mesh: str, one: Structure) -> int:
-        if mesh not in self._triangles:
-            file = self._world.folder.path / MESH_FOLDER / f"{mesh}.obj"
-            if file.is_file():
-                return self._copied(mesh)
-            text = one.model.meshes[mesh].to_obj()
-            path = self._draft / MESH_FOLDER / f"{mesh}.obj"
-            path.write_text(text, "utf-8")
-            self._triangles[mesh] = triangles_in(text)
-        return self._triangles[mesh]
+                return path.read_text("utf-8")
+        return meshes[Path(place).stem].to_obj()
 
     def table(self, new: Mapping[str, Structure]) -> None:
         """Writes the table of structures: today's, then the others.
@@ -337,7 +324,9 @@ def _history(events: Iterable[Event]) -> str:
     return out.getvalue()
 
 
-def _copy_inputs(folder: MapFolder, drives: Iterable[Path], draft: Path) -> None:
+def _copy_inputs(
+    folder: MapFolder, drives: Iterable[Path], draft: Path
+) -> None:
     """Copies roads, views and ways of drives."""
     names = {ROADS_NAME, LANES_NAME, folder.views.name}
     for path in drives:

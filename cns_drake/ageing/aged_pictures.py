@@ -59,7 +59,7 @@ def air_view(aged: AgedMap) -> View:
     _, p = aged.trajectory.poses(np.linspace(0.0, aged.trajectory.duration, 99))
     x, y, z = (p.min(axis=0) + p.max(axis=0)) / 2
     half = float(np.ptp(p, axis=0)[:2].max()) / 2
-    up = (x - 0.9 * half, y - 1.1 * half, z + 0.9 * half)
+    up = (x - 0.9 * half, y - 1.1 * half, z + 1.2 * half)
     return View(position=up, target=(x, y, z), fov_y=52)
 
 
@@ -86,6 +86,7 @@ def draw_pictures(
     for row, stage in zip(panels, years, strict=True):
         year = aged.years[stage]
         progress(f"picturing year {year}")
+        scene = None  # The scenes of two years would need twice the memory.
         scene = StageScene(folder / stage_name(stage))
         for axes, (name, view) in zip(row, views.items(), strict=True):
             picture = scene.photograph(view, _WIDTH, _HEIGHT)

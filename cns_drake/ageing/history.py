@@ -290,9 +290,7 @@ class City:
             area = max(pieces, key=lambda p: p.area).simplify(0.05)
             plot = Plot.facing(area, world.streets, one.bottom)
             z = self._front_height(plot, one.bottom)
-            yield _Lot(
-                number, replace(plot, z=z), one.top - z, one.name, []
-            )
+            yield _Lot(number, replace(plot, z=z), one.top - z, one.name, [])
 
     def _front_height(self, plot: Plot, default: float) -> float:
         """Returns the height of the ground before the front of a plot [m].
@@ -374,9 +372,7 @@ class City:
             age = -int(rng.integers(_YOUNG_YEARS, 60))
             if height < size - 1.0:  # It has not grown up yet.
                 age = -round((height - _PLANTED[0]) / np.mean(_GROWTH))
-            yield _Tree(
-                one.name, whole, height, height, max(size, height), age
-            )
+            yield _Tree(one.name, whole, height, height, max(size, height), age)
 
     # A year.
 
@@ -422,7 +418,10 @@ class City:
             kind = self._class(name)
             foot = self._foot(name)
             inside = foot.intersection(area).area > 0.5 * foot.area
-            if kind in ("building", "other-structure") or not inside:
+            is_loose = kind in (*_PASSING, "other-object", "vegetation")
+            if kind in ("building", "other-structure"):
+                continue
+            if not inside and not is_loose:
                 continue
             self._remove(name)
             trees = [tree for tree in self._trees if tree.name == name]
@@ -475,7 +474,8 @@ class City:
         lot.coming, lot.old = coming, old
         lot.finished = self.year + 1 + int(rng.uniform() < _TWO_YEARS)
         for one in plots.site(plot, f"site_{ending}", rng):
-            if not self.near(one.footprint_W.buffer(-0.05)):
+            fences = [part for part in lot.parts if "_fence_" in part]
+            if not self.near(one.footprint_W, fences):
                 self._put(one)
                 lot.parts.append(one.name)
         self._tell("site", coming.name, f"site_{ending}")
@@ -706,9 +706,7 @@ class City:
             round(whole.xyz[2] + rise, 3),
         )
         name = f"{place}_{self.year:03d}y"
-        new = replace(
-            whole, name=name, xyz=xyz, yaw=round(whole.yaw + turn, 5)
-        )
+        new = replace(whole, name=name, xyz=xyz, yaw=round(whole.yaw + turn, 5))
         self._remove(old)
         foot = affinity.rotate(foot, turn, use_radians=True)
         self._put(new, affinity.translate(foot, *offset))
@@ -722,9 +720,9 @@ class City:
         for place in self._furniture:
             old = self._places[place]
             near = self._foot(old).intersects(around)
-            if near and old in self.standing:
-                if self._furniture[place] != "benches":
-                    self._move(place)
+            is_part = self._furniture[place] != "benches"
+            if near and is_part and old in self.standing:
+                self._move(place)
         self._remove(self._kerbs.get(name, ""))
         stones, ground = [], self._world.ground
         for kerb in ground.kerbs(1.0):

@@ -31,6 +31,7 @@ from cns_drake.city.geometry.structures import (
     triple,
 )
 from cns_drake.city.geometry.upper_sides import from_above
+from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.roads.network import load_road_network
 from cns_drake.scene.world import load_world
 from cns_drake.transient import world_structures
@@ -42,8 +43,6 @@ from cns_drake.transient.world_structures import (
 
 # The ground is known this far around buildings [m].
 _AROUND = 40.0
-# A column of `structures.csv` with the year in which a building was built.
-YEAR_COLUMN = "built"
 
 
 @dataclass(frozen=True)
@@ -115,9 +114,8 @@ class OldWorld:
 
     def _read_table(self) -> None:
         path = self.folder.structures
-        with user_errors(path):
-            with path.open(encoding="utf-8", newline="") as file:
-                self.columns = next(csv.reader(file), [])
+        with user_errors(path), path.open(encoding="utf-8") as file:
+            self.columns = next(csv.reader(file), [])
         needed = ("instance", "name", "class", "label", "x", "y", "z", "yaw")
         records = read_records(path, needed)
         self.rows = {row["name"]: row for _, row in records}

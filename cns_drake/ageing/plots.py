@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.facades.assembly import Rgb
 from cns_drake.city.furniture.pavilions import FENCES
+from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
 from cns_drake.city.geometry.polygons import placed, polygons_of
 from cns_drake.city.geometry.structures import (
     MeshShape,
@@ -186,9 +187,7 @@ def new_building(
     return None
 
 
-def _blind_edges(
-    footprint: Polygon, near: Sequence[BaseGeometry]
-) -> set[int]:
+def _blind_edges(footprint: Polygon, near: Sequence[BaseGeometry]) -> set[int]:
     """Returns the edges of a rectangle, from the front on, with neighbours."""
     x0, y0, x1, y1 = footprint.bounds
     g, e = PARTY_WALL, 0.5
@@ -227,6 +226,13 @@ def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
         moved = Plot(plot.area, place(plot, x, y), plot.yaw + turn, plot.z)
         things.append(moved.thing(f"{name}_fence_{k}", "fence", fence))
     empty = plot.thing(name, "building", Model((), {}, lot.buffer(-0.8)))
+    digger = SITE_EQUIPMENT["excavator"]
+    middle = place(plot, *lot.centroid.coords[0])
+    turned = Plot(plot.area, middle, float(rng.uniform(-3.1, 3.1)), plot.z)
+    model = digger.build(rng)
+    digging = turned.thing(f"{name}_digger", digger.semantic_class, model)
+    if plot.area.buffer(-0.8).contains(digging.footprint_W):
+        things.append(digging)
     return things + list(lot_objects(empty, "yard", {}, rng))
 
 
@@ -295,8 +301,12 @@ def storey_on(
     rgb, middle = _colour(rng), ((x0 + x1) / 2, (y0 + y1) / 2)
     model = assemble(
         block("wall", (w, d, 3.2), (*middle, z + 1.5), rgb=rgb),
-        block("glass", (w + 0.06, d + 0.06, 1.4), (*middle, z + 1.7), rgb=_GLASS),
-        block("roof", (w + 0.5, d + 0.5, 0.25), (*middle, z + 3.2), rgb=_CONCRETE),
+        block(
+            "glass", (w + 0.06, d + 0.06, 1.4), (*middle, z + 1.7), rgb=_GLASS
+        ),
+        block(
+            "roof", (w + 0.5, d + 0.5, 0.25), (*middle, z + 3.2), rgb=_CONCRETE
+        ),
     )
     return plot.thing(name, "building", model)
 
@@ -327,7 +337,11 @@ def annex_to(
         if not np.ptp(walls) < 0.5:  # No wall, or no plane one.
             continue
         y = min(walls) - 0.05
-        area = placed(box(x - w / 2, max(walls) + 0.02, x + w / 2, y + d), plot.xy, plot.yaw)
+        area = placed(
+            box(x - w / 2, max(walls) + 0.02, x + w / 2, y + d),
+            plot.xy,
+            plot.yaw,
+        )
         if not is_free(area):
             continue
         y += d / 2
@@ -368,7 +382,9 @@ def balconies_on(
                 y = max(walls) - 0.6
                 middle = (float(x), y, float(z))
                 parts += [
-                    block(f"slab_{k}_{j}", (2.5, 1.3, 0.18), middle, rgb=_CONCRETE),
+                    block(
+                        f"slab_{k}_{j}", (2.5, 1.3, 0.18), middle, rgb=_CONCRETE
+                    ),
                     block(
                         f"rail_{k}_{j}",
                         (2.5, 0.06, 1.0),
@@ -455,4 +471,3 @@ def structure_triangles(structure: Structure) -> np.ndarray:
 
 def _colour(rng: np.random.Generator) -> Rgb:
     return _COLOURS[int(rng.integers(len(_COLOURS)))]
-

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 from scipy.stats import poisson
@@ -60,7 +61,7 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
     """
     found = tuple(years)
     text = " ".join(map(str, found))
-    if not found or any(a >= b for a, b in zip(found, found[1:], strict=False)):
+    if not found or any(a >= b for a, b in pairwise(found)):
         raise InputError(f"--years: {text or 'none'}: not in ascending order")
     if max(map(abs, found)) > LAST_YEAR:
         raise InputError(

@@ -6,6 +6,7 @@ at once. Interrupts wait during imports.
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
+from cns_drake.command_line.ageing import age
 from cns_drake.command_line.laddering import ladder, levels, size
 from cns_drake.command_line.maps import city, import_city, list_drives
 from cns_drake.command_line.overlapping import overlap
@@ -80,6 +81,13 @@ app.command(
         "    --years 1930 1970 2000 2020 --output delft",
     ),
 )(import_city)
+app.command(
+    epilog=example(
+        "cns-drake age suburbia \\",
+        "    --years 1 5 20 --seed 1 --output old_suburbia",
+    ),
+    context_settings={"ignore_unknown_options": True},
+)(age)
 app.command(
     epilog=example(
         "cns-drake city town --start",

@@ -35,6 +35,8 @@ from cns_drake.imports.staged_city import Growth, StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
 _OF_BOX = 12  # triangles
+# Column of the table of structures: the year in which a building was built.
+YEAR_COLUMN = "built"
 _CRUISE = 8.0  # [m/s]
 _ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
 _DPI = 130
@@ -88,6 +90,10 @@ def write_world(
         names = [one.structure.name for one in city.kept]
         origins = [dressing.origins.get(name, "file") for name in names]
         table = with_column(table, "origin", ["guess"] * len(bottom) + origins)
+    years = [one.year for one in city.kept]
+    if any(years):
+        texts = ["" if year is None else str(year) for year in years]
+        table = with_column(table, YEAR_COLUMN, [""] * len(bottom) + texts)
     (draft / STRUCTURES_NAME).write_text(table, "utf-8")
     triangles: dict[str, int] = {}
     for structure in structures:
