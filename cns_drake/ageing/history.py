@@ -24,7 +24,8 @@ from cns_drake.ageing.plots import Plot
 from cns_drake.ageing.rates import Tally
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.polygons import polygons_of
-from cns_drake.city.geometry.structures import Structure, assemble, block
+from cns_drake.city.geometry.structures import Part, Structure, assemble, block
+from cns_drake.city.growth.lowering import top_of
 from cns_drake.city.growth.stage_structures import (
     lot_objects,
     scaled,
@@ -308,7 +309,8 @@ class City:
 
         Trees and furniture may stand there.
         """
-        world, taken = self._world, []
+        world = self._world
+        taken: list[BaseGeometry] = []
         streets = world.streets
         solid = [
             one.foot.buffer(plots.PARTY_WALL)
@@ -523,7 +525,7 @@ class City:
         plot = plots.building_plot(coming)
         lot.building, lot.coming, lot.finished = coming.name, None, 0
         lot.plot = replace(plot, area=plot.area)
-        lot.height = float(plots.top_of(coming.model))
+        lot.height = float(top_of(coming.model))
         if lot.old:
             self._tell("replaced", lot.old, coming.name)
         else:
@@ -724,7 +726,8 @@ class City:
             if near and is_part and old in self.standing:
                 self._move(place)
         self._remove(self._kerbs.get(name, ""))
-        stones, ground = [], self._world.ground
+        stones: list[Part] = []
+        ground = self._world.ground
         for kerb in ground.kerbs(1.0):
             for k in range(len(kerb.points) - 1):
                 a, b = kerb.points[k : k + 2]

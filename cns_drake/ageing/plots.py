@@ -90,13 +90,15 @@ class Plot:
         z: height of its ground [m].
     """
 
-    area: Polygon
+    area: BaseGeometry
     xy: tuple[float, float]
     yaw: float
     z: float
 
     @classmethod
-    def facing(cls, area: Polygon, streets: BaseGeometry, z: float) -> Plot:
+    def facing(
+        cls, area: BaseGeometry, streets: BaseGeometry, z: float
+    ) -> Plot:
         """Returns the plot of an area, its front to the nearest street."""
         rectangle = shapely.orient_polygons(area.minimum_rotated_rectangle)
         corners = shapely.get_coordinates(rectangle)
@@ -413,6 +415,7 @@ def renewed(
         return building
     sizes: dict[Rgb, int] = {}
     for part in walls:
+        assert part.rgb is not None
         mesh = model.meshes.get(getattr(part.shape, "mesh", ""))
         number = 12 if mesh is None else mesh.num_triangles
         sizes[part.rgb] = sizes.get(part.rgb, 0) + number

@@ -1,0 +1,353 @@
+"""A small city that ages: nested, repeatable, sound; and its faults."""
+
+import csv
+import itertools
+import re
+
+from helpers.small_city import write_small_city
+import numpy as np
+import pytest
+from scipy.stats import poisson
+import shapely
+
+from cns_drake.ageing.aged_map import age_map, past
+from cns_drake.ageing.history import City
+from cns_drake.ageing.old_world import OldWorld
+from cns_drake.ageing.plots import Plot, last, new_building, section
+from cns_drake.ageing.rates import (
+    DEFAULT_RATES,
+    Tally,
+    check_years,
+    poisson_p,
+    read_rates,
+)
+from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.city.generation.generate import generate_city
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scene.world import load_world
+from cns_drake.transient.world_structures import read_structures
+
+_DRIVE = """
+map: .
+stage: "02"
+title: Around the north
+route:
+  - {road: north, direction: forward, lane: 1, start: 10.0, end: 120.0}
+speeds: {cruise: 8.0}
+"""
+# A lot happens, so that a few years show all kinds of events.
+_BUSY = {**dict.fromkeys(DEFAULT_RATES, 0.1), "built": 0.3}
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    folder = write_small_city(tmp_path_factory.mktemp("age") / "town")
+    generate_city(folder)
+    (folder / "sequence_02.yaml").write_text(_DRIVE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def long(town):
+    output = town.parent / "long"
+    age_map(town, [3, 8], 5, _BUSY, output)
+    return output
+
+
+def _rows(folder, name="history.csv"):
+    with (folder / name).open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_histories_are_nested_and_repeatable(town, long):
+    short = town.parent / "short"
+    age_map(town, [3], 5, _BUSY, short)
+    name = "stage_02.sdf"
+    assert (short / name).read_bytes() == (long / name).read_bytes()
+    few, many = _rows(short), _rows(long)
+    assert few == [row for row in many if int(row["year"]) <= 3]
+    assert len(few) < len(many)
+    # Instance ids of the shorter history stay.
+    ids = {r["name"]: r["instance"] for r in _rows(long, "structures.csv")}
+    for row in _rows(short, "structures.csv"):
+        assert ids[row["name"]] == row["instance"]
+
+
+def test_another_seed_is_another_history(town, long):
+    other = town.parent / "other"
+    age_map(town, [3], 6, _BUSY, other)
+    assert _rows(other) != [r for r in _rows(long) if int(r["year"]) <= 3]
+
+
+def test_today_is_the_last_stage_of_the_map(town, long):
+    today = (town / "stage_02.sdf").read_bytes()
+    assert (long / "stage_01.sdf").read_bytes() == today
+
+
+def test_stages_follow_from_the_history(town, long):
+    """What was gone or came, by the history, is gone or there."""
+
+    def names(stage):
+        text = (long / f"stage_{stage}.sdf").read_text()
+        return set(re.findall('visual name="([^/"]+)/', text))
+
+    today, then = names("01"), names("03")
+    gone, come = set(), set()
+    for row in _rows(long):
+        one, successor = row["structure"], row["successor"]
+        if row["event"] in ("demolished", "felled", "removed", "furniture"):
+            gone.add(one)
+            come.discard(one)
+        if row["event"] == "built":
+            come.add(one)
+        if row["event"] in ("replaced", "planted", "furniture"):
+            come.add(successor)
+    assert today & gone
+    assert today - then == today & gone
+    assert come
+    assert come <= then
+
+
+def test_drives_of_an_aged_map(long):
+    drives = MapFolder(long).recordable_drives()
+    assert [path.stem for path in drives] == [
+        "sequence_01",
+        "sequence_02",
+        "sequence_03",
+    ]
+    assert load_scenario(drives[-1]).stage == "03"
+    assert not load_world(long / "stage_03.sdf").notes
+
+
+def test_nothing_stands_in_another_or_on_a_street(long):
+    things = read_structures(load_world(long / "stage_03.sdf"))
+    new = [
+        one
+        for name, one in things.items()
+        if re.search(r"\d{3}y", name)
+        and not re.search("balconies|storey|site_|frame|scaffold|kerb", name)
+    ]
+    assert new
+    walls = [t for t in things.values() if t.semantic_class == "building"]
+    corners = np.concatenate(
+        [
+            part.p_WPs[part.geometry.surface.triangles]
+            for part in things["carriageway"].parts
+        ]
+    )
+    roads = shapely.union_all(shapely.polygons(corners[..., :2]))
+    for one in new:
+        inner = one.footprint.buffer(-0.3)
+        assert not inner.intersects(roads), one.name
+        for other in walls:
+            if other.name in one.name or one.name in other.name:
+                continue  # An annex stands against its own building.
+            assert not inner.intersects(other.footprint.buffer(-0.3)), (
+                one.name,
+                other.name,
+            )
+
+
+def test_new_things_stand_on_the_ground(long):
+    world = OldWorld(MapFolder(long))
+    checked = 0
+    for name, thing in world.things.items():
+        if not re.search(r"\d{3}y", name) or thing.foot.is_empty:
+            continue
+        if re.search("balconies|storey|_frame|kerb|scaffold", name):
+            continue
+        at = np.array(thing.foot.centroid.coords[0])
+        z = world.ground.heights(at[None])[0]
+        if np.isfinite(z):
+            assert -1.6 < thing.bottom - z < 0.35, name
+            checked += 1
+    assert checked > 3
+
+
+def test_replacements_are_of_another_kind(long):
+    events = [r for r in _rows(long) if r["event"] == "replaced"]
+    for row in events:
+        kinds = [
+            re.sub(r"_\d.*", "", row[k]) for k in ("structure", "successor")
+        ]
+        assert kinds[0] != kinds[1]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_rates_come_about(town, seed):
+    """Numbers of 30 years are Poisson's, at one in a thousand for each."""
+    world = OldWorld(MapFolder(town))
+    city = City(world, DEFAULT_RATES, seed, shapely.Polygon())
+    for _ in range(30):
+        city.live()
+    tally = city.tally
+    assert tally.expected["lamps"] > 5
+    for event, rate in DEFAULT_RATES.items():
+        expected = rate * tally.exposure.get(event, 0)
+        if event == "built":
+            expected = tally.expected.get("built", 0.0)
+        number = tally.number.get(event, 0)
+        assert poisson.ppf(0.001, expected) <= number
+        assert number <= poisson.ppf(0.999, expected)
+    logged = [e.event for e in city.events]
+    assert logged.count("renewed") == tally.number["renewed"]
+    assert logged.count("extended") == tally.number["extended"]
+
+
+def test_nothing_happens_at_rate_zero(town):
+    city = City(
+        OldWorld(MapFolder(town)),
+        dict.fromkeys(DEFAULT_RATES, 0.0),
+        1,
+        shapely.Polygon(),
+    )
+    for _ in range(5):
+        city.live()
+    assert {e.event for e in city.events} <= {"grown"}
+
+
+def test_the_past_lacks_younger_buildings(town, tmp_path):
+    folder = tmp_path / "dated"
+    folder.mkdir()
+    for path in town.iterdir():
+        if path.is_file():
+            (folder / path.name).write_bytes(path.read_bytes())
+    (folder / "meshes").symlink_to(town / "meshes")
+    rows = _rows(town, "structures.csv")
+    houses = [r["name"] for r in rows if r["class"] == "building"]
+    with (folder / "structures.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, [*rows[0], "built"])
+        table.writeheader()
+        for row in rows:
+            built = ""
+            if row["name"] in houses:
+                built = 2020 if row["name"] == houses[0] else 1950
+            table.writerow({**row, "built": built})
+    world = OldWorld(MapFolder(folder))
+    before, events = past(world, -10)
+    assert houses[0] not in before
+    assert houses[1] in before
+    assert not events[0].year
+    after, _ = past(world, 0)
+    assert houses[0] in after
+    age_map(folder, [-10, 0, 2], 1, _BUSY, tmp_path / "old")
+    text = (tmp_path / "old" / "stage_02.sdf").read_text()
+    assert f'"{houses[0]}/' not in text
+    assert f'"{houses[1]}/' in text
+    assert not (tmp_path / "old" / "stage_04.sdf").exists()
+
+
+@pytest.mark.parametrize(
+    "years", [[], [2, 2], [5, 1], [1, 201], [-201, 0]], ids=str
+)
+def test_faulty_years(years):
+    with pytest.raises(InputError, match="--years"):
+        check_years(years)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("eaten: 0.1", "eaten: unknown event"),
+        ("built: 1.5", "built: 1.5 is no rate"),
+        ("built: -0.1", "built: -0.1 is no rate"),
+        ("built: yes", "built: True is no rate"),
+        ("- built", "not a mapping"),
+    ],
+)
+def test_faulty_rates(tmp_path, text, fault):
+    path = tmp_path / "rates.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=fault):
+        read_rates(path)
+
+
+def test_rates_of_a_file_and_a_factor(tmp_path):
+    path = tmp_path / "rates.yaml"
+    path.write_text("felled: 0.04")
+    rates = read_rates(path, 2.0)
+    assert rates["felled"] == 0.08
+    assert rates["built"] == 2 * DEFAULT_RATES["built"]
+    with pytest.raises(InputError, match="--rate"):
+        read_rates(path, 100.0)
+
+
+def test_faulty_maps(town, tmp_path):
+    def age(source, years=(1,), seed=1, output=None):
+        age_map(source, years, seed, _BUSY, output or tmp_path / "new")
+
+    with pytest.raises(InputError, match="no sequence_NN"):
+        age(tmp_path)
+    with pytest.raises(InputError, match="there already"):
+        age(town, output=tmp_path)
+    with pytest.raises(InputError, match="--seed"):
+        age(town, seed=-1)
+    with pytest.raises(InputError, match="column built"):
+        age(town, years=(-5, 5))
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    for path in town.iterdir():
+        if path.is_file():
+            text = path.read_text().replace(",building,", ",other-structure,")
+            (bare / path.name).write_text(text)
+    (bare / "meshes").symlink_to(town / "meshes")
+    with pytest.raises(InputError, match="without lots"):
+        age(bare)
+    assert not (tmp_path / "new").exists()
+
+
+def test_poisson_p():
+    # P(N >= 9 | 4) = 0.02136, by summing the series.
+    terms = [4.0**0]
+    for k in range(1, 9):
+        terms.append(terms[-1] * 4 / k)
+    tail = 1.0 - np.exp(-4.0) * sum(terms)
+    assert poisson_p(9, 4.0) == pytest.approx(2 * tail)
+    assert poisson_p(4, 4.0) == 1.0
+    tally = Tally({"lamps": 0.5})
+    tally.count("lamps", 0.5, True, 1)
+    assert "lamps,0.5,1,0.500,1,1.000000" in tally.to_csv()
+
+
+def test_section_of_a_roof():
+    """A triangle from (0, 0, 0) and (4, 0, 0) to (0, 2, 2), cut at height 1."""
+    triangle = np.array([[[0, 0, 0], [4, 0, 0], [0, 2, 2]]], float)
+    cut = section(triangle, 1.0)
+    ends = cut[0][np.argsort(cut[0][:, 0])]
+    np.testing.assert_allclose(ends, [[0, 1], [2, 1]], atol=1e-3)
+    assert last(cut, 1.0) == pytest.approx(1.0, abs=1e-3)
+    assert np.isnan(last(cut, 3.0))
+
+
+def test_a_plot_faces_its_street():
+    street = shapely.box(-50, -20, 50, -10)
+    for angle in (0.0, 40.0):
+        area, way = (
+            shapely.affinity.rotate(one, angle, origin=(0, 0))
+            for one in (shapely.box(-8, -6, 8, 6), street)
+        )
+        plot = Plot.facing(area, way, 1.0)
+        assert plot.yaw == pytest.approx(np.radians(angle), abs=1e-4)
+        np.testing.assert_allclose(
+            plot.inside(way).bounds, (-50, -20, 50, -10), atol=0.01
+        )
+
+
+def test_new_buildings_stay_on_their_plot():
+    area = shapely.affinity.rotate(shapely.box(0, 0, 20, 14), 30)
+    street = shapely.affinity.rotate(
+        shapely.box(-20, -8, 40, -3), 30, origin=area.centroid
+    )
+    plot = Plot.facing(area, street, 0.0)
+    made = [
+        new_building(plot, 11.0, "walk_up", [], np.random.default_rng(k), "x")
+        for k in range(6)
+    ]
+    kinds = {one.tags[0] for one in made}
+    assert len(kinds) > 1
+    assert "walk_up" not in kinds
+    for one, other in itertools.pairwise(made):
+        assert area.buffer(0.05).contains(one.footprint_W)
+        assert one.name == f"{one.tags[0]}_x"
+        assert other.semantic_class == "building"
