@@ -1,4 +1,4 @@
-"""The command `cns-drake age`."""
+"""The commands `cns-drake age` and `years`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
+from cns_drake.command_line.options import Jobs, MethodFiles, Results, Scheduler
 
 FirstYear = Annotated[
     list[int],
@@ -19,6 +20,15 @@ FirstYear = Annotated[
         metavar="YEAR ...",
         help="Years from today, ascending, at most 200; before today where "
         "buildings have years.",
+    ),
+]
+
+RatesFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.yaml",
+        help="Rates of your own: event: rate a year, from 0 to 1; the others "
+        "keep theirs.",
     ),
 ]
 
@@ -64,14 +74,7 @@ def age(
             min=0.0, metavar="FACTOR", help="Factor for all yearly rates."
         ),
     ] = 1.0,
-    rates: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.yaml",
-            help="Rates of your own: event: rate a year, from 0 to 1; the "
-            "others keep theirs.",
-        ),
-    ] = None,
+    rates: RatesFile = None,
     pictures: Annotated[
         bool,
         typer.Option(
@@ -120,3 +123,71 @@ def age(
     ]
     rows += [(event, str(number)) for event, number in aged.events.items()]
     print_rows([*rows, ("written", str(output))])
+
+
+def years(
+    maps: Annotated[
+        list[str],
+        typer.Argument(metavar="MAP", help="Maps, by name or folder."),
+    ],
+    output: Results,
+    years: Annotated[
+        list[int] | None,
+        typer.Option(
+            metavar="YEAR ...",
+            help="Years between database and query, ascending; 1 2 5 10 20 40 "
+            "by default, 5 20 40 with --quick.",
+        ),
+    ] = None,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            min=1, metavar="N", help="Number of histories of each city."
+        ),
+    ] = 1,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            help="Fewer years, queries and places, and only old databases.",
+        ),
+    ] = False,
+    rate: Annotated[
+        float,
+        typer.Option(
+            min=0.0, metavar="FACTOR", help="Factor for all yearly rates."
+        ),
+    ] = 1.0,
+    rates: RatesFile = None,
+    method: MethodFiles = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """How old a map may be for each method.
+
+    A drive queries a database of its own route that is some years older, and
+    an older drive one of today. No drive is recorded. Writes years.csv,
+    lifetimes.csv and a chart. After an interruption the same command goes on.
+    """
+    named, wanted = maps_and_years(maps, years or [])
+    with uninterrupted():
+        from cns_drake.ageing.rates import read_rates
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.studies import years as study
+        from evaluation.report.years import BACKWARD, FORWARD
+        from evaluation.study.chosen_methods import choose_methods
+
+    path, text = study.measure_years(
+        named,
+        wanted or (study.QUICK_YEARS if quick else study.YEARS),
+        range(1, seeds + 1),
+        read_rates(rates, rate),
+        output,
+        choose_cluster(jobs, scheduler),
+        choose_methods(method or ()),
+        study.QUICK_PROTOCOL if quick else study.YEARS_PROTOCOL,
+        (FORWARD,) if quick else (FORWARD, BACKWARD),
+        note,
+    )
+    typer.echo(path)
+    typer.echo(text)

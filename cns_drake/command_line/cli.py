@@ -6,6 +6,7 @@ at once. Interrupts wait during imports.
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
+from cns_drake.command_line.ageing import age, years
 from cns_drake.command_line.ageing import age
 from cns_drake.command_line.laddering import ladder, levels, size
 from cns_drake.command_line.maps import city, import_city, list_drives
@@ -88,6 +89,13 @@ app.command(
     ),
     context_settings={"ignore_unknown_options": True},
 )(age)
+app.command(
+    epilog=example(
+        "cns-drake years suburbia \\",
+        "    --years 5 20 --quick --output years",
+    ),
+    context_settings={"ignore_unknown_options": True},
+)(years)
 app.command(
     epilog=example(
         "cns-drake city town --start",

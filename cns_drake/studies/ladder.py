@@ -116,16 +116,16 @@ def climb_ladder(
         InputError: a map is unknown, the folder cannot be made, or a step
             failed.
     """
-    query_drives = _query_drives(maps or shipped_maps())
+    asked = query_drives(maps or shipped_maps())
     make_folder(output)
     files = StudyFiles(output.absolute())
-    plans: dict[str, _Plan] = {}
+    plans: dict[str, RungPlan] = {}
     planned: list[tuple[Scenario, Rung]] = []
-    for drive in query_drives:
+    for drive in asked:
         rungs, notes = plan_rungs(drive, extent)
         for text in notes:
             on_note(f"{drive.source}: {text}")
-        plan = _Plan(drive, extent.viewpoint, methods, protocol, files)
+        plan = RungPlan(drive, extent.viewpoint, methods, protocol, files)
         most = max(rung.drives.num_distractors for rung in rungs)
         if most:
             on_note(f"{drive.name}: looking for {most} places elsewhere")
@@ -150,7 +150,7 @@ def climb_ladder(
         on_note(f"crossing two by two: {', '.join(crossed)}")
         planned = [
             (drive, rung)
-            for drive in query_drives
+            for drive in asked
             for rung in plan_pairs(drive, crossed, extent)
         ]
         measured += _measure(planned, plans, cluster, protocol)
@@ -189,7 +189,7 @@ def localise_rungs(
             failed.
     """
     pairs = []
-    for drive in _query_drives(maps or shipped_maps()):
+    for drive in query_drives(maps or shipped_maps()):
         rungs, notes = plan_rungs(drive, extent)
         for text in notes:
             on_note(f"{drive.source}: {text}")
@@ -216,7 +216,7 @@ def localise_rungs(
 
 def _measure(
     planned: Sequence[tuple[Scenario, Rung]],
-    plans: Mapping[str, _Plan],
+    plans: Mapping[str, RungPlan],
     cluster: Cluster,
     protocol: RetrievalProtocol,
 ) -> list[MeasuredRung]:
@@ -237,7 +237,7 @@ def _measure(
     ]
 
 
-def _query_drives(maps: Iterable[str]) -> list[Scenario]:
+def query_drives(maps: Iterable[str]) -> list[Scenario]:
     """Returns the last drive of each map.
 
     Raises:
@@ -254,7 +254,7 @@ def _query_drives(maps: Iterable[str]) -> list[Scenario]:
     return list(drives.values())
 
 
-class _Plan:
+class RungPlan:
     """The jobs of one map."""
 
     def __init__(

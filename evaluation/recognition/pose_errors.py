@@ -120,14 +120,6 @@ def pose_metrics(
         # A comparison with NaN is false: such a pose is no success.
         accepted = outcomes.is_right & (outcomes.best_scores >= least)
     known = ~np.isnan(errors.translation)
-    success = math.nan
-    # A method that finds no place localises no query.
-    estimates = known.any() or np.isnan(outcomes.best_scores).all()
-    if estimates and outcomes.has_match.any():
-        is_near = (errors.translation <= SUCCESS_TRANSLATION) & (
-            errors.rotation_deg <= SUCCESS_ROTATION_DEG
-        )
-        success = float(is_near[outcomes.has_match].mean())
     translation = errors.translation[accepted & known]
     rotation_deg = errors.rotation_deg[accepted & known]
     return PoseMetrics(
@@ -136,8 +128,26 @@ def pose_metrics(
         translation_90=_quantile(translation, 0.9),
         rotation_median_deg=_quantile(rotation_deg, 0.5),
         rotation_90_deg=_quantile(rotation_deg, 0.9),
-        success=success,
+        success=pose_success(errors, outcomes),
     )
+
+
+def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
+    """Returns `PoseMetrics.success`.
+
+    Args:
+        errors: errors of the queries.
+        outcomes: outcomes of the same queries.
+    """
+    # A method that finds no place localises no query.
+    known = ~np.isnan(errors.translation)
+    estimates = known.any() or np.isnan(outcomes.best_scores).all()
+    if not (estimates and outcomes.has_match.any()):
+        return math.nan
+    is_near = (errors.translation <= SUCCESS_TRANSLATION) & (
+        errors.rotation_deg <= SUCCESS_ROTATION_DEG
+    )
+    return float(is_near[outcomes.has_match].mean())
 
 
 def _quantile(values: np.ndarray, part: float) -> float:

@@ -518,6 +518,19 @@ RECIPES = {
         prints=("ladder/ladder.csv", "Town, "),
         makes=("ladder/ladder.png", "ladder/queries.csv"),
     ),
+    "help: age": Recipe(
+        "cns-drake age suburbia",
+        changes=(("age suburbia", "age town"), ("1 5 20", "1 2")),
+        after=("start a city",),
+        makes=("old_suburbia/history.csv", "old_suburbia/pictures/film.jpg"),
+    ),
+    "help: years": Recipe(
+        "cns-drake years suburbia",
+        changes=(("years suburbia", "years town"), ("5 20", "20")),
+        after=("start a city",),
+        prints=("years/years.csv",),
+        makes=("years/lifetimes.csv", "years/years.png"),
+    ),
     "help: ladder": Recipe(
         "cns-drake ladder metropolis",
         changes=(("metropolis", "town --cause construction"),),

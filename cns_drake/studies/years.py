@@ -1,0 +1,267 @@
+"""What a city's years cost each method, without a recording.
+
+A drive queries a database of its own route that was mapped some years before:
+the city of today ages, see `cns_drake.ageing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+import shutil
+
+import numpy as np
+
+from cns_drake.ageing.aged_map import age_map
+from cns_drake.ageing.rates import check_years
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing, make_folder, user_errors
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.fingerprint import code_digest
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.scenarios.provenance import digest_file
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.ladder import RungPlan, query_drives
+from cns_drake.studies.ladder_rungs import NEAR, NONE, Rung, plain_drives
+from evaluation.change.tcr import temporal_change
+from evaluation.drives.sampling import sample_frames
+from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.report.years import (
+    BACKWARD,
+    FORWARD,
+    AgedPair,
+    draw_years,
+    lifetime_table,
+    year_rows,
+    year_table,
+    year_text,
+)
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.parts import MakePart, Part, StudyFiles
+
+YEARS = (1, 2, 5, 10, 20, 40)
+QUICK_YEARS = (5, 20, 40)
+# Turned and tilted queries; with --quick, every third.
+YEARS_PROTOCOL = FAIR_PROTOCOL
+QUICK_PROTOCOL = replace(YEARS_PROTOCOL, query_spacing=30.0, place_spacing=10.0)
+# Maps for the TCR have a scan each so many metres.
+_MAP_SPACING = 5.0
+# The file in its folder with the fingerprint of an aged map.
+_PART = "aged.data"
+# Expected seconds: to age a city, and to map it.
+_AGE_COST, _MAP_COST = 40.0, 20.0
+
+
+@dataclass(frozen=True)
+class AgeCity(Step):
+    """Lets a city live.
+
+    Attributes:
+        source: the folder of the map.
+        years: of the stages.
+        seed: of its history.
+        rates: event -> rate a year.
+        folder: the map folder to write.
+    """
+
+    source: Path
+    years: tuple[int, ...]
+    seed: int
+    rates: tuple[tuple[str, float], ...]
+    folder: Path
+
+    @property
+    def output(self) -> Path:
+        return self.folder
+
+    def is_done(self) -> bool:
+        # A folder that has its final name is complete.
+        return Part(self.folder / _PART).is_current(self._made_of())
+
+    def run(self, reporter: Reporter) -> None:
+        made_of = self._made_of()
+        if (self.folder / _PART).is_file():
+            with user_errors(self.folder):
+                shutil.rmtree(self.folder)
+        age_map(
+            self.source,
+            self.years,
+            self.seed,
+            dict(self.rates),
+            self.folder,
+            finish=lambda draft, _: Part(draft / _PART).write(made_of, None),
+        )
+
+    def _made_of(self) -> dict[str, object]:
+        files = sorted(self.source.glob("*.*"))
+        return {
+            "files": {one.name: digest_file(one) for one in files},
+            "years": list(self.years),
+            "seed": self.seed,
+            "rates": dict(self.rates),
+            "code": code_digest("cns_drake.ageing.aged_map"),
+        }
+
+
+def measure_years(
+    maps: Sequence[str] | None,
+    years: Sequence[int],
+    seeds: Sequence[int],
+    rates: Mapping[str, float],
+    output: Path,
+    cluster: Cluster,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol = YEARS_PROTOCOL,
+    directions: Sequence[str] = (FORWARD, BACKWARD),
+    on_note: Callable[[str], None] = lambda text: None,
+) -> tuple[Path, str]:
+    """Measures what years cost; writes tables, chart and findings.
+
+    `<output>/years.csv` and `lifetimes.csv` are the tables, `years.png` (and
+    PDF, SVG) the chart, `findings.txt` the findings, `cities/` the aged maps.
+    Finished work is not repeated.
+
+    Args:
+        maps: by name or folder; all shipped ones if empty.
+        years: positive, ascending.
+        seeds: of the histories, from 1 on.
+        rates: event -> rate a year.
+        output: the folder for everything.
+        cluster: where the work is done.
+        methods: the methods to measure.
+        protocol: that of place recognition.
+        directions: whether the database is of today, the query, or both in
+            turn.
+        on_note: receives the progress.
+
+    Returns:
+        The path of `years.csv`, and the findings.
+
+    Raises:
+        InputError: an argument or a map cannot be used, the folder cannot be
+            made, or a step failed.
+    """
+    wanted = check_years(years)
+    if wanted[0] <= 0:
+        raise InputError(f"--years: {wanted[0]}: not after today")
+    drives = query_drives(maps or shipped_maps())
+    make_folder(output)
+    output = output.absolute()
+    cities = {
+        (drive.name, seed): AgeCity(
+            map_folder(drive).path.resolve(),
+            wanted,
+            seed,
+            tuple(sorted(rates.items())),
+            output / "cities" / f"{map_folder(drive).name}_s{seed}",
+        )
+        for drive in drives
+        for seed in seeds
+    }
+    on_note(f"{len(cities)} cities age")
+    run_jobs(
+        [
+            Job(f"age {step.folder.name}", step, cost=_AGE_COST)
+            for step in cities.values()
+        ],
+        cluster,
+    )
+    files = StudyFiles(output)
+    jobs: dict[str, Job] = {}
+    found: list[tuple[Scenario, int, int, str, Part, Part, Part]] = []
+    for drive in drives:
+        plan = RungPlan(drive, NEAR, methods, protocol, files)
+        plain = plain_drives(drive)
+        today = _map_job(drive, files, jobs)
+        part = plan.add_rung(Rung(NONE, 0, 0, "", plain))
+        found.append((drive, 0, 0, FORWARD, part, today, today))
+        for seed in seeds:
+            folder = cities[drive.name, seed].folder
+            for k, year in enumerate(wanted):
+                aged = {"map": str(folder), "stage": f"{k + 2:02d}"}
+                ending = f"y{year}_s{seed}"
+                then = drive.model_copy(
+                    update={**aged, "name": f"{drive.name}_{ending}"}
+                )
+                mapped = _map_job(then, files, jobs)
+                pairs = {
+                    FORWARD: replace(plain, query=then),
+                    BACKWARD: replace(
+                        plain,
+                        database=plain.database.model_copy(
+                            update={
+                                **aged,
+                                "name": f"{plain.database.name}_{ending}",
+                            }
+                        ),
+                    ),
+                }
+                for direction in directions:
+                    rung = Rung(direction, year, seed, "", pairs[direction])
+                    part = plan.add_rung(rung)
+                    found.append(
+                        (drive, year, seed, direction, part, today, mapped)
+                    )
+        jobs |= plan.jobs
+    run_jobs(jobs.values(), cluster)
+    pairs_found = [
+        AgedPair(
+            map_folder(drive).name,
+            year,
+            seed,
+            direction,
+            temporal_change(before.read(), after.read()).symmetric
+            if year
+            else 0.0,
+            part.read(),
+        )
+        for drive, year, seed, direction, part, before, after in found
+    ]
+    return _write(pairs_found, output)
+
+
+def _map_job(drive: Scenario, files: StudyFiles, jobs: dict[str, Job]) -> Part:
+    """Adds the job that maps a city along a drive; returns its part."""
+    part = files.trend_points("map", drive.name)
+    step = MakePart(part, map_city, (DriveSimulation(drive), _MAP_SPACING))
+    name = f"map {drive.name}"
+    jobs[name] = Job(name, step, cost=_MAP_COST)
+    return part
+
+
+def map_city(
+    reporter: Reporter, source: DriveSimulation, spacing: float
+) -> np.ndarray:
+    """Returns the centroids (N, 3) of the voxel map of a drive's scans [m].
+
+    Args:
+        reporter: takes the progress.
+        source: the drive.
+        spacing: between two scans [m].
+    """
+    drive = source()
+    frames = sample_frames(drive.X_WS[:, :3, 3], spacing)
+    voxels = VoxelAccumulator()
+    for frame in reporter.track(frames, "mapping", len(frames)):
+        voxels.add(drive.scan(frame), drive.X_WS[frame])
+    return voxels.to_map().centroids_W
+
+
+def _write(pairs: Sequence[AgedPair], output: Path) -> tuple[Path, str]:
+    rows = year_rows(pairs)
+    text = year_text(rows)
+    for name, content in (
+        ("lifetimes.csv", lifetime_table(rows).to_csv()),
+        ("findings.txt", text + "\n"),
+        ("years.csv", year_table(rows).to_csv()),
+    ):
+        with completing(output / name) as part:
+            part.write_text(content, encoding="utf-8")
+    draw_years(rows, output / "years")
+    return output / "years.csv", text

@@ -1,0 +1,334 @@
+"""What is left of each method after years: tables, lifetimes and a chart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+from evaluation.recognition.pose_errors import pose_success
+from evaluation.recognition.pr_curve import pr_curve
+from evaluation.recognition.resampling import (
+    Interval,
+    percentile_interval,
+    resampled_metrics,
+    resampled_weights,
+)
+from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.report.drawing import method_style, save
+from evaluation.report.tables import Columns, Table, in_table_order, title
+
+# Shares of a value that are left where a lifetime ends.
+_TENTH, _HALF = 0.9, 0.5
+# The database is of today, or the query.
+FORWARD, BACKWARD = "old_map", "old_query"
+
+
+@dataclass(frozen=True)
+class AgedPair:
+    """The outcomes of all methods, with some years between the drives.
+
+    Attributes:
+        map_name: name of the city.
+        year: years between database and query; 0 without.
+        seed: seed of the city's history.
+        direction: `FORWARD` or `BACKWARD`.
+        tcr_sym: change of the city along the query's way; NaN if unknown.
+        outcomes: one for each method, without and with the gate.
+    """
+
+    map_name: str
+    year: int
+    seed: int
+    direction: str
+    tcr_sym: float
+    outcomes: Sequence[RungOutcome]
+
+
+@dataclass(frozen=True)
+class YearRow:
+    """A task of a method after some years.
+
+    Attributes:
+        pair: the drives.
+        task: `place` or `pose`.
+        method: its name.
+        gate: whether the gate was used.
+        value: AUC, or the share of right poses.
+        today: the value without years between.
+        interval: 95 % interval of `kept` by bootstrap over queries.
+        r1: R@1.
+        visible_change: part of the queries' scans that the best place does not
+            show, today's taken off.
+        queries: number of queries.
+    """
+
+    pair: AgedPair
+    task: str
+    method: str
+    gate: bool
+    value: float
+    today: float
+    interval: Interval
+    r1: float
+    visible_change: float
+    queries: int
+
+    @property
+    def kept(self) -> float:
+        """The share of today's value that is left; NaN for none."""
+        return self.value / self.today if self.today > 0.0 else math.nan
+
+    @property
+    def key(self) -> tuple[str, str, str, bool, str]:
+        """What a lifetime is of."""
+        pair = self.pair
+        return pair.map_name, self.task, self.method, self.gate, pair.direction
+
+
+def year_rows(pairs: Sequence[AgedPair]) -> list[YearRow]:
+    """Returns the rows of pairs, of which each map has one of year 0."""
+    none = {
+        (pair.map_name, one.method, one.is_gated): one
+        for pair in pairs
+        if pair.year == 0
+        for one in pair.outcomes
+    }
+    return [
+        row
+        for pair in pairs
+        for one in pair.outcomes
+        for row in _rows(
+            pair, one, none[pair.map_name, one.method, one.is_gated]
+        )
+    ]
+
+
+def _rows(
+    pair: AgedPair, now: RungOutcome, then: RungOutcome
+) -> Iterable[YearRow]:
+    unknown = Interval(math.nan, math.nan)
+    interval = unknown
+    if len(now.outcomes) == len(then.outcomes):
+        weights = resampled_weights(len(now.outcomes))
+        after, before = (
+            resampled_metrics(one.outcomes, weights)[0] for one in (now, then)
+        )
+        with np.errstate(invalid="ignore", divide="ignore"):
+            interval = percentile_interval(
+                np.where(before > 0.0, after / before, math.nan)
+            )
+    r1 = now.outcomes.recall_at(1)
+    hidden = _hidden(now) - _hidden(then)
+    number = len(now.outcomes)
+    auc, auc_then = (pr_curve(one.outcomes).auc for one in (now, then))
+    poses = [pose_success(o.pose_errors, o.outcomes) for o in (now, then)]
+    values = {"place": (auc, auc_then, interval)}
+    if not math.isnan(poses[1]):
+        values["pose"] = (poses[0], poses[1], unknown)
+    for task, (value, today, kept) in values.items():
+        yield YearRow(
+            pair,
+            task,
+            now.method,
+            now.is_gated,
+            value,
+            today,
+            kept,
+            r1,
+            hidden,
+            number,
+        )
+
+
+def _hidden(outcome: RungOutcome) -> float:
+    known = outcome.overlaps[~np.isnan(outcome.overlaps)]
+    return 1.0 - float(known.mean()) if len(known) else math.nan
+
+
+_COLUMNS: Columns[YearRow] = {
+    "map": lambda row: row.pair.map_name,
+    "year": lambda row: row.pair.year,
+    "seed": lambda row: row.pair.seed,
+    "task": lambda row: row.task,
+    "method": lambda row: row.method,
+    "gate": lambda row: row.gate,
+    "value": lambda row: row.value,
+    "kept": lambda row: row.kept,
+    "kept_low": lambda row: row.interval.low,
+    "kept_high": lambda row: row.interval.high,
+    "r1": lambda row: row.r1,
+    "direction": lambda row: row.pair.direction,
+    "tcr_sym": lambda row: row.pair.tcr_sym,
+    "visible_change": lambda row: row.visible_change,
+    "queries": lambda row: row.queries,
+}
+
+
+def year_table(rows: Iterable[YearRow]) -> Table:
+    """Returns the table of all rows."""
+    return Table.of(rows, _COLUMNS)
+
+
+def lifetime(
+    years: Sequence[float], kept: Sequence[float], left: float
+) -> float:
+    """Returns the years until a share is left; infinite if more is left.
+
+    Between two years the share falls evenly.
+
+    Args:
+        years: ascending, from 0 on.
+        kept: shares then, 1 at 0.
+        left: the share that is left.
+    """
+    for k in range(1, len(years)):
+        if kept[k] <= left:
+            fall = kept[k - 1] - kept[k]
+            part = (kept[k - 1] - left) / fall if fall > 0.0 else 0.0
+            return years[k - 1] + part * (years[k] - years[k - 1])
+    return math.inf
+
+
+def lifetime_table(rows: Sequence[YearRow]) -> Table:
+    """Returns how long each method lives, over seeds.
+
+    `tenth` and `half` are of the mean over seeds; `_low` and `_high` the
+    shortest and the longest of a seed.
+    """
+    found = []
+    for key, some in _grouped(rows).items():
+        last = max(row.pair.year for row in some)
+        values: list[object] = [*key]
+        for left in (_TENTH, _HALF):
+            single = [
+                lifetime(
+                    *_curve([r for r in some if r.pair.seed in (0, s)]), left
+                )
+                for s in sorted({r.pair.seed for r in some} - {0})
+            ] or [math.inf]
+            mean = lifetime(*_curve(some), left)
+            values += [
+                f"over {last}" if math.isinf(one) else f"{one:.1f}"
+                for one in (mean, min(single), max(single))
+            ]
+        found.append(tuple(values))
+    header = ("map", "task", "method", "gate", "direction")
+    ends = ("tenth", "tenth_low", "tenth_high", "half", "half_low", "half_high")
+    return Table((*header, *ends), tuple(found))
+
+
+def _grouped(rows: Sequence[YearRow]) -> dict[tuple, list[YearRow]]:
+    """Returns the rows of each lifetime; those of today belong to all."""
+    groups: dict[tuple, list[YearRow]] = {}
+    for row in rows:
+        if row.pair.year > 0:
+            groups.setdefault(row.key, []).append(row)
+    for key, some in groups.items():
+        some += [
+            row for row in rows if row.pair.year == 0 and row.key[:4] == key[:4]
+        ]
+    return groups
+
+
+def _curve(rows: Sequence[YearRow]) -> tuple[list[float], list[float]]:
+    """Returns years, and the mean share that is left."""
+    years = sorted({row.pair.year for row in rows})
+    means = [
+        float(np.mean([row.kept for row in rows if row.pair.year == year]))
+        for year in years
+    ]
+    return [float(year) for year in years], means
+
+
+def year_text(rows: Sequence[YearRow]) -> str:
+    """Returns the findings: what the city of each year costs the methods."""
+    lines = []
+    for name in dict.fromkeys(row.pair.map_name for row in rows):
+        mine = [
+            row
+            for row in rows
+            if row.pair.map_name == name
+            and row.task == "place"
+            and not row.gate
+            and row.pair.direction == FORWARD
+        ]
+        for year in sorted({r.pair.year for r in mine} - {0}):
+            then = [row for row in mine if row.pair.year == year]
+            words = [
+                f"{title(method)} "
+                f"{np.mean([r.kept for r in then if r.method == method]):.0%}"
+                for method in in_table_order(r.method for r in then)
+            ]
+            tcr = np.mean([row.pair.tcr_sym for row in then])
+            seen = np.mean([row.visible_change for row in then])
+            lines.append(
+                f"{name}, {year} years: TCR_sym {tcr:.3f}, visible change "
+                f"{seen:.1%}; of AUC is left: {', '.join(words)}"
+            )
+    return "\n".join(lines)
+
+
+def draw_years(rows: Sequence[YearRow], stem: Path) -> None:
+    """Draws the share of today's AUC that is left over the years.
+
+    Args:
+        rows: rows for all maps.
+        stem: path to write, without ending.
+    """
+    maps = list(dict.fromkeys(row.pair.map_name for row in rows))
+    figure = Figure(figsize=(4.2 * len(maps), 3.6), layout="constrained")
+    panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
+    for axes, name in zip(panels, maps, strict=True):
+        _draw_map(axes, [r for r in rows if r.pair.map_name == name])
+        axes.set_title(name.capitalize())
+    panels[0].set_ylabel("share of today's AUC that is left")
+    panels[-1].legend(fontsize=7)
+    save(figure, stem)
+
+
+def _draw_map(axes: Axes, rows: Sequence[YearRow]) -> None:
+    mine = [
+        row
+        for row in rows
+        if row.task == "place"
+        and not row.gate
+        and row.pair.direction == FORWARD
+        and row.pair.year > 0
+    ]
+    years = sorted({row.pair.year for row in mine})
+    for method in in_table_order(row.method for row in mine):
+        shares = [
+            [r.kept for r in mine if r.method == method and r.pair.year == y]
+            for y in years
+        ]
+        colour, _, marker = method_style(method)
+        means = [float(np.mean(one)) for one in shares]
+        axes.plot(
+            years, means, marker=marker, color=colour, label=title(method)
+        )
+        axes.fill_between(
+            years,
+            [min(one) for one in shares],
+            [max(one) for one in shares],
+            color=colour,
+            alpha=0.15,
+            linewidth=0,
+        )
+    seen = [
+        1.0
+        - float(np.mean([r.visible_change for r in mine if r.pair.year == y]))
+        for y in years
+    ]
+    axes.plot(years, seen, "--", color="0.3", label="visible as before")
+    axes.set_xscale("log")
+    axes.set_xticks(years, [str(year) for year in years])
+    axes.minorticks_off()
+    axes.set_xlabel("age of the map [years]")
+    axes.set_ylim(0.0, 1.1)
+    axes.grid(alpha=0.3)
