@@ -7,7 +7,6 @@ at once. Interrupts wait during imports.
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
 from cns_drake.command_line.ageing import age, years
-from cns_drake.command_line.ageing import age
 from cns_drake.command_line.laddering import ladder, levels, size
 from cns_drake.command_line.maps import city, import_city, list_drives
 from cns_drake.command_line.overlapping import overlap
