@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping
-import contextlib
 import functools
 import hashlib
 import json
 from pathlib import Path
-import re
 from typing import NamedTuple
 
 from cns_drake.base.files import user_errors
@@ -28,8 +26,6 @@ _PACKAGES = ("cns_drake", "evaluation")
 _LIBRARIES = (
     "drake", "embreex", "numba", "numpy", "open3d", "open3d-cpu", "scipy",
 )  # fmt: skip
-# The start of a line that may begin a statement which is not in a block.
-_STATEMENT = re.compile(rb"^[^\s)#]", re.MULTILINE)
 
 
 def fingerprint(inputs: Mapping[str, object]) -> str:
@@ -200,7 +196,7 @@ def _is_in(module: _Module, packages: Iterable[str]) -> bool:
 def _find_imports(text: bytes, package: str) -> _Imports:
     """Returns the imports in the source of a module of a package."""
     try:
-        tree = _parse_to_last_import(text)
+        tree = ast.parse(text)
     except (SyntaxError, ValueError):
         return _Imports((), {})  # Running the file reports it.
     names: list[tuple[str, str]] = []
@@ -219,21 +215,6 @@ def _find_imports(text: bytes, package: str) -> _Imports:
             for block in ("body", "orelse", "finalbody", "handlers", "cases"):
                 waiting += getattr(node, block, [])
     return _Imports(tuple(names), offered)
-
-
-def _parse_to_last_import(text: bytes) -> ast.Module:
-    """Parses a source without the top-level statements after its last import.
-
-    In most modules these are nearly all. A word that only looks like an import
-    means that more is parsed than needed.
-    """
-    line_end = text.find(b"\n", max(text.rfind(b"import"), 0))
-    following = _STATEMENT.search(text, line_end) if line_end >= 0 else None
-    if following is not None:
-        # A statement may go on there: its start alone is no Python.
-        with contextlib.suppress(SyntaxError):
-            return ast.parse(text[: following.start()])
-    return ast.parse(text)
 
 
 def _is_for_types(test: ast.expr) -> bool:
