@@ -13,7 +13,6 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.progress import Track, silent
-from evaluation.geometry.sorting import cell_order
 
 # One slot of the hash table of voxels: the number of a voxel, how many points
 # it has (0: the slot is free), and their sum relative to its corner [m]. A slot
@@ -324,7 +323,7 @@ class VoxelAccumulator:
         # NumPy takes records much faster this way than by an index.
         cells = self._table.compress(self._table["count"] > 0)
         indices = np.stack([cells[name] for name in ("ix", "iy", "iz")], axis=1)
-        order = cell_order(indices)
+        order = np.lexsort(indices.T[::-1])
         cells, indices = cells.take(order), indices.take(order, axis=0)
         counts = cells["count"].astype(np.int64)
         sums = np.stack([cells[name] for name in ("sx", "sy", "sz")], axis=1)
@@ -436,7 +435,7 @@ def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
     kept = np.logical_and.reduce([np.abs(cell) < FARTHEST for cell in cells])
     rows = np.flatnonzero(kept)
     numbers = np.stack([cell[rows] for cell in cells], axis=1)
-    order = cell_order(numbers.astype(np.int32))
+    order = np.lexsort(numbers.astype(np.int32).T[::-1])
     rows = rows[order]
     cells = [cell[rows] for cell in cells]
     is_first = np.ones(len(rows), bool)
