@@ -6,7 +6,6 @@ import json
 import math
 import os
 import sys
-import time
 import traceback
 from typing import Annotated, Any, NoReturn
 
@@ -25,7 +24,6 @@ from cns_drake.base.interrupts import (
     interrupt_on_termination,
 )
 from cns_drake.base.process import look_seldom
-from cns_drake.base.progress import LINE_INTERVAL
 from cns_drake.base.version import __version__
 
 # All errors of usage are click's UsageError. New versions of Typer contain it
@@ -200,33 +198,18 @@ def _forget_results() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def track(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
+def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
     """Shows progress on stderr: a bar, or lines where that is no terminal."""
-    from rich.console import Console
-    from rich.progress import track as rich_track
+    # Slow to import, and not needed to print help.
+    from cns_drake.base.progress_bars import count_progress, show_progress
 
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        return _track_by_lines(items, description, total)
-    return rich_track(
-        items,
-        description=description,
-        total=total,
-        console=console,
-        transient=True,
-    )
-
-
-def _track_by_lines(
-    items: Iterable[Any], description: str, total: int
-) -> Iterator[Any]:
-    """Prints every few seconds how many items are done."""
-    said = time.monotonic()
-    for done, item in enumerate(items):
-        if time.monotonic() - said >= LINE_INTERVAL:
-            note(f"{description}: {done} of {total}")
-            said = time.monotonic()
-        yield item
+    with show_progress() as progress:
+        task = progress.add_task(description, total=total, note="")
+        on_item = count_progress(progress, task, "done")
+        for done, item in enumerate(items):
+            on_item(done, total)
+            yield item
+        progress.remove_task(task)
 
 
 def note(message: str) -> None:
