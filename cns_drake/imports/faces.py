@@ -12,7 +12,7 @@ from shapely.geometry.polygon import orient
 from shapely.validation import make_valid
 
 from cns_drake.city.geometry.polygons import triangulate
-from cns_drake.city.geometry.upper_sides import quartered
+from cns_drake.city.geometry.upper_sides import long_normals, quartered
 from cns_drake.imports.options import ImportFaults
 
 # Faces of less area are dropped [m^2].
@@ -22,6 +22,8 @@ _BENT = 0.05
 # Corners closer than this are the same [m].
 _MM = 1000.0
 _LEAST_PART = 0.01  # [m^2]
+# The angles of a face of four corners; the second and last one fill it.
+_CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
 
 
 def face_triangles(
@@ -39,7 +41,10 @@ def face_triangles(
     if len(rings[0]) < 3:
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
-    normal = np.array(_newell(rings[0].tolist()))
+    # As long as twice the area.
+    first, rest = rings[0][:1], rings[0][1:]
+    fan = [np.repeat(first, len(rest) - 1, axis=0), rest[:-1], rest[1:]]
+    normal = long_normals(np.stack(fan, axis=1)).sum(axis=0)
     if 0.5 * np.linalg.norm(normal) < _LEAST_AREA:
         # Both halves of a ring that crosses itself may be equally large.
         _, spread, axes = np.linalg.svd(rings[0] - rings[0].mean(axis=0))
@@ -54,12 +59,10 @@ def face_triangles(
     heights = (outer - outer[0]) @ normal
     if np.ptp(heights) > 2.0 * _BENT * np.linalg.norm(normal):
         faults.add("face that is not plane, folded between its corners", name)
-    if (
-        len(outer) == 4
-        and not holes
-        and _is_convex(outer.tolist(), normal.tolist())
-    ):
-        return outer[[[0, 1, 2], [0, 2, 3]]]
+    if len(outer) == 4 and not holes:
+        corners = outer[_CORNERS_OF_FOUR]
+        if (long_normals(corners) @ normal > 0.0).all():
+            return corners[[1, 3]]
     return _filled(_Plane(normal, rings), outer, holes, name, faults)
 
 
@@ -74,20 +77,6 @@ def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
         faults.add("repeated corner, left out", name, twice)
         return ring[kept]
     return ring
-
-
-def _newell(corners: list[list[float]]) -> tuple[float, float, float]:
-    """Returns the normal of a ring; its length is twice the area."""
-    x, y, z = corners[0]
-    moved = [(a - x, b - y, c - z) for a, b, c in corners]
-    nx, ny, nz = 0.0, 0.0, 0.0
-    for (ax, ay, az), (bx, by, bz) in zip(
-        moved, moved[1:] + moved[:1], strict=True
-    ):
-        nx += ay * bz - az * by
-        ny += az * bx - ax * bz
-        nz += ax * by - ay * bx
-    return nx, ny, nz
 
 
 class _Plane:
@@ -129,26 +118,6 @@ class _Plane:
             offset = self._normal @ (row - self._origin)
             row[self._axis] -= offset / self._normal[self._axis]
         return result
-
-
-def _is_convex(
-    corners: list[list[float]], normal: tuple[float, float, float]
-) -> bool:
-    """Returns whether a quadrilateral is convex."""
-    nx, ny, nz = normal
-    for k in range(4):
-        (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = (
-            corners[(k + step) % 4] for step in (-1, 0, 1)
-        )
-        ax, ay, az = x1 - x0, y1 - y0, z1 - z0
-        bx, by, bz = x2 - x0, y2 - y0, z2 - z0
-        if (
-            (ay * bz - az * by) * nx
-            + (az * bx - ax * bz) * ny
-            + (ax * by - ay * bx) * nz
-        ) <= 0.0:
-            return False
-    return True
 
 
 def _filled(
