@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 from shapely import STRtree
-from shapely.geometry import LineString, MultiLineString, MultiPolygon, Polygon
+from shapely.geometry import LineString, MultiLineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh
@@ -275,33 +275,16 @@ def _laid(
         above: height above it [m].
     """
     pieces = shapely.intersection(outlines, area, grid_size=_GRID)
-    whole = np.isclose(
-        shapely.area(pieces), shapely.area(shapely.convex_hull(pieces)), 1e-6
-    )
     found = [np.zeros((0, 3, 3))]
-    for triangle, piece, is_convex in zip(ground, pieces, whole, strict=True):
+    for triangle, piece in zip(ground, pieces, strict=True):
         a, b, c = triangle
         normal = np.cross(b - a, c - a)
         for part in parts_of(piece):
-            flat = _fan(part) if is_convex else _filled(part)
+            flat = flat_surface(part, 0.0, "street", ImportFaults())
             aside = (flat - a)[..., :2] @ normal[:2]
             flat[..., 2] = a[2] - aside / normal[2] + above
             found.append(flat)
     return turned_up(np.concatenate(found))
-
-
-def _filled(area: Polygon) -> np.ndarray:
-    return flat_surface(area, 0.0, "street", ImportFaults())
-
-
-def _fan(area: Polygon) -> np.ndarray:
-    """Returns a convex area as triangles (N, 3, 3) at height 0 [m]."""
-    corners = np.array(area.exterior.coords)[:-1, :2]
-    fan = np.zeros((len(corners) - 2, 3, 3))
-    fan[:, 0, :2] = corners[0]
-    fan[:, 1, :2], fan[:, 2, :2] = corners[1:-1], corners[2:]
-    sides = fan[:, 1:, :2] - fan[:, :1, :2]
-    return fan[np.abs(np.linalg.det(sides)) > _GRID * _GRID]
 
 
 # Widest gap that is paved [m], and least area of one [m^2].
