@@ -92,7 +92,6 @@ def localise(
         make_estimator,
         make_map,
     )
-    from evaluation.report.localisation import draw_track
     from evaluation.study.chosen_methods import parse_setting
 
     starts = queries.Starts(start, start_turn, seed).checked()
@@ -134,6 +133,8 @@ def localise(
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.TrackSummary(rows).to_json()
         if output is not None:
+            from evaluation.report.localisation import draw_track
+
             draw_track(rows, output / "track")
     else:
         frames = queries.query_frames(drive, is_mapped, query_spacing)

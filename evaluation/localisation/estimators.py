@@ -161,7 +161,17 @@ def make_map(
     Raises:
         InputError: if it cannot be read, or has hardly a point.
     """
-    accumulator = VoxelAccumulator(settings.voxel)
+    points = _centroids(source, settings.voxel, track)
+    if len(points) < FEWEST_POINTS:
+        raise InputError(
+            f"{source.name}: a map of {len(points)} points, fewer than"
+            f" {FEWEST_POINTS}"
+        )
+    return map_of(points, source.name, settings)
+
+
+def _centroids(source: Drive | Path, voxel: float, track: Track) -> np.ndarray:
+    accumulator = VoxelAccumulator(voxel)
     if isinstance(source, Drive):
         frames = sample_frames(source.X_WS[:, :3, 3], _MAP_SPACING).tolist()
         for frame in track(frames, f"mapping {source.name}", len(frames)):
@@ -171,13 +181,7 @@ def make_map(
     else:
         for block in read_blocks(source):
             accumulator.add(block)
-    points = accumulator.to_map().centroids_W
-    if len(points) < FEWEST_POINTS:
-        raise InputError(
-            f"{source.name}: a map of {len(points)} points, fewer than"
-            f" {FEWEST_POINTS}"
-        )
-    return map_of(points, source.name, settings)
+    return accumulator.to_map().centroids_W
 
 
 def map_of(
@@ -382,7 +386,11 @@ _KINDS = {
 KISS_MATCHER = "kiss-matcher"
 METHODS = (*_KINDS, KISS_MATCHER)
 # The best on unchanged cities; see docs/localisation.md.
-_DEFAULTS: dict[str, Settings] = {}
+_DEFAULTS = {
+    "gicp": Settings(width=8.0),
+    "plane-icp": Settings(width=4.0),
+    "vgicp": Settings(resolution=1.0),
+}
 
 
 def default_settings(method: str) -> Settings:
