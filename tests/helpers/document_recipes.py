@@ -518,18 +518,45 @@ RECIPES = {
         prints=("ladder/ladder.csv", "Town, "),
         makes=("ladder/ladder.png", "ladder/queries.csv"),
     ),
+    "age": Recipe(
+        ".venv/bin/cns-drake age suburbia",
+        changes=(
+            ("age suburbia", "age town"),
+            ("1 5 20", "1 2 --no-pictures"),
+        ),
+        after=("start a city",),
+        makes=("old_suburbia/history.csv", "old_suburbia/rates.csv"),
+    ),
+    "years": Recipe(
+        ".venv/bin/cns-drake years suburbia",
+        changes=(
+            ("years suburbia", "years town"),
+            ("5 20", "20"),
+            ("output years", "output aged"),
+        ),
+        after=("start a city",),
+        prints=("aged/years.csv", "20 years"),
+        makes=("aged/lifetimes.csv", "aged/years.png"),
+    ),
     "help: age": Recipe(
         "cns-drake age suburbia",
-        changes=(("age suburbia", "age town"), ("1 5 20", "1 2")),
+        changes=(
+            ("age suburbia", "age town"),
+            ("1 5 20", "1"),
+            ("old_suburbia", "pictured"),
+        ),
         after=("start a city",),
-        makes=("old_suburbia/history.csv", "old_suburbia/pictures/film.jpg"),
+        makes=("pictured/history.csv", "pictured/pictures/film.jpg"),
     ),
     "help: years": Recipe(
         "cns-drake years suburbia",
-        changes=(("years suburbia", "years town"), ("5 20", "20")),
-        after=("start a city",),
-        prints=("years/years.csv",),
-        makes=("years/lifetimes.csv", "years/years.png"),
+        changes=(
+            ("years suburbia", "years town"),
+            ("5 20", "20"),
+            ("output years", "output aged"),
+        ),
+        after=("years",),
+        prints=("aged/years.csv",),
     ),
     "help: ladder": Recipe(
         "cns-drake ladder metropolis",
