@@ -79,7 +79,10 @@ CITY: Sections = {
 }
 METHODS: Sections = {
     "All methods": MethodConfig,
-    **{name: make_method(name, {}).Config for name in shipped_methods()},
+    **{
+        name: make_method(name, {}).Config
+        for name in (*shipped_methods(), "learned")
+    },
 }
 # Fields without a default that whoever reads the file fills in.
 _FILLED_IN = {(Scenario, "name"): "the file's name"}

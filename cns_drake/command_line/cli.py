@@ -8,6 +8,7 @@ from cns_drake.base import terminal
 from cns_drake.base.terminal import example
 from cns_drake.command_line.ageing import age, years
 from cns_drake.command_line.laddering import ladder, levels, size
+from cns_drake.command_line.learning import export_pairs, train
 from cns_drake.command_line.maps import city, import_city, list_drives
 from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
@@ -69,6 +70,16 @@ app.command(
     epilog=example("cns-drake ladder metropolis --output ladder --quick")
 )(ladder)
 app.command(epilog=example("cns-drake levels ours.csv theirs.csv"))(levels)
+app.command(epilog=example("cns-drake train --output mine.npz --minutes 10"))(
+    train
+)
+app.command(
+    "export-pairs",
+    epilog=example(
+        "cns-drake export-pairs riverside_01 riverside_02 \\",
+        "    --format pointnetvlad --output pairs",
+    ),
+)(export_pairs)
 app.command(
     epilog=example(
         "cns-drake size metropolis --places 0 --places 1000 --output size"

@@ -202,7 +202,7 @@ def plain_drives(scenario: Scenario, viewpoint: str = NEAR) -> RungDrives:
         name += f"_{viewpoint}"
     database = scenario.model_copy(update={"name": name})
     left, heading_deg = VIEWPOINTS[viewpoint]
-    moved = _mapped_from(database, _AHEAD, left, heading_deg)
+    moved = mapped_from(database, _AHEAD, left, heading_deg)
     return RungDrives(moved, scenario)
 
 
@@ -310,7 +310,7 @@ def _viewpoint(
 ) -> RungDrives:
     left, heading_deg = offset
     plain_left, _ = VIEWPOINTS[NEAR]
-    moved = _mapped_from(drives.database, 0.0, left - plain_left, heading_deg)
+    moved = mapped_from(drives.database, 0.0, left - plain_left, heading_deg)
     return replace(drives, database=moved)
 
 
@@ -349,10 +349,16 @@ def _with_query(drives: RungDrives, **update: Any) -> RungDrives:
     return replace(drives, query=drives.query.model_copy(update=update))
 
 
-def _mapped_from(
+def mapped_from(
     scenario: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a scenario with its LiDARs moved on the vehicle."""
+    """Returns a scenario with its LiDARs moved on the vehicle.
+
+    Args:
+        scenario: the scenario.
+        ahead, left: how far they move [m].
+        heading_deg: how far they turn to the left [deg].
+    """
     lidars = {
         name: config.model_copy(
             update={

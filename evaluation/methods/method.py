@@ -194,9 +194,12 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
 
 _METHODS: dict[str, type[Method]] = {}
-# Methods that need another package: name -> module. They run only if they are
-# named.
-_OPTIONAL = {"map-closures": "evaluation.methods.map_closures"}
+# Methods that run only if they are named: name -> module. Some need another
+# package.
+_OPTIONAL = {
+    "learned": "evaluation.methods.learned",
+    "map-closures": "evaluation.methods.map_closures",
+}
 
 # The methods of the interface, which the author may have written.
 _CALLED = (
@@ -249,7 +252,7 @@ def known_methods() -> tuple[str, ...]:
 
 
 def optional_methods() -> tuple[str, ...]:
-    """Returns the names of the methods that need another package."""
+    """Returns the names of the methods that run only if they are named."""
     return tuple(sorted(_OPTIONAL))
 
 

@@ -19,10 +19,11 @@ METHOD_STYLES = {
     "scan-context++": ("#009E73", "-.", "^"),
     "solid": ("#CC79A7", ":", "D"),
     "layered-overlap": ("#E69F00", "-", "v"),
+    "learned": ("#56B4E9", "--", "P"),
 }
 _OTHER_STYLES = (
-    ("#56B4E9", "--", "P"),
     ("#000000", "-.", "X"),
+    ("#8C564B", ":", "p"),
 )
 
 # Colours (red, green, blue) and what they mean.

@@ -34,6 +34,7 @@ _METHOD_TITLES = {
     "ring++": "RING++",
     "btc": "BTC",
     "layered-overlap": "Layered overlap",
+    "learned": "Learned",
 }
 
 _LATEX = {

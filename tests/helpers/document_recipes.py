@@ -349,7 +349,7 @@ RECIPES = {
         prints=("the nearest 7.90 m ahead",),
     ),
     "exports": Recipe(
-        ".venv/bin/cns-drake export",
+        ".venv/bin/cns-drake export ",
         changes=(_FIRST, _LAST),
         after=("own city",),
         makes=(
@@ -683,6 +683,42 @@ RECIPES = {
         prints=("within 0.3 m and 1 deg",),
         makes=("localisation/localisation.csv",),
     ),
+    "pairs": Recipe(
+        ".venv/bin/cns-drake export-pairs riverside_01 riverside_02 "
+        "--format pointnetvlad",
+        changes=(
+            (
+                "riverside_01 riverside_02",
+                "town/sequence_01.yaml town/sequence_02.yaml",
+            ),
+        ),
+        after=("own city",),
+        prints=("pairs/training_queries_baseline2.pickle",),
+        makes=("pairs/runs/town_0[12]/000000.bin",),
+    ),
+    "help: pairs": Recipe(
+        "cns-drake export-pairs riverside_01",
+        changes=(
+            (
+                "riverside_01 riverside_02",
+                "town/sequence_01.yaml town/sequence_02.yaml",
+            ),
+        ),
+        after=("pairs",),
+        prints=("pairs/training_queries_baseline2.pickle",),
+    ),
+    "pairs with overlaps": Recipe(
+        ".venv/bin/cns-drake export-pairs riverside_01 riverside_02 "
+        "--format overlap",
+        changes=(
+            (
+                "riverside_01 riverside_02",
+                "town/sequence_01.yaml town/sequence_02.yaml",
+            ),
+        ),
+        after=("own city",),
+        prints=("overlaps/overlaps.npz",),
+    ),
     "own data": Recipe(
         ".venv/bin/cns-eval tcr kitti",
         changes=(("sequences/04", "sequences/02"),),
@@ -741,6 +777,10 @@ NOT_RUN = {
     "cns-drake levels mine": "needs these hours; test_levels has such tables",
     "cns-drake levels ours": "needs the same hours",
     "cns-eval pr --method map-closures": "needs an extra",
+    "cns-drake train": "needs an extra, and minutes; test_training trains",
+    ".venv/bin/cns-drake train": "needs that extra, too",
+    "pip install '.[train]'": "installs it",
+    "import pickle": "needs a trainer's class; test_pair_export has it",
     "pip install '.[map-closures]'": "installs that extra",
     "pip install '.[kiss-matcher]'": "installs another extra",
     "python -m pydrake.visualization.meldis": "a server, which does not end; "

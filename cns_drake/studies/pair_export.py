@@ -1,0 +1,347 @@
+"""Sets of scans for trainers of place recognition, with exact truth.
+
+Nothing is recorded in between. Drives through one city are one another's
+places. Cities lie `CITY_DISTANCE` apart, which keeps them apart by any radius.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import itertools
+from pathlib import Path
+import pickle
+import sys
+import types
+from typing import Any, Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing, make_folder, user_errors
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.points import encode_bin
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.exact_overlap import exact_overlaps
+from cns_drake.transient.world_structures import GROUND_CLASSES
+from evaluation.drives.sampling import gather, sample_frames
+from evaluation.maps.voxel_maps import thin
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.study.parts import MakePart, Part
+
+Format = Literal["pointnetvlad", "overlap"]
+
+# Added to the northing of each further city [m].
+CITY_DISTANCE = 100_000.0
+# As in PointNetVLAD (Uy and Lee, CVPR 2018): points of a cloud; radius of
+# positives, of what is no negative, and of matches in the evaluation [m].
+_POINTS = 4096
+_POSITIVE, _NON_NEGATIVE, _MATCH = 10.0, 50.0, 25.0
+# Clouds are thinned to this first, so that far walls keep points [m].
+_VOXEL = 0.3
+_GROUND = np.array(sorted(CLASS_IDS[name] for name in GROUND_CLASSES))
+# Expected time to export a drive, and to compare two [s].
+_DRIVE_COST, _PAIR_COST = 20.0, 60.0
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """What is exported of each drive.
+
+    Attributes:
+        format: the trainer's.
+        spacing: between two clouds, along the path [m].
+        scans: consecutive scans that are merged into a cloud.
+        max_range: points with a greater x, y or z are left out [m].
+    """
+
+    format: Format = "pointnetvlad"
+    spacing: float = 10.0
+    scans: int = 1
+    max_range: float = 50.0
+
+
+def export_pairs(
+    scenarios: Sequence[Scenario],
+    held_out: Sequence[Scenario],
+    output: Path,
+    options: ExportOptions,
+    cluster: Cluster,
+) -> list[Path]:
+    """Writes a set for a trainer; finished drives are not simulated again.
+
+    Args:
+        scenarios: drives to learn from.
+        held_out: drives for the evaluation alone; without any, that is of the
+            others.
+        output: the folder.
+        options: what of each drive.
+        cluster: where the work is done.
+
+    Returns:
+        The files that name the pairs.
+
+    Raises:
+        InputError: two drives have one name, or one cannot be simulated; all
+            such are named.
+    """
+    every = [*scenarios, *held_out]
+    names = [one.name for one in every]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"export-pairs: two drives are named {name}")
+    make_folder(output)
+    output = output.absolute()
+    parts = {name: Part(output / "parts" / f"{name}.data") for name in names}
+    jobs = [
+        Job(
+            f"export {one.name}",
+            MakePart(
+                parts[one.name],
+                export_run,
+                (DriveSimulation(one), output / "runs" / one.name, options),
+            ),
+            cost=_DRIVE_COST,
+        )
+        for one in every
+    ]
+    pairs = {}
+    if options.format == "overlap":
+        for two in itertools.permutations(every, 2):
+            if two[0].map == two[1].map and two[0].world == two[1].world:
+                name = f"{two[0].name} in {two[1].name}"
+                pairs[two[0].name, two[1].name] = part = Part(
+                    output / "parts" / f"{name}.data"
+                )
+                step = MakePart(
+                    part, compare_runs, (*map(DriveSimulation, two), options)
+                )
+                jobs.append(Job(f"overlap {name}", step, cost=_PAIR_COST))
+    run_jobs(jobs, cluster)
+    runs = {name: np.array(part.read()) for name, part in parts.items()}
+    if options.format == "overlap":
+        found = {key: part.read() for key, part in pairs.items()}
+        return [_write_overlaps(output, runs, found)]
+    cities = list(dict.fromkeys((one.map, one.world) for one in every))
+    placed = {
+        one.name: Run(
+            f"runs/{one.name}",
+            runs[one.name],
+            cities.index((one.map, one.world)),
+        )
+        for one in every
+    }
+    learned = [placed[one.name] for one in scenarios]
+    tested = [placed[one.name] for one in held_out]
+    return _write_pickles(output, learned, tested)
+
+
+def export_run(
+    reporter: Reporter,
+    simulation: DriveSimulation,
+    folder: Path,
+    options: ExportOptions,
+) -> np.ndarray:
+    """Writes the clouds of a drive; returns (N, 4, 4) poses X_WS."""
+    drive = simulation()
+    frames = sample_frames(drive.X_WS[:, :3, 3], options.spacing)
+    make_folder(folder)
+    before = options.scans // 2
+    for number, frame in enumerate(
+        reporter.track(frames, drive.name, len(frames))
+    ):
+        if options.format == "overlap":
+            data = encode_bin(drive.scan(int(frame)))
+        else:
+            cloud = gather(
+                drive,
+                int(frame),
+                options.scans,
+                options.max_range,
+                ("label",),
+                before,
+            )
+            data = _cloud(cloud, options.max_range, number).tobytes()
+        with user_errors(folder):
+            (folder / f"{number:06d}.bin").write_bytes(data)
+    X_WS = drive.X_WS[frames]
+    with completing(folder / "poses.txt") as part:
+        np.savetxt(part, X_WS[:, :3].reshape(-1, 12), fmt="%.9g")
+    return X_WS
+
+
+def _cloud(points: np.ndarray, max_range: float, seed: int) -> np.ndarray:
+    """Returns 4096 points in [-1, 1], without ground, of mean 0; float64."""
+    kept = points[~np.isin(points["label"], _GROUND)]
+    xyz = np.stack([kept[axis] for axis in "xyz"], axis=1)
+    xyz = thin(xyz, _VOXEL)
+    if len(xyz) == 0:
+        return np.zeros((_POINTS, 3))
+    rng = np.random.default_rng(seed)
+    few = len(xyz) < _POINTS
+    chosen = xyz[rng.choice(len(xyz), _POINTS, replace=few)]
+    return (chosen - chosen.mean(axis=0)) / (2.0 * max_range)
+
+
+def compare_runs(
+    reporter: Reporter,
+    query: DriveSimulation,
+    database: DriveSimulation,
+    options: ExportOptions,
+) -> np.ndarray:
+    """Returns the exact overlaps of a drive's scans with another's, (Q, D)."""
+    protocol = RetrievalProtocol(
+        query_spacing=options.spacing,
+        place_spacing=options.spacing,
+        max_range=options.max_range,
+    )
+    return exact_overlaps(database(), query(), protocol, reporter.track)
+
+
+@dataclass(frozen=True)
+class Run:
+    """An exported drive.
+
+    Attributes:
+        folder: of its clouds, below the set's folder.
+        X_WS: (N, 4, 4) poses of the clouds.
+        city: number of its city.
+    """
+
+    folder: str
+    X_WS: np.ndarray
+    city: int
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(N, 2) northing and easting [m]."""
+        north_east = self.X_WS[:, [1, 0], 3]
+        return north_east + np.array([CITY_DISTANCE * self.city, 0.0])
+
+    @property
+    def files(self) -> list[str]:
+        """The cloud files."""
+        return [f"{self.folder}/{k:06d}.bin" for k in range(len(self.X_WS))]
+
+
+def _write_pickles(
+    output: Path, learned: Sequence[Run], tested: Sequence[Run]
+) -> list[Path]:
+    """Writes the pickles of PointNetVLAD, as MinkLoc3Dv2 reads them."""
+    written = []
+    for name, runs in (
+        ("training_queries_baseline2.pickle", learned),
+        ("test_queries_baseline2.pickle", tested or learned),
+    ):
+        written.append(output / name)
+        _pickle(written[-1], training_tuples(runs))
+    database, queries = evaluation_sets(tested or learned)
+    for name, values in (
+        ("evaluation_database.pickle", database),
+        ("evaluation_query.pickle", queries),
+    ):
+        written.append(output / name)
+        _pickle(written[-1], values)
+    return written
+
+
+def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
+    """Returns number -> `TrainingTuple` of all clouds of some drives."""
+    files = [file for run in runs for file in run.files]
+    positions = np.concatenate([run.positions for run in runs])
+    tree = cKDTree(positions)
+    near = tree.query_ball_point(positions, _POSITIVE)
+    wide = tree.query_ball_point(positions, _NON_NEGATIVE)
+    found = {}
+    for number, file in enumerate(files):
+        values = {
+            "id": number,
+            "timestamp": number,
+            "rel_scan_filepath": file,
+            "positives": np.array(sorted({*near[number]} - {number}), int),
+            "non_negatives": np.array(sorted(wide[number]), int),
+            "position": positions[number],
+        }
+        one = _tuple_class()()
+        one.__dict__.update(values)
+        found[number] = one
+    return found
+
+
+def evaluation_sets(runs: Sequence[Run]) -> tuple[list[dict], list[dict]]:
+    """Returns the database and the queries of each drive."""
+    trees = [cKDTree(run.positions) for run in runs]
+
+    def entries(run: Run) -> dict[int, dict]:
+        return {
+            number: {"query": file, "northing": north, "easting": east}
+            for number, (file, (north, east)) in enumerate(
+                zip(run.files, run.positions.tolist(), strict=True)
+            )
+        }
+
+    queries: list[dict[int, dict]] = [entries(run) for run in runs]
+    for (i, tree), (j, run) in itertools.product(
+        enumerate(trees), enumerate(runs)
+    ):
+        if i != j:
+            near = tree.query_ball_point(run.positions, _MATCH)
+            for number, matches in enumerate(near):
+                queries[j][number][i] = sorted(matches)
+    return [entries(run) for run in runs], queries
+
+
+_MODULE = "datasets.base_datasets"
+
+
+def _tuple_class() -> type:
+    """Returns the class that trainers unpickle, under its name there."""
+    if _MODULE in sys.modules:
+        return sys.modules[_MODULE].TrainingTuple
+    module: Any = types.ModuleType(_MODULE)
+    module.TrainingTuple = type("TrainingTuple", (), {"__module__": _MODULE})
+    sys.modules.setdefault("datasets", types.ModuleType("datasets"))
+    sys.modules[_MODULE] = module
+    return module.TrainingTuple
+
+
+def _pickle(path: Path, values: object) -> None:
+    with completing(path) as part, open(part, "wb") as stream:
+        pickle.dump(values, stream, protocol=pickle.HIGHEST_PROTOCOL)
+
+
+def _write_overlaps(
+    output: Path,
+    runs: Mapping[str, np.ndarray],
+    found: Mapping[tuple[str, str], np.ndarray],
+) -> Path:
+    """Writes all overlaps that are not zero, as OverlapNet's trainers do.
+
+    `overlaps` (N, 4) is the query's number, the place's number, their overlap
+    and the query's yaw in the place's frame [rad]; `seq` (N, 2) are the drives.
+    """
+    rows, drives = [], []
+    for (query, database), overlaps in found.items():
+        asked, placed = np.nonzero(overlaps > 0.0)
+        R_PQ = np.einsum(
+            "nji,njk->nik",
+            runs[database][placed, :3, :3],
+            runs[query][asked, :3, :3],
+        )
+        yaw = np.arctan2(R_PQ[:, 1, 0], R_PQ[:, 0, 0])
+        values = overlaps[asked, placed]
+        rows.append(np.stack([asked, placed, values, yaw], axis=1))
+        drives += [(query, database)] * len(asked)
+    path = output / "overlaps.npz"
+    with completing(path) as part, open(part, "wb") as stream:
+        np.savez_compressed(
+            stream,
+            overlaps=np.concatenate(rows) if rows else np.zeros((0, 4)),
+            seq=np.array(drives, dtype=str).reshape(-1, 2),
+        )
+    return path

@@ -1,0 +1,574 @@
+"""Trains the method `learned` on scans of drawn cities.
+
+A batch asks scans of one drive for places of another drive through the same
+city. Scores are those of the method. The loss is the cross entropy between a
+softmax over all places of the batch and weights that fall with the distance:
+the right place ranks first, and those a little too far behind it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_writable, completing, make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.version import __version__
+from cns_drake.studies.training_drives import DrawnCity, scan_city
+from evaluation.methods.learned import (
+    FEATURES,
+    FREQUENCIES,
+    HEADINGS,
+    LAYERS,
+    SEEN,
+    TURNS,
+    WEIGHTS_VERSION,
+)
+from evaluation.methods.polar_images import SECTORS
+from evaluation.study.parts import MakePart, Part
+
+# A batch has this many cities, clusters of queries in each, and queries in each
+# cluster; every query comes with a place near and one further along.
+_CITIES, _CLUSTERS, _QUERIES = 2, 4, 5
+# The queries of a cluster lie within this distance [m].
+_CLUSTER = 40.0
+# Farthest right place, and nearest wrong one [m]; between them, none counts.
+_RIGHT, _WRONG = 7.5, 11.0
+# Farthest of the places further along [m].
+_ALONG = 35.0
+# The weights of right places fall with distance by this deviation [m].
+_DEVIATION = 4.0
+_TEMPERATURE = 0.05
+# Parts of the images with a hidden sector, of which angles [deg], and with
+# lost pixels, and how many of these.
+_HIDDEN, _HIDDEN_DEG = 0.4, (30.0, 120.0)
+_LOST, _MOST_LOST = 0.3, 0.3
+_RATE, _LEAST_RATE, _WARM_UP = 2e-3, 2e-5, 30
+_DECAYS = (0.9, 0.99)
+_GRADIENT = 1.0
+_KEPT_EVERY = 50
+
+Parameters = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class TrainingScans:
+    """Scans of several drives through several cities.
+
+    Attributes:
+        images: (N, RINGS, SECTORS, CHANNELS) uint8.
+        xy: (N, 2) places of the sensors [m].
+        cities: (N,) number of the city.
+        drives: (N,) number of the drive in its city.
+    """
+
+    images: np.ndarray
+    xy: np.ndarray
+    cities: np.ndarray
+    drives: np.ndarray
+
+    @classmethod
+    def of(cls, parts: Sequence["TrainingScans"]) -> "TrainingScans":
+        """Joins scans of several cities, which are numbered in order."""
+        return cls(
+            np.concatenate([part.images for part in parts]),
+            np.concatenate([part.xy for part in parts]),
+            np.repeat(np.arange(len(parts)), [len(p.xy) for p in parts]),
+            np.concatenate([part.drives for part in parts]),
+        )
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Images of Q queries and P places, with the truth.
+
+    Attributes:
+        images: (Q + P, RINGS, SECTORS, CHANNELS) uint8, queries first.
+        weights: (Q, P) of right places, with sum 1 in each row.
+        counts: (Q, P) whether a place takes part in the softmax.
+    """
+
+    images: np.ndarray
+    weights: np.ndarray
+    counts: np.ndarray
+
+
+class Sampler:
+    """Draws batches; a step's batch depends on seed and step alone."""
+
+    def __init__(self, scans: TrainingScans, seed: int):
+        """Finds what can be paired.
+
+        Raises:
+            InputError: no city has two drives that meet.
+        """
+        self._scans = scans
+        self._seed = seed
+        self._groups = {
+            int(city): {
+                int(drive): np.flatnonzero(
+                    (scans.cities == city) & (scans.drives == drive)
+                )
+                for drive in np.unique(scans.drives[scans.cities == city])
+            }
+            for city in np.unique(scans.cities)
+        }
+        self._groups = {
+            city: drives
+            for city, drives in self._groups.items()
+            if len(drives) > 1
+        }
+        if not self._groups:
+            raise InputError("training: no city has two drives that meet")
+
+    def batch(self, step: int) -> Batch:
+        """Returns the batch of a step."""
+        rng = np.random.default_rng([self._seed, step])
+        queries: list[int] = []
+        places: list[int] = []
+        wanted = _CITIES * _CLUSTERS * _QUERIES
+        keys = list(self._groups)
+        size = min(_CITIES, len(keys))
+        cities = [keys[k] for k in rng.permutation(len(keys))[:size]]
+        for turn in range(100):
+            # Some clusters lie where the two drives do not meet.
+            of_query, of_places = self._cluster(cities[turn % size], rng)
+            room = wanted - len(queries)
+            queries += of_query[:room]
+            places += of_places[: 2 * room]
+            if len(queries) == wanted:
+                break
+        else:
+            raise InputError("training: the drives of a city hardly meet")
+        scans = self._scans
+        distance = np.linalg.norm(
+            scans.xy[queries][:, None] - scans.xy[places], axis=2
+        )
+        same = scans.cities[queries][:, None] == scans.cities[places]
+        right = same & (distance <= _RIGHT)
+        weights = np.exp(-0.5 * (distance / _DEVIATION) ** 2) * right
+        counts = right | ~same | (distance >= _WRONG)
+        images = scans.images[[*queries, *places]]
+        _augment(images, rng)
+        return Batch(
+            images,
+            (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32),
+            counts,
+        )
+
+    def _cluster(
+        self, city: int, rng: np.random.Generator
+    ) -> tuple[list[int], list[int]]:
+        """Returns near queries, and two places for each of them."""
+        xy = self._scans.xy
+        drives = list(self._groups[city].values())
+        first, second = rng.permutation(len(drives))[:2]
+        asked, asked_of = drives[first], drives[second]
+        center = xy[asked[int(rng.integers(len(asked)))]]
+        near = asked[np.linalg.norm(xy[asked] - center, axis=1) <= _CLUSTER]
+        queries: list[int] = []
+        places: list[int] = []
+        for query in rng.permutation(near)[:_QUERIES].tolist():
+            away = np.linalg.norm(xy[asked_of] - xy[query], axis=1)
+            right = asked_of[away <= _RIGHT]
+            along = asked_of[(away >= _WRONG) & (away <= _ALONG)]
+            if len(right) and len(along):
+                queries.append(query)
+                places += [int(rng.choice(right)), int(rng.choice(along))]
+        return queries, places
+
+
+def _augment(images: np.ndarray, rng: np.random.Generator) -> None:
+    """Turns images at random, hides sectors, loses pixels; in place."""
+    is_mirrored = rng.random() < 0.5
+    for number, image in enumerate(images):
+        if is_mirrored:
+            image = image[:, ::-1]
+        image = np.roll(image, int(rng.integers(SECTORS)), axis=1)
+        if rng.random() < _HIDDEN:
+            width = rng.uniform(*_HIDDEN_DEG) / 360.0 * SECTORS
+            image[:, : int(width)] = 0
+            image = np.roll(image, int(rng.integers(SECTORS)), axis=1)
+        if rng.random() < _LOST:
+            share = rng.uniform(0.0, _MOST_LOST)
+            image[rng.random(image.shape[:2]) < share] = 0
+        images[number] = image
+
+
+def import_jax() -> None:
+    """Imports JAX, an optional dependency.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import jax  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            "train: it needs JAX: pip install 'cns-drake[train]'"
+        ) from error
+
+
+def start_parameters(seed: int) -> Parameters:
+    """Returns the weights before training (He et al., ICCV 2015)."""
+    rng = np.random.default_rng([seed, 0xC0DE])
+    found: Parameters = {}
+    for number, (before, after, _, _) in enumerate(LAYERS):
+        scale = (2.0 / (9 * before)) ** 0.5
+        kernel = scale * rng.standard_normal((9 * before, after))
+        found[f"kernel_{number}"] = kernel.astype(np.float32)
+        found[f"bias_{number}"] = np.zeros(after, np.float32)
+    return found
+
+
+def features(parameters: Parameters, images: Any) -> Any:
+    """Returns maps of unit length (N, TURNS, FEATURES), in JAX."""
+    import jax
+    from jax import lax
+    import jax.numpy as jnp
+
+    cells = images.astype(jnp.float32) / 255.0
+    for number, (before, after, down, along) in enumerate(LAYERS):
+        cells = jnp.concatenate(
+            [cells[:, :, -1:], cells, cells[:, :, :1]], axis=2
+        )
+        cells = jnp.pad(cells, ((0, 0), (1, 1), (0, 0), (0, 0)))
+        cells = lax.conv_general_dilated(
+            cells,
+            parameters[f"kernel_{number}"].reshape(3, 3, before, after),
+            (down, along),
+            "VALID",
+            dimension_numbers=("NHWC", "HWIO", "NHWC"),
+        )
+        cells += parameters[f"bias_{number}"]
+        if number < len(LAYERS) - 1:
+            cells = jax.nn.relu(cells)
+    maps = cells.transpose(0, 2, 1, 3).reshape(len(images), TURNS, FEATURES)
+    length = jnp.sqrt((maps**2).sum(axis=(1, 2), keepdims=True) + 1e-12)
+    return maps / length
+
+
+def scores(queries: Any, places: Any) -> Any:
+    """Returns the method's scores (Q, P) of maps, in JAX."""
+    import jax.numpy as jnp
+
+    own, others = (
+        jnp.fft.rfft(maps, axis=1)[:, :FREQUENCIES]
+        for maps in (queries, places)
+    )
+    products = jnp.einsum("qfc,pfc->qpf", jnp.conj(own), others)
+    turned = jnp.fft.irfft(products * (HEADINGS / TURNS), n=HEADINGS, axis=2)
+    return turned.max(axis=2)
+
+
+def train(
+    scans: TrainingScans,
+    steps: int,
+    seed: int,
+    state: Path,
+    digest: str = "",
+    track: Track = silent,
+    on_step: Callable[[int, Parameters], None] = lambda step, values: None,
+) -> tuple[Parameters, np.ndarray]:
+    """Trains a network.
+
+    Args:
+        scans: to learn from.
+        steps: number of batches.
+        seed: seed of the first weights and of all batches.
+        state: file that keeps the state; a training that was interrupted goes
+            on from there.
+        digest: stands for the scans in the state.
+        track: reports progress.
+        on_step: called now and then with the step and the weights.
+
+    Returns:
+        The weights, and (steps, 2) loss and share of right best places.
+
+    Raises:
+        InputError: there is nothing to pair, the state is another training's,
+            or JAX is not installed.
+    """
+    import_jax()
+    import jax
+    import jax.numpy as jnp
+
+    def loss(values: Parameters, images: Any, weights: Any, counts: Any) -> Any:
+        maps = features(values, images)
+        found = scores(maps[: len(weights)], maps[len(weights) :])
+        logits = jnp.where(counts, found / _TEMPERATURE, -1e9)
+        cross = -(weights * jax.nn.log_softmax(logits, axis=1)).sum(axis=1)
+        best = jnp.take_along_axis(
+            weights, logits.argmax(axis=1)[:, None], axis=1
+        )
+        return cross.mean(), (best > 0.0).mean()
+
+    @jax.jit
+    def update(
+        values: Parameters,
+        first: Parameters,
+        second: Parameters,
+        step: Any,
+        images: Any,
+        weights: Any,
+        counts: Any,
+    ) -> Any:
+        (value, right), slope = jax.value_and_grad(loss, has_aux=True)(
+            values, images, weights, counts
+        )
+        length = jnp.sqrt(sum((one**2).sum() for one in slope.values()))
+        slope = {
+            name: one * jnp.minimum(1.0, _GRADIENT / (length + 1e-9))
+            for name, one in slope.items()
+        }
+        # Adam (Kingma and Ba, ICLR 2015); the rate falls like a cosine.
+        progress = (step + 1.0) / steps
+        rate = _LEAST_RATE + 0.5 * (_RATE - _LEAST_RATE) * (
+            1.0 + jnp.cos(jnp.pi * progress)
+        )
+        rate *= jnp.minimum(1.0, (step + 1.0) / _WARM_UP)
+        one, two = _DECAYS
+        first = {k: one * first[k] + (1 - one) * v for k, v in slope.items()}
+        second = {
+            k: two * second[k] + (1 - two) * v**2 for k, v in slope.items()
+        }
+        values = {
+            k: v
+            - rate
+            * (first[k] / (1 - one ** (step + 1.0)))
+            / (jnp.sqrt(second[k] / (1 - two ** (step + 1.0))) + 1e-8)
+            for k, v in values.items()
+        }
+        return values, first, second, value, right
+
+    sampler = Sampler(scans, seed)
+    key = json.dumps([WEIGHTS_VERSION, digest, len(scans.xy), steps, seed])
+    moments, curve = _read_state(state, key, seed)
+    begin = len(curve)
+    for step in track(range(begin, steps), "training", steps - begin):
+        batch = sampler.batch(step)
+        *new, value, right = update(
+            *moments,
+            np.float32(step),
+            batch.images,
+            batch.weights,
+            batch.counts,
+        )
+        moments = tuple(new)
+        curve.append((float(value), float(right)))
+        if (step + 1) % _KEPT_EVERY == 0 or step + 1 == steps:
+            _write_state(state, key, moments, curve)
+            on_step(step + 1, moments[0])
+    values = {name: np.asarray(one) for name, one in moments[0].items()}
+    return values, np.array(curve)
+
+
+_Moments = tuple[Parameters, ...]
+_PREFIXES = ("value", "first", "second")
+
+
+def _read_state(
+    path: Path, key: str, seed: int
+) -> tuple[_Moments, list[tuple[float, float]]]:
+    """Returns weights and moments, and the curve so far."""
+    start = start_parameters(seed)
+    zero = {name: np.zeros_like(one) for name, one in start.items()}
+    if not path.exists():
+        return (start, zero, zero), []
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if str(file["key"]) != key:
+                raise InputError(
+                    f"{path}: the state of another training; delete it"
+                )
+            moments = tuple(
+                {name: file[f"{prefix}_{name}"] for name in start}
+                for prefix in _PREFIXES
+            )
+            return moments, [tuple(row) for row in file["curve"].tolist()]
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise InputError(f"{path}: damaged ({error}); delete it") from error
+
+
+def _write_state(
+    path: Path,
+    key: str,
+    moments: _Moments,
+    curve: Sequence[tuple[float, float]],
+) -> None:
+    values: dict[str, Any] = {
+        f"{prefix}_{name}": np.asarray(one)
+        for prefix, part in zip(_PREFIXES, moments, strict=True)
+        for name, one in part.items()
+    }
+    values |= {"key": key, "curve": np.array(curve)}
+    with completing(path) as part_file, open(part_file, "wb") as stream:
+        np.savez(stream, **values)
+
+
+def write_weights(
+    path: Path,
+    values: Mapping[str, np.ndarray],
+    seen: tuple[float, float],
+    made_by: Mapping[str, Any],
+) -> None:
+    """Writes a file of weights, as the method `learned` reads it.
+
+    Args:
+        path: the file.
+        values: the weights.
+        seen: least and greatest part of the sectors with a point in training.
+        made_by: what made them, ready for JSON.
+    """
+    arrays: dict[str, Any] = {
+        "version": np.int64(WEIGHTS_VERSION),
+        "made_by": json.dumps(made_by),
+        SEEN: np.array(seen, np.float32),
+        **{name: np.asarray(one) for name, one in values.items()},
+    }
+    with completing(path) as part_file, open(part_file, "wb") as stream:
+        np.savez(stream, **arrays)
+
+
+# The streets of the cities, in turn. Metropolis is kept for tests.
+MAPS = ("riverside", "suburbia", "downtown")
+# Cities and batches for each minute of one core.
+_CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
+# Expected time for a city [s].
+_CITY_COST = 60.0
+
+
+@dataclass(frozen=True)
+class TrainingPlan:
+    """What a training sees, and for how long.
+
+    Attributes:
+        cities: number of drawn cities.
+        steps: number of batches.
+        seed: seed of everything.
+        change: whether drives see different stages, and passing changes.
+        returns: whether some have calibrated returns and weather.
+        driver: whether drivers wander and change lanes.
+    """
+
+    cities: int
+    steps: int
+    seed: int = 1
+    change: bool = True
+    returns: bool = True
+    driver: bool = True
+
+    @classmethod
+    def of_minutes(cls, minutes: float, **fields: Any) -> "TrainingPlan":
+        """Returns a plan of about so many minutes of one core."""
+        cities = max(2, round(_CITIES_A_MINUTE * minutes))
+        steps = max(10, round(_STEPS_A_MINUTE * minutes))
+        return cls(**{"cities": cities, "steps": steps, **fields})
+
+    def drawn(self) -> list[DrawnCity]:
+        """Returns the cities."""
+        return [
+            DrawnCity(
+                MAPS[number % len(MAPS)],
+                self.seed,
+                number,
+                change=self.change,
+                returns=self.returns,
+                driver=self.driver,
+            )
+            for number in range(self.cities)
+        ]
+
+
+def make_weights(
+    plan: TrainingPlan,
+    output: Path,
+    command: str,
+    cluster: Cluster,
+    track: Track = silent,
+) -> Path:
+    """Draws cities, trains on them and writes weights.
+
+    `<output>.training` keeps the scans and the state: an interrupted training
+    goes on there.
+
+    Args:
+        plan: what to train on.
+        output: the file of weights.
+        command: what made them, for the file.
+        cluster: where cities are simulated.
+        track: reports progress.
+
+    Returns:
+        The picture of the curve, `<output>` with the ending `.png`.
+
+    Raises:
+        InputError: JAX is not installed, a file cannot be written, or cities
+            could not be drawn.
+    """
+    import_jax()
+    check_writable(output)
+    work = output.absolute().with_name(output.name + ".training")
+    make_folder(work)
+    drawn = plan.drawn()
+    parts = [Part(work / f"city_{one.number:03d}.data") for one in drawn]
+    jobs = [
+        Job(
+            f"city {one.number} ({one.map_name})",
+            MakePart(part, scan_city, (one, work / f"city_{one.number:03d}")),
+            cost=_CITY_COST,
+        )
+        for one, part in zip(drawn, parts, strict=True)
+    ]
+    run_jobs(jobs, cluster)
+    scans = TrainingScans.of(
+        [
+            TrainingScans(
+                one["images"], one["xy"], one["drives"], one["drives"]
+            )
+            for one in (part.read() for part in parts)
+        ]
+    )
+    digest = fingerprint({"cities": [part.identity() for part in parts]})
+    values, curve = train(
+        scans, plan.steps, plan.seed, work / "state.npz", digest, track
+    )
+    seen = scans.images.any(axis=(1, 3)).mean(axis=1)
+    made_by = {
+        "command": command,
+        "version": __version__,
+        "digest": digest,
+        "scans": len(scans.xy),
+        "plan": asdict(plan),
+    }
+    write_weights(output, values, (seen.min(), seen.max()), made_by)
+    picture = output.with_suffix(".png")
+    _draw_curve(curve, picture)
+    return picture
+
+
+def _draw_curve(curve: np.ndarray, path: Path) -> None:
+    """Draws the loss, and the share of right best places, over the steps."""
+    from matplotlib.figure import Figure
+
+    size = max(1, len(curve) // 40)
+    kept = curve[: len(curve) // size * size].reshape(-1, size, 2).mean(axis=1)
+    steps = (np.arange(len(kept)) + 0.5) * size
+    figure = Figure(figsize=(6.0, 3.2), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(steps, kept[:, 0], color="#0072B2")
+    axes.set(xlabel="step", ylabel="loss", ylim=(0.0, None))
+    axes.yaxis.label.set_color("#0072B2")
+    other = axes.twinx()
+    other.plot(steps, kept[:, 1], color="#D55E00", linestyle="--")
+    other.set(ylabel="right best places in a batch", ylim=(0.0, 1.0))
+    other.yaxis.label.set_color("#D55E00")
+    with completing(path) as part:
+        figure.savefig(part, format="png", dpi=130)

@@ -1,0 +1,269 @@
+"""A learned descriptor: a small network on polar images, trained in simulation.
+
+Convolutions that are circular in azimuth turn the polar image of a scan into a
+map of features, 8 rings x 48 sectors x 16. Two scans are compared by the
+correlation of their maps at the best turn, which is also the heading. The
+network has never seen a recorded scan: `cns-drake train` makes its weights.
+
+Its kin: correlations over turns are those of OverlapNet (Chen et al., RSS
+2020) and DiSCO (Xu et al., RA-L 2021).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+import hashlib
+import math
+from pathlib import Path
+import zipfile
+
+import numpy as np
+from pydantic import computed_field
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.poses import make_pose
+from cns_drake.base.terminal import note
+from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.polar_images import (
+    CHANNELS,
+    SECTORS,
+    polar_image,
+)
+
+WEIGHTS_VERSION = 1
+# Each layer of 3 x 3 cells has channels in and out, steps over rings and
+# sectors.
+LAYERS = ((CHANNELS, 16, 2, 2), (16, 32, 2, 2), (32, 64, 2, 1), (64, 16, 1, 1))
+# Rings x channels, and sectors, of the map of features.
+FEATURES = 8 * 16
+TURNS = 48
+# Frequencies of a map along its sectors; the highest one has no phase.
+FREQUENCIES = TURNS // 2
+# Headings at which two maps are compared.
+HEADINGS = 2 * TURNS
+# Parts of the sectors with a return, least and greatest in training.
+SEEN = "seen"
+# The weights of the package.
+SHIPPED = Path(__file__).with_name("learned_weights.npz")
+_MOST_BYTES = 5_000_000
+
+
+class LearnedConfig(MethodConfig):
+    """Parameters of the learned descriptor.
+
+    Attributes:
+        weights: file by `cns-drake train`; None for the shipped weights.
+    """
+
+    weights: Path | None = None
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def digest(self) -> str:
+        """The weights: two files of one name are not the same method."""
+        path = self.weights or SHIPPED
+        load_weights(path)
+        return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class LearnedScan:
+    """Descriptor of one scan.
+
+    Attributes:
+        features: (TURNS, FEATURES) float32 of unit length; all zero without a
+            point in reach.
+    """
+
+    features: np.ndarray
+
+
+@dataclass(frozen=True)
+class LearnedDatabase:
+    """Descriptors of D places.
+
+    Attributes:
+        spectra: (FREQUENCIES, FEATURES, D) complex64.
+        filled: (D,) bool, whether a place has a point.
+    """
+
+    spectra: np.ndarray
+    filled: np.ndarray
+
+
+@register("learned")
+class Learned(Method[LearnedScan, LearnedDatabase]):
+    """The network; the score of a pair is the cosine at the best turn."""
+
+    Config = LearnedConfig
+    config: LearnedConfig
+
+    def __init__(self, config: MethodConfig | None = None):
+        super().__init__(config)
+        path = self.config.weights or SHIPPED
+        self._weights = load_weights(path)
+        self._warned = False
+
+    def describe(self, points: np.ndarray) -> LearnedScan:
+        return self.describe_image(
+            polar_image(points, self.config.sensor_height)
+        )
+
+    def describe_image(self, image: np.ndarray) -> LearnedScan:
+        """Describes a polar image."""
+        if not image.any():
+            return LearnedScan(np.zeros((TURNS, FEATURES), np.float32))
+        self._check_seen(image)
+        features = _infer(self._weights, image)
+        length = float(np.linalg.norm(features))
+        return LearnedScan(features / np.float32(max(length, 1e-9)))
+
+    def build_database(self, places: Sequence[LearnedScan]) -> LearnedDatabase:
+        spectra = np.empty(
+            (FREQUENCIES, FEATURES, len(places)), dtype=np.complex64
+        )
+        for number, place in enumerate(places):
+            spectra[:, :, number] = _spectrum(place)
+        filled = np.array([bool(place.features.any()) for place in places])
+        return LearnedDatabase(spectra, filled)
+
+    def score(
+        self,
+        query: LearnedScan,
+        database: LearnedDatabase,
+        *,
+        exhaustive: bool = False,
+    ) -> np.ndarray:
+        del exhaustive  # It always is.
+        if not query.features.any():
+            return np.full(len(database.filled), np.nan)
+        found = _correlations(query, database.spectra).max(axis=0)
+        return np.where(database.filled, found, np.nan).astype(np.float64)
+
+    def relative_pose(
+        self, query: LearnedScan, database: LearnedDatabase, place: int
+    ) -> np.ndarray | None:
+        """Returns the turn of the query, in steps of 3.75 deg.
+
+        None if one of the two has no points within reach.
+        """
+        if not (query.features.any() and database.filled[place]):
+            return None
+        spectrum = database.spectra[:, :, place : place + 1]
+        turn = int(_correlations(query, spectrum)[:, 0].argmax())
+        # What the query sees at azimuth a, the place sees at a + turn.
+        yaw = 2.0 * math.pi * turn / HEADINGS
+        c, s = math.cos(yaw), math.sin(yaw)
+        R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return make_pose(R_PQ, np.zeros(3))
+
+    def _check_seen(self, image: np.ndarray) -> None:
+        """Notes once that the sensor sees less than any in training."""
+        if self._warned:
+            return
+        seen = seen_part(image)
+        least = float(self._weights[SEEN][0])
+        if seen < least:
+            self._warned = True
+            note(
+                f"learned: points in {100 * seen:.0f} % of the image's sectors;"
+                f" in training {100 * least:.0f} % or more"
+            )
+
+
+def seen_part(image: np.ndarray) -> float:
+    """Returns the part of the sectors of a polar image that have a point."""
+    return float(image.any(axis=(0, 2)).mean())
+
+
+def load_weights(path: Path) -> Mapping[str, np.ndarray]:
+    """Reads and checks a file of weights.
+
+    Returns:
+        `kernel_0` (9 x channels in, channels out) float32, `bias_0`, and so on;
+        `seen` (2,).
+
+    Raises:
+        InputError: it cannot be read, or has another version or size.
+    """
+    try:
+        changed = path.stat()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    return _load(path, changed.st_mtime_ns, changed.st_size)
+
+
+@lru_cache(maxsize=4)
+def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
+    del mtime_ns
+    if size > _MOST_BYTES:
+        raise InputError(
+            f"{path}: {size} bytes are too many for weights (at most "
+            f"{_MOST_BYTES})"
+        )
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            values = {name: file[name] for name in file.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: no file of weights ({error})") from error
+    version = values.get("version")
+    if version is None or version.shape != () or version != WEIGHTS_VERSION:
+        raise InputError(
+            f"{path}: version: {version} instead of {WEIGHTS_VERSION}; train "
+            "again with this version of the program"
+        )
+    shapes: dict[str, tuple[int, ...]] = {SEEN: (2,)}
+    for number, (before, after, _, _) in enumerate(LAYERS):
+        shapes[f"kernel_{number}"] = (9 * before, after)
+        shapes[f"bias_{number}"] = (after,)
+    for name, shape in shapes.items():
+        if name not in values:
+            raise InputError(f"{path}: {name} is missing")
+        found = values[name]
+        if found.shape != shape:
+            raise InputError(
+                f"{path}: {name}: size {found.shape} instead of {shape}"
+            )
+        if found.dtype.kind != "f" or not np.isfinite(found).all():
+            raise InputError(f"{path}: {name}: not all are finite numbers")
+        values[name] = found.astype(np.float32)
+    return values
+
+
+def _infer(weights: Mapping[str, np.ndarray], image: np.ndarray) -> np.ndarray:
+    """Returns the map of features (TURNS, FEATURES) of a polar image."""
+    cells = image.astype(np.float32) * np.float32(1.0 / 255.0)
+    last = len(LAYERS) - 1
+    for number, (before, after, down, along) in enumerate(LAYERS):
+        rings, sectors = cells.shape[0] // down, cells.shape[1] // along
+        padded = np.zeros(
+            (cells.shape[0] + 2, cells.shape[1] + 2, before), np.float32
+        )
+        padded[1:-1, 1:-1] = cells
+        padded[1:-1, 0], padded[1:-1, -1] = cells[:, -1], cells[:, 0]
+        taps = np.empty((rings, sectors, 9, before), np.float32)
+        for tap in range(9):
+            row, column = divmod(tap, 3)
+            taps[:, :, tap] = padded[
+                row : row + down * rings : down,
+                column : column + along * sectors : along,
+            ]
+        flat = taps.reshape(rings * sectors, 9 * before)
+        flat = flat @ weights[f"kernel_{number}"] + weights[f"bias_{number}"]
+        if number < last:
+            np.maximum(flat, 0.0, out=flat)
+        cells = flat.reshape(rings, sectors, after)
+    return cells.transpose(1, 0, 2).reshape(SECTORS // 4, FEATURES)
+
+
+def _spectrum(scan: LearnedScan) -> np.ndarray:
+    """Returns a map's spectrum along its turns, (FREQUENCIES, FEATURES)."""
+    return np.fft.rfft(scan.features, axis=0)[:FREQUENCIES]
+
+
+def _correlations(query: LearnedScan, spectra: np.ndarray) -> np.ndarray:
+    """Returns the correlations with D places at all headings, (HEADINGS, D)."""
+    own = np.conj(_spectrum(query)).astype(np.complex64)
+    products = np.matmul(own[:, None, :], spectra)[:, 0]
+    scale = HEADINGS / TURNS
+    return np.fft.irfft(products * scale, n=HEADINGS, axis=0)
