@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import complete_part, part_path, user_errors
 from cns_drake.base.points import encode_bin, encode_pcd, to_xyzi
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
@@ -36,16 +37,19 @@ def scan_world(
     Returns:
         Structured array of `POINT_DTYPE`, in the sensor frame.
     """
-    lidar = Lidar(
-        world.scene_graph.world_frame_id(),
-        X_WS,
-        pattern,
-        returns=returns,
-        structures=world.structures,
-        anchored_frames=world.anchored_frames(),
-    )
-    context = _make_still_world(world, lidar).CreateDefaultContext()
-    return lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
+    lidar, context = _stand(world, X_WS, pattern, returns)
+    return lidar.GetOutputPort("scan").Eval(context)
+
+
+def still_scene(world: World, pattern: BeamPattern) -> RayCastingScene:
+    """Returns the world's models in their initial state, to cast rays on.
+
+    Args:
+        world: the world; its SceneGraph is used up.
+        pattern: any beams.
+    """
+    lidar, context = _stand(world, RigidTransform(), pattern)
+    return lidar.EvalScene(context)
 
 
 def check_ending(path: Path) -> None:
@@ -85,6 +89,25 @@ def _encode_npy(scan: np.ndarray) -> bytes:
 
 
 _ENCODERS = {".bin": encode_bin, ".npy": _encode_npy, ".pcd": encode_pcd}
+
+
+def _stand(
+    world: World,
+    X_WS: RigidTransform,
+    pattern: BeamPattern,
+    returns: CalibratedReturns | None = None,
+) -> tuple[Lidar, Context]:
+    """Returns a LiDAR that stands in a world, and its Context."""
+    lidar = Lidar(
+        world.scene_graph.world_frame_id(),
+        X_WS,
+        pattern,
+        returns=returns,
+        structures=world.structures,
+        anchored_frames=world.anchored_frames(),
+    )
+    context = _make_still_world(world, lidar).CreateDefaultContext()
+    return lidar, lidar.GetMyContextFromRoot(context)
 
 
 def _make_still_world(world: World, lidar: Lidar) -> Diagram:

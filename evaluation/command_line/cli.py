@@ -16,6 +16,7 @@ import typer
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
 from evaluation.command_line.localising import localise
+from evaluation.command_line.map_updating import map_sessions, map_update
 from evaluation.command_line.options import (
     Align,
     AlignName,
@@ -463,6 +464,16 @@ app.command(
         "    results/latest/metropolis_04_poses_tum.txt",
     )
 )(trajectory)
+
+app.command(epilog=example("cns-eval map-update changed --baseline distance"))(
+    map_update
+)
+app.command(
+    epilog=example(
+        "cns-eval map-sessions mulran/KAIST01 mulran/KAIST02 \\",
+        "    --output kaist",
+    ),
+)(map_sessions)
 
 
 def main() -> None:

@@ -70,6 +70,12 @@ Parameters = Annotated[
 SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
 ]
+SessionSpacing = Annotated[
+    float,
+    typer.Option(
+        metavar="METRES", min=0.01, help="Way between two scans of a map."
+    ),
+]
 LidarName = Annotated[
     str | None,
     typer.Option(

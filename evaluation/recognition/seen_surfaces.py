@@ -111,6 +111,24 @@ class SeenSurfaces:
             float(np.mean(kinds == _SHOWN)), float(np.mean(kinds == _BEHIND))
         )
 
+    def clearances(self, points: np.ndarray) -> np.ndarray:
+        """Returns how far before the seen surface points (N, 3) lie, (N,) [m].
+
+        The distance is across the plane of the three nearest returns, or, at
+        edges and with fewer returns, along the line of sight to the nearest of
+        them. It is negative behind the surface, infinite where no return is
+        near, and NaN for a point between two surfaces.
+
+        Args:
+            points: in this sensor's frame.
+        """
+        return _measure_clearances(
+            np.ascontiguousarray(points, dtype=np.float64),
+            self.points,
+            self.angles_deg,
+            self.starts,
+        )
+
     def hides(self, points: np.ndarray) -> np.ndarray:
         """Returns which of points (N, 3) are behind, (N,) bool."""
         return self._kinds(points) == _BEHIND
@@ -182,6 +200,24 @@ def _is_on_plane(
 
     That is, along its direction, within `TOLERANCE`.
     """
+    plane = _fit_plane(seen, corners, away)
+    along = plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2]
+    if along == 0.0:
+        return False
+    # The plane meets the ray at `part` times the point.
+    part = plane[3] / along
+    return abs(part - 1.0) * _length(p) <= TOLERANCE
+
+
+@compiled
+def _fit_plane(
+    seen: np.ndarray, corners: np.ndarray, away: np.ndarray
+) -> tuple[float, float, float, float]:
+    """Returns the plane n p = h of the nearest three returns; n of any length.
+
+    Returns:
+        The three components of n, and h.
+    """
     # In place of `np.argsort`, which takes a second to compile.
     order = np.empty(4, np.int64)
     for quadrant in range(4):
@@ -196,12 +232,7 @@ def _is_on_plane(
     nx = u[1] * v[2] - u[2] * v[1]
     ny = u[2] * v[0] - u[0] * v[2]
     nz = u[0] * v[1] - u[1] * v[0]
-    # The plane meets the ray at `part` times the point.
-    along = nx * p[0] + ny * p[1] + nz * p[2]
-    if along == 0.0:
-        return False
-    part = (nx * a[0] + ny * a[1] + nz * a[2]) / along
-    return abs(part - 1.0) * _length(p) <= TOLERANCE
+    return nx, ny, nz, nx * a[0] + ny * a[1] + nz * a[2]
 
 
 @compiled
@@ -241,3 +272,37 @@ def _classify(
         elif count > 0 and distance > farthest + TOLERANCE:
             kinds[i] = _BEHIND
     return kinds
+
+
+@compiled
+def _measure_clearances(
+    others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
+) -> np.ndarray:
+    """Returns how far M points lie before what is seen [m]."""
+    found = np.empty(len(others))
+    corners = np.empty(4, np.int64)
+    away = np.empty(4)
+    for i in range(len(others)):
+        p = others[i]
+        distance = _length(p)
+        _find_corners(p, angles, starts, corners, away)
+        farthest, nearest, count = 0.0, math.inf, 0
+        for quadrant in range(4):
+            if corners[quadrant] >= 0:
+                reach = _length(seen[corners[quadrant]])
+                count += 1
+                farthest, nearest = max(farthest, reach), min(nearest, reach)
+        found[i] = math.nan
+        if count == 0:
+            found[i] = math.inf
+        elif count >= 3 and farthest <= _FARTHEST * nearest:
+            x, y, z, h = _fit_plane(seen, corners, away)
+            along = x * p[0] + y * p[1] + z * p[2]
+            size = math.sqrt(x * x + y * y + z * z)
+            if along != 0.0 and size > 0.0:
+                found[i] = math.copysign(1.0, along) * (h - along) / size
+        elif distance < nearest:
+            found[i] = nearest - distance
+        elif distance > farthest:
+            found[i] = farthest - distance
+    return found

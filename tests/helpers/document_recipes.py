@@ -719,6 +719,57 @@ RECIPES = {
         after=("own city",),
         prints=("overlaps/overlaps.npz",),
     ),
+    "map truth": Recipe(
+        ".venv/bin/cns-drake map-truth",
+        changes=(
+            (
+                "metropolis_01 metropolis_04",
+                "town/sequence_01.yaml town/sequence_02.yaml --spacing 20",
+            ),
+        ),
+        after=("own city",),
+        prints=("changed",),
+        makes=("changed/A/truth.npy", "changed/index.html"),
+    ),
+    "help: map-truth": Recipe(
+        "cns-drake map-truth metropolis_01",
+        changes=(
+            (
+                "metropolis_01 metropolis_04",
+                "town/sequence_01.yaml town/sequence_02.yaml --spacing 20",
+            ),
+            ("output changed", "output shown"),
+        ),
+        after=("own city",),
+        prints=("shown",),
+    ),
+    "map update": Recipe(
+        ".venv/bin/cns-eval map-update",
+        after=("map truth",),
+        prints=("mean IoU", "by structure"),
+    ),
+    "help: map-update": Recipe(
+        "cns-eval map-update changed",
+        after=("map truth",),
+        prints=("mean IoU",),
+    ),
+    "map sessions": Recipe(
+        ".venv/bin/cns-eval map-sessions",
+        changes=(_FIRST, _LAST),
+        after=("own city",),
+        prints=("real",),
+        makes=("real/A/map.ply",),
+    ),
+    "help: map-sessions": Recipe(
+        "cns-eval map-sessions mulran",
+        changes=(
+            ("mulran/KAIST01", "drives/town_01"),
+            ("mulran/KAIST02", "drives/town_02"),
+            ("kaist", "sessions"),
+        ),
+        after=("own city",),
+        prints=("sessions",),
+    ),
     "own data": Recipe(
         ".venv/bin/cns-eval tcr kitti",
         changes=(("sequences/04", "sequences/02"),),

@@ -1,0 +1,432 @@
+"""Exact labels of two maps of one place: what is gone, new, or not looked at.
+
+Rays decide, cast in the worlds that both drives saw.
+
+- A drive **observes** a point if, from one of its poses, the point is within
+  the LiDAR's ranges, its beams cover the direction, and no surface hides it. A
+  surface hides a point that lies more than `NEAR` behind it along the line of
+  sight; but within `_GRAZING` along that line, only a point that lies more than
+  `_SKIN` behind it, measured across the surface. Thus a wall that has moved a
+  little does not hide its old place: the drive sees that it stands elsewhere.
+- A surface is **there** if it passes within `NEAR` of the point, measured
+  across it. Moving objects are no surfaces.
+
+A point of the older map A is `kept` if B's drive observes it and a surface of
+B's world is there, `gone` if B's drive observes it and none is there, and
+`unobserved` if B's drive does not observe it. A point of the newer map B is
+`kept`, `new` or `newly seen` likewise, by A's drive and A's world. With A and B
+swapped, gone and new swap.
+
+The poses are those of the sessions' scans. Surfaces are ideal: glass and leaves
+are where the geometry has them.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+import itertools
+import os
+from pathlib import Path
+import shutil
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cns_drake.base.drives.drive import Drive, check_same_world
+from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import part_path, user_errors
+from cns_drake.base.process import num_cores
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.scenarios.provenance import (
+    INPUTS_KEY,
+    combined_digest,
+    digest_inputs,
+)
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import load_scenario, map_folder
+from cns_drake.sensors.lidar.patterns import BeamCoverage, BeamPattern
+from cns_drake.simulation.loaded_drive import load_stage
+from cns_drake.simulation.scanning import still_scene
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.studies.map_truth_page import write_page
+from evaluation.drives.sampling import sample_frames
+from evaluation.map_update.sessions import (
+    SIDES,
+    SPACING,
+    Pair,
+    Session,
+    write_labels,
+    write_session,
+)
+from evaluation.map_update.structures import write_structures
+
+# A surface this near to a point is its own [m].
+NEAR = 0.1
+# A surface hides what lies this far behind it, across it [m].
+_SKIN = 0.3
+# Greatest distance along a line in which that holds [m].
+_GRAZING = 1.0
+# Way between the first poses that look [m]: most points are seen from them.
+_FIRST_LOOKS = 32.0
+# Points that are cast on at a time.
+_CHUNK = 1 << 15
+# Sides of the tiles in which points are found, and in which rays to them are
+# neighbours [m].
+_TILE, _FINE = 16.0, 1.0
+# Recorded poses are those of the scenario up to this [m, or without a unit].
+_SAME_POSE = 1e-6
+# One of each two opposite directions to the neighbours of a cube's middle.
+# Every direction is within 28 deg of one of them: a ray of 1.25 times `NEAR`
+# meets any plane within `NEAR`.
+_AXES = np.array(
+    [
+        axis
+        for axis in itertools.product((-1.0, 0.0, 1.0), repeat=3)
+        if axis > (0.0, 0.0, 0.0)
+    ]
+)
+_REACH = 1.25 * NEAR
+
+
+@dataclass(frozen=True)
+class Survey:
+    """One of both drives, with its world.
+
+    Attributes:
+        drive: its scans and poses, recorded or simulated.
+        simulated: the same drive, in its world.
+        scenario: what was simulated.
+    """
+
+    drive: Drive
+    simulated: SimulatedDrive
+    scenario: Scenario
+
+    def still(self) -> RayCastingScene:
+        """Returns its world without the vehicle and moving objects."""
+        if self.scenario.traffic.is_off:
+            # The LiDAR does not see its own vehicle.
+            return self.simulated.look(0)[0]
+        world = load_stage(
+            self.scenario,
+            with_vehicle=False,
+            trajectory=self.simulated.trajectory,
+        )
+        return still_scene(world, self.simulated.pattern)
+
+
+def open_survey(place: str | Path) -> Survey:
+    """Opens a recording of a simulated drive, or simulates a scenario.
+
+    Args:
+        place: a recording, the name of a shipped drive or a scenario's file.
+
+    Raises:
+        InputError: it cannot be used, the points have no instances, or the
+            files of its world have changed since it was recorded.
+    """
+    path = Path(place)
+    if not path.exists() or not holds_mcap(path):
+        scenario = load_scenario(place)
+        simulated = SimulatedDrive(scenario)
+        return Survey(simulated, simulated, scenario)
+    folder = path if path.is_dir() else path.parent
+    if not (folder / "scenario.yaml").is_file():
+        raise InputError(
+            f"{folder}: no scenario.yaml: the geometry of a recording by others"
+            " is not known (cns-eval map-sessions makes its maps)"
+        )
+    drive = McapDrive(path)
+    _check_instances(drive, path)
+    scenario = load_scenario(folder / "scenario.yaml")
+    _check_unchanged(folder, scenario)
+    simulated = SimulatedDrive(scenario)
+    planned = simulated.X_WS[: len(drive)]
+    if planned.shape != drive.X_WS.shape or not np.allclose(
+        planned, drive.X_WS, rtol=0.0, atol=_SAME_POSE
+    ):
+        raise InputError(
+            f"{path}: its poses are not those of its scenario.yaml"
+        )
+    return Survey(drive, simulated, scenario)
+
+
+def write_truth(
+    a: Survey,
+    b: Survey,
+    output: Path,
+    spacing: float = SPACING,
+    track: Track = silent,
+) -> Mapping[str, Counter[int]]:
+    """Writes the maps of two drives with their labels.
+
+    See `evaluation.map_update.sessions` for the files; `structures.csv` and
+    `index.html` show how much of each structure is gone or new.
+
+    Args:
+        a: the older drive.
+        b: the newer drive.
+        output: the folder, new or empty.
+        spacing: length of the way between two scans [m].
+        track: reports progress.
+
+    Returns:
+        Side -> label -> number of points.
+
+    Raises:
+        InputError: the drives are of different worlds, or the folder cannot be
+            written.
+    """
+    check_same_world(a.drive, b.drive)
+    _check_same_map(a, b)
+    with user_errors(output):
+        if output.exists() and (not output.is_dir() or any(output.iterdir())):
+            raise InputError(f"{output}: exists already; give a new folder")
+        output.parent.mkdir(parents=True, exist_ok=True)
+        part = part_path(output)
+        shutil.rmtree(part, ignore_errors=True)
+    try:
+        sessions, frames = [], []
+        for side, survey in zip(SIDES, (a, b), strict=True):
+            session, taken = write_session(
+                survey.drive, part / side, spacing, track
+            )
+            sessions.append(session)
+            frames.append(taken)
+        pair = Pair(*sessions)
+        truth = (
+            label_points(pair.A, b, frames[1], track),
+            label_points(pair.B, a, frames[0], track),
+        )
+        for session, labels in zip(pair, truth, strict=True):
+            write_labels(session.folder / "truth.npy", labels)
+        names = [survey.drive.instances or {} for survey in (a, b)]
+        table = write_structures(part / "structures.csv", pair, truth, names)
+        write_page(
+            part / "index.html",
+            pair,
+            truth,
+            table,
+            (a.drive.name, b.drive.name),
+        )
+        with user_errors(output):
+            if output.exists():
+                output.rmdir()
+            os.replace(part, output)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return {
+        side: Counter(labels.tolist())
+        for side, labels in zip(SIDES, truth, strict=True)
+    }
+
+
+def label_points(
+    session: Session, other: Survey, frames: np.ndarray, track: Track = silent
+) -> np.ndarray:
+    """Returns a label for each point of a map, (N,) uint8.
+
+    Args:
+        session: the map.
+        other: the other drive.
+        frames: (K,) frames of the other drive that look.
+        track: reports progress.
+    """
+    unobserved, kept, changed = SIDES[session.side]
+    labels = np.full(len(session.points), unobserved, np.uint8)
+    seen = observed(session.points, other.simulated, frames, track)
+    rows = np.flatnonzero(seen)
+    there = is_there(session.points[rows], other.still())
+    labels[rows] = np.where(there, kept, changed)
+    return labels
+
+
+def observed(
+    points: np.ndarray,
+    drive: SimulatedDrive,
+    frames: np.ndarray,
+    track: Track = silent,
+) -> np.ndarray:
+    """Returns which points (N, 3) in the world a drive observes, (N,) bool.
+
+    Args:
+        points: in the world [m].
+        drive: the drive that looks.
+        frames: (K,) its frames.
+        track: reports progress.
+    """
+    result = np.zeros(len(points), bool)
+    pattern = drive.pattern
+    coverage = BeamCoverage(pattern.beams(0).d_Sset)
+    tiles = _Tiles(points)
+    first = sample_frames(drive.X_WS[frames, :3, 3], _FIRST_LOOKS)
+    looks = np.concatenate([frames[first], np.delete(frames, first)]).tolist()
+    with ThreadPoolExecutor(num_cores()) as threads:
+        for frame in track(looks, f"looking from {drive.name}", len(looks)):
+            if not pattern.repeats:
+                coverage = BeamCoverage(pattern.beams(frame).d_Sset)
+            near = tiles.near(drive.X_WS[frame, :3, 3], pattern.max_range)
+            if not near:
+                continue
+            look = _Look(*drive.look(frame), pattern, coverage)
+            rows = np.concatenate([tiles.left[tile] for tile in near])
+            for seen in threads.map(
+                lambda chunk, look=look: chunk[look.sees(points[chunk])],
+                list(_chunks(rows)),
+            ):
+                result[seen] = True
+            # Points that are seen already need no more rays.
+            for tile in near:
+                left = tiles.left[tile]
+                tiles.left[tile] = left[~result[left]]
+    return result
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What a LiDAR observes from a place.
+
+    Attributes:
+        scene: the world as it was then.
+        X_WS: pose of the LiDAR.
+        pattern: the pattern of its beams.
+        coverage: what their directions cover.
+    """
+
+    scene: RayCastingScene
+    X_WS: RigidTransform
+    pattern: BeamPattern
+    coverage: BeamCoverage
+
+    def sees(self, points: np.ndarray) -> np.ndarray:
+        """Returns the rows of the observed ones of points (N, 3) in W."""
+        p_WS, R_WS = self.X_WS.translation(), self.X_WS.rotation().matrix()
+        offsets = points - p_WS
+        distances = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
+        rows = np.flatnonzero(
+            (distances >= self.pattern.min_range)
+            & (distances <= self.pattern.max_range)
+        )
+        distances = distances[rows]
+        d_Sset = (offsets[rows] / distances[:, None]) @ R_WS
+        covered = self.coverage.covers(d_Sset)
+        rows, d_Sset = rows[covered], d_Sset[covered]
+        distances = distances[covered]
+        hits = self.scene.cast_rays(p_WS, d_Sset, distances, R_WSset=R_WS)
+        # A miss is infinitely far behind the point.
+        before = distances - hits.ranges
+        is_free = before <= NEAR
+        grazed = np.flatnonzero(~is_free & (before <= _GRAZING))
+        d_Sset = d_Sset[grazed]
+        hits = self.scene.cast_rays(
+            p_WS, d_Sset, distances[grazed], R_WSset=R_WS, with_normals=True
+        )
+        cosines = np.einsum("ij,ij->i", hits.normals_W, d_Sset @ R_WS.T)
+        is_free[grazed] = before[grazed] * np.abs(cosines) <= _SKIN
+        return rows[is_free]
+
+
+class _Tiles:
+    """Points by square tiles of the ground.
+
+    Attributes:
+        left: rows of the points of each tile that are not yet seen.
+    """
+
+    def __init__(self, points: np.ndarray):
+        cells = np.floor(points[:, :2] / _TILE).astype(np.int64)
+        # Rays to neighbours meet the same surfaces, which is fast.
+        fine = np.floor(points / _FINE).astype(np.int64)
+        order = np.lexsort((*fine.T, *cells.T))
+        cells = cells[order]
+        is_first = np.ones(len(points), bool)
+        is_first[1:] = (np.diff(cells, axis=0) != 0).any(axis=1)
+        starts = np.flatnonzero(is_first)
+        self.left = np.split(order, starts[1:])
+        self._middles = _TILE * (cells[starts] + 0.5)
+
+    def near(self, p_WS: np.ndarray, reach: float) -> list[int]:
+        """Returns the tiles with points left within a distance [m]."""
+        away = np.linalg.norm(self._middles - p_WS[:2], axis=1)
+        near = np.flatnonzero(away <= reach + _TILE)
+        return [int(tile) for tile in near if len(self.left[tile])]
+
+
+def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
+    """Returns which points (N, 3) a surface passes within `NEAR`, (N,) bool.
+
+    Args:
+        points: in the world [m].
+        scene: the surfaces.
+    """
+    result = np.zeros(len(points), bool)
+    left = np.arange(len(points))
+    for axis in _AXES / np.linalg.norm(_AXES, axis=1, keepdims=True):
+        for rows in _chunks(left):
+            hits = scene.cast_rays(
+                points[rows] - _REACH * axis,
+                np.broadcast_to(axis, (len(rows), 3)),
+                2.0 * _REACH,
+                with_normals=True,
+            )
+            along = np.abs(np.minimum(hits.ranges, np.float32(9.0)) - _REACH)
+            # The normal of a miss is zero.
+            across = along * np.abs(hits.normals_W @ axis)
+            result[rows] = (hits.geometry >= 0) & (across <= NEAR)
+        left = left[~result[left]]
+    return result
+
+
+def _chunks(rows: np.ndarray) -> Iterator[np.ndarray]:
+    for start in range(0, len(rows), _CHUNK):
+        yield rows[start : start + _CHUNK]
+
+
+def _check_instances(drive: McapDrive, path: Path) -> None:
+    names = drive.scan(0).dtype.names or () if len(drive) else ()
+    if drive.instances is None or not {"label", "instance"} <= set(names):
+        raise InputError(
+            f"{path}: its points have no label and instance; record the drive "
+            "anew"
+        )
+
+
+def _check_unchanged(folder: Path, scenario: Scenario) -> None:
+    """Refuses a recording whose world has changed since.
+
+    Raises:
+        InputError: the digest of its inputs is another one.
+    """
+    metadata = read_yaml(folder / "metadata.yaml")
+    try:
+        data = metadata["rosbag2_bagfile_information"]["custom_data"]
+        recorded = data[INPUTS_KEY]
+    except (TypeError, KeyError):
+        raise InputError(
+            f"{folder / 'metadata.yaml'}: {INPUTS_KEY}: missing: the recording "
+            "does not say which world it shows"
+        ) from None
+    if recorded != combined_digest(digest_inputs(scenario)):
+        raise InputError(
+            f"{folder}: its world ({map_folder(scenario).path}) has changed "
+            "since it was recorded; record the drive anew"
+        )
+
+
+def _check_same_map(a: Survey, b: Survey) -> None:
+    """Refuses surveys of two folders, whose names may be the same.
+
+    Worlds without a map are stages of one place, if the user says so.
+
+    Raises:
+        InputError: they are not of one map.
+    """
+    if (a.scenario.map is None) != (b.scenario.map is None):
+        raise InputError(
+            f"{b.drive.name}: one drive is through a map, the other through a "
+            "world; give two of one place"
+        )

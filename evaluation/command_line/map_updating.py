@@ -1,0 +1,153 @@
+"""Commands on maps that have grown old: `map-update` and `map-sessions`."""
+
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cns_drake.base import terminal
+from evaluation.command_line.options import Json, LidarName, SessionSpacing
+
+
+class BaselineName(str, Enum):
+    FREE_SPACE = "free-space"
+    DISTANCE = "distance"
+    M3C2 = "m3c2"
+
+
+def map_update(
+    folder: Annotated[Path, typer.Argument(metavar="DIR")],
+    baseline: Annotated[
+        BaselineName | None,
+        typer.Option(help="Score this one; free-space without labels."),
+    ] = None,
+    labels_a: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Labels of A's map: 0 unobserved, 1 kept, 2 gone (.npy, or "
+            ".ply with a property prediction).",
+        ),
+    ] = None,
+    labels_b: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Labels of B's map: 1 kept, 3 new, 4 newly seen.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Write the baseline's labels, A and B."
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Score what a map must forget and learn.
+
+    DIR is a folder of cns-drake map-truth, or one with the same files for real
+    drives: A/map.ply, A/truth.npy, B/map.ply, B/truth.npy, and scans and poses
+    for a baseline; 255 in a truth leaves a point out. Scores the labels of a
+    file, or those of a baseline.
+    """
+    from cns_drake.base.errors import InputError
+    from cns_drake.base.files import make_folder
+    from evaluation.map_update.baselines import run_baseline
+    from evaluation.map_update.scores import Labels, score
+    from evaluation.map_update.sessions import (
+        read_labels,
+        read_pair,
+        write_labels,
+    )
+    from evaluation.map_update.structures import class_names
+
+    if (labels_a is None) != (labels_b is None):
+        raise InputError("--labels-a and --labels-b: give both")
+    if labels_a is not None and baseline is not None:
+        raise InputError("--baseline: not together with --labels-a")
+    if output is not None:
+        make_folder(output)
+    pair = read_pair(folder)
+    truth = Labels(
+        *(
+            read_labels(one.folder / "truth.npy", one, truth=True)
+            for one in pair
+        )
+    )
+    name = "labels"
+    if labels_a is not None and labels_b is not None:
+        found = Labels(
+            read_labels(labels_a, pair.A, truth=False),
+            read_labels(labels_b, pair.B, truth=False),
+        )
+    else:
+        name = (baseline or BaselineName.FREE_SPACE).value
+        found = run_baseline(name, pair, terminal.track)
+    if output is not None:
+        for session, labels in zip(pair, found, strict=True):
+            write_labels(output / f"{session.side}.npy", labels)
+    scores = score(pair, truth, found, class_names(folder))
+    if json:
+        terminal.print_json({"method": name, **scores})
+    else:
+        terminal.print_rows(_rows(name, scores))
+
+
+def map_sessions(
+    a: Annotated[Path, typer.Argument(metavar="A")],
+    b: Annotated[Path, typer.Argument(metavar="B")],
+    *,
+    output: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder to write.")
+    ],
+    spacing: SessionSpacing = 1.0,
+    lidar: LidarName = None,
+) -> None:
+    """Maps of two recorded drives.
+
+    Writes maps, scans and poses as cns-drake map-truth does, but no labels: for
+    drives whose world is not known, such as real ones. Both are in one world.
+    """
+    from cns_drake.base.drives.drive import check_same_world
+    from cns_drake.base.errors import InputError
+    from evaluation.drives import open_drive
+    from evaluation.map_update.sessions import SIDES, write_session
+
+    drives = [open_drive(path, lidar) for path in (a, b)]
+    check_same_world(*drives)
+    if output.exists():
+        raise InputError(f"{output}: exists already; give a new folder")
+    for side, drive in zip(SIDES, drives, strict=True):
+        write_session(drive, output / side, spacing, terminal.track)
+    print(output)
+
+
+def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:
+    yield "method", name
+    yield "mean IoU", terminal.number(scores["miou"])
+    for one in ("kept", "gone", "new", "unobserved"):
+        yield f"  {one}", terminal.number(scores[f"iou_{one}"])
+    for title, part in (
+        ("by point", scores),
+        ("within 0.2 m", scores["within_02m"]),
+        ("within 0.5 m", scores["within_05m"]),
+        ("by structure", scores["by_structure"]),
+    ):
+        text = ", ".join(
+            f"{change} {terminal.number(part[f'precision_{change}'])} and "
+            f"{terminal.number(part[f'recall_{change}'])}"
+            for change in ("gone", "new")
+        )
+        yield f"precision and recall {title}", text
+    still = scores["without_vehicles_and_people"]["miou"]
+    yield "mean IoU without vehicles and people", terminal.number(still)
+    updated = scores["updated_map"]
+    yield (
+        "updated map: complete, accurate, Chamfer",
+        f"{terminal.number(updated['completeness'])}, "
+        f"{terminal.number(updated['accuracy'])}, "
+        f"{terminal.number(updated['chamfer'])} m",
+    )

@@ -1,0 +1,225 @@
+"""Baselines that label two maps, without the truth.
+
+- `distance`: a point is kept if the other map has a point within 0.5 m, else
+  gone or new. Nothing is unobserved.
+- `m3c2` (the extra `map-update`; Lague et al., ISPRS J. 82, 2013, in py4dgeo):
+  distance of both maps along the surface's normal. A point is kept if it is
+  less than the level of detection and 0.1 m, gone or new if it is more, and
+  unobserved where a map has no points to measure.
+- `free-space`: cells of 0.2 m are compared with each scan of the other drive. A
+  scan sees past a cell if the surface through the three returns nearest to its
+  direction lies behind it, or if there is no return though the LiDAR looks
+  there. It shows the cell if that surface passes through it. A cell is kept if
+  the other map has a point near it; else gone or new if a scan sees past it;
+  else kept if enough scans show it; else unobserved.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+import importlib
+import os
+from pathlib import Path
+import tempfile
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.process import num_cores
+from cns_drake.base.progress import Track, silent
+from evaluation.drives.sampling import sample_frames
+from evaluation.map_update.scores import Labels, nearest
+from evaluation.map_update.sessions import SIDES, Pair, Session
+from evaluation.recognition.seen_surfaces import SeenSurfaces
+
+# Distance of the baseline of that name [m].
+_APART = 0.5
+# M3C2: radii of the normal's and of the cylinder's neighbourhood, greatest
+# distance, and the smallest one that counts [m].
+_NORMAL, _CYLINDER, _FARTHEST, _LEAST = 1.0, 0.5, 3.0, 0.1
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """Settings of `free-space`, fitted on Metropolis 01 and 04.
+
+    Attributes:
+        cell: side of a cell [m].
+        near: distance of a point of the other map that keeps a cell [m].
+        behind: distance of the surface behind a cell that a scan sees past [m].
+        on: distance of the surface from a cell that a scan shows [m].
+        spacing: way between two scans [m].
+        past: share of the scans that must see past a changed cell, of those
+            that see past it or show it.
+        shown: number of scans that must show a kept cell, as a share of those
+            for which it is hidden.
+    """
+
+    cell: float = 0.2
+    near: float = 0.2
+    behind: float = 0.5
+    on: float = 0.2
+    spacing: float = 2.0
+    past: float = 0.05
+    shown: float = 0.05
+
+
+def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
+    """Returns the labels of a baseline.
+
+    Args:
+        name: one of `BASELINES`.
+        pair: both sessions.
+        track: reports progress.
+
+    Raises:
+        InputError: the sessions lack what it needs, or its package is not
+            installed.
+    """
+    label = BASELINES[name]
+    return Labels(
+        *(
+            label(mine, theirs, track)
+            for mine, theirs in (pair, (pair.B, pair.A))
+        )
+    )
+
+
+def by_distance(
+    mine: Session, theirs: Session, track: Track = silent
+) -> np.ndarray:
+    """Returns labels (N,) of a map by the distance of the other one's."""
+    del track
+    _, kept, changed = SIDES[mine.side]
+    far = np.isinf(nearest(mine.points, theirs.points, _APART))
+    return np.where(far, changed, kept).astype(np.uint8)
+
+
+def by_free_space(
+    mine: Session,
+    theirs: Session,
+    track: Track = silent,
+    settings: FreeSpace | None = None,
+) -> np.ndarray:
+    """Returns labels (N,) of a map by what the other's scans see."""
+    settings = settings or FreeSpace()
+    unobserved, kept, changed = SIDES[mine.side]
+    _check_scans(theirs)
+    cells = np.floor(mine.points / settings.cell).astype(np.int64)
+    _, first, cell_of = np.unique(
+        cells, axis=0, return_index=True, return_inverse=True
+    )
+    past, shown, hidden = _count_views(
+        mine.points[first], theirs, settings, track
+    )
+    is_shown = (shown > 0) & (shown >= settings.shown * hidden)
+    labels = np.where(is_shown, kept, unobserved)
+    is_past = (past > 0) & (past > settings.past * (past + shown))
+    labels = np.where(is_past, changed, labels)[cell_of.ravel()]
+    near = np.isfinite(nearest(mine.points, theirs.points, settings.near))
+    labels[near] = kept
+    return labels.astype(np.uint8)
+
+
+def _count_views(
+    points: np.ndarray, other: Session, settings: FreeSpace, track: Track
+) -> np.ndarray:
+    """Returns how many scans see past points (N, 3), show and hide them.
+
+    Returns:
+        (3, N).
+    """
+    counts = np.zeros((3, len(points)), np.int32)
+    chosen = sample_frames(other.X_WS[:, :3, 3], settings.spacing).tolist()
+    # The LiDAR looks between its lowest and its highest return, as far as its
+    # farthest.
+    some = chosen[:: max(len(chosen) // 20, 1)]
+    scans = [other.scan(number) for number in some]
+    returns = np.concatenate([np.zeros((0, 3)), *scans])
+    if len(returns) == 0:
+        return counts
+    slopes = _slopes(returns)
+    low, high = slopes.min(), slopes.max()
+    reach = np.linalg.norm(returns, axis=1).max()
+
+    def look(number: int) -> list[np.ndarray]:
+        X_WS = other.X_WS[number]
+        offsets = points - X_WS[:3, 3]
+        squares = np.einsum("ij,ij->i", offsets, offsets)
+        rows = np.flatnonzero(squares <= reach**2)
+        p_S = offsets[rows] @ X_WS[:3, :3]
+        slopes = _slopes(p_S)
+        inside = (slopes >= low) & (slopes <= high)
+        rows, p_S = rows[inside], p_S[inside]
+        found = SeenSurfaces.of(other.scan(number)).clearances(p_S)
+        return [
+            rows[found > settings.behind],
+            rows[np.abs(found) <= settings.on],
+            rows[found < -settings.on],
+        ]
+
+    with ThreadPoolExecutor(num_cores()) as threads:
+        found = threads.map(look, chosen)
+        what = f"free space of {other.side}"
+        for kinds in track(found, what, len(chosen)):
+            for count, rows in zip(counts, kinds, strict=True):
+                count[rows] += 1
+    return counts
+
+
+def _slopes(p_S: np.ndarray) -> np.ndarray:
+    return p_S[:, 2] / np.maximum(np.hypot(p_S[:, 0], p_S[:, 1]), 1e-9)
+
+
+def by_m3c2(
+    mine: Session, theirs: Session, track: Track = silent
+) -> np.ndarray:
+    """Returns labels (N,) of a map by M3C2 of py4dgeo."""
+    del track
+    py4dgeo = _py4dgeo()
+    unobserved, kept, changed = SIDES[mine.side]
+    epochs = [py4dgeo.Epoch(one.points) for one in (mine, theirs)]
+    compare = py4dgeo.M3C2(
+        epochs=tuple(epochs),
+        corepoints=mine.points,
+        normal_radii=[_NORMAL],
+        cyl_radius=_CYLINDER,
+        max_distance=_FARTHEST,
+    )
+    distances, uncertainties = compare.run()
+    least = np.maximum(np.nan_to_num(uncertainties["lodetection"]), _LEAST)
+    labels = np.where(np.abs(distances) > least, changed, kept)
+    labels[np.isnan(distances)] = unobserved
+    return labels.astype(np.uint8)
+
+
+BASELINES: dict[str, Callable[[Session, Session, Track], np.ndarray]] = {
+    "free-space": by_free_space,
+    "distance": by_distance,
+    "m3c2": by_m3c2,
+}
+
+
+def _check_scans(session: Session) -> None:
+    if len(session.X_WS) == 0:
+        raise InputError(
+            f"{session.folder}: no poses.txt and Scans; this baseline needs "
+            "them"
+        )
+
+
+def _py4dgeo() -> Any:
+    here = Path.cwd()
+    try:
+        # Its import leaves a log in the current folder.
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            return importlib.import_module("py4dgeo")
+    except ImportError:
+        raise InputError(
+            "--baseline: m3c2 needs py4dgeo; pip install "
+            "'cns-drake[map-update]'"
+        ) from None
+    finally:
+        os.chdir(here)

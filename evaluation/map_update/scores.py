@@ -1,0 +1,287 @@
+"""Scores of labels of two maps against the truth. Points count, not voxels.
+
+IoU of a class is that of the points that have it by truth and by prediction,
+in both maps together: `unobserved` includes what B sees newly. A class that
+neither has is left out of the mean, `miou`.
+
+Precision and recall of gone (in A) and new (in B) are those of points; within
+0.2 m and 0.5 m, a point is right if a point of the other set lies that near;
+by structure, those of structures, see `structures.verdicts`.
+
+The updated map is A without what is predicted gone, with what is predicted new
+or newly seen in B. Its completeness is the share of B's map within 0.2 m of it,
+its accuracy the share of its own points that B's drive observed (by truth)
+within 0.2 m of B's map, its Chamfer distance the mean of both mean distances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import json_number
+from evaluation.map_update.sessions import SIDES, Label, Pair, Session
+from evaluation.map_update.structures import verdicts
+
+_CLASSES = {
+    "kept": (Label.KEPT,),
+    "gone": (Label.GONE,),
+    "new": (Label.NEW,),
+    "unobserved": (Label.UNOBSERVED, Label.NEWLY_SEEN),
+}
+_CHANGES = {"gone": ("A", Label.GONE), "new": ("B", Label.NEW)}
+_TOLERANCES = {"within_02m": 0.2, "within_05m": 0.5}
+# Limits of distances from the other drive [m].
+_DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
+
+
+class Labels(NamedTuple):
+    """Labels of both maps, (N,) and (M,)."""
+
+    A: np.ndarray
+    B: np.ndarray
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Numbers of points of each true and each predicted class.
+
+    Attributes:
+        table: (4, 4) by truth and by prediction, in the order of the names of
+            IoUs.
+    """
+
+    table: np.ndarray
+
+    def iou(self) -> dict[str, float]:
+        """Returns the IoU of each class, NaN if it is nowhere, and the mean."""
+        right = np.diag(self.table)
+        union = self.table.sum(axis=0) + self.table.sum(axis=1) - right
+        values = [_ratio(n, d) for n, d in zip(right, union, strict=True)]
+        known = [value for value in values if not math.isnan(value)]
+        mean = sum(known) / len(known) if known else math.nan
+        names = (f"iou_{name}" for name in _CLASSES)
+        return {"miou": mean, **dict(zip(names, values, strict=True))}
+
+    def changes(self) -> dict[str, float]:
+        """Returns precision and recall of gone and of new."""
+        found = {}
+        for name in _CHANGES:
+            k = list(_CLASSES).index(name)
+            right = self.table[k, k]
+            found[f"precision_{name}"] = _ratio(right, self.table[:, k].sum())
+            found[f"recall_{name}"] = _ratio(right, self.table[k].sum())
+        return found
+
+
+def score(
+    pair: Pair, truth: Labels, predicted: Labels, names: Mapping[int, str]
+) -> dict:
+    """Returns all scores, ready for JSON; None where one is undefined.
+
+    Args:
+        pair: both maps.
+        truth: their true labels.
+        predicted: the labels to score.
+        names: class -> its name.
+
+    Raises:
+        InputError: the truth leaves out every point.
+    """
+    counted = [labels != Label.IGNORED for labels in truth]
+    if not any(rows.any() for rows in counted):
+        raise InputError(f"{pair.A.folder.parent}: no point has a true label")
+    still = [
+        rows & ~session.moves
+        for rows, session in zip(counted, pair, strict=True)
+    ]
+    result: dict = _of_points(truth, predicted, counted)
+    result["points"] = int(sum(rows.sum() for rows in counted))
+    result["without_vehicles_and_people"] = _of_points(truth, predicted, still)
+    for name, distance in _TOLERANCES.items():
+        result[name] = _within(pair, truth, predicted, counted, distance)
+    result["by_structure"] = _by_structure(pair, truth, predicted, counted)
+    result["updated_map"] = _updated_map(pair, truth, predicted, counted)
+    result["by_class"] = {
+        name: _of_points(
+            truth,
+            predicted,
+            [
+                rows & (session.classes == number)
+                for rows, session in zip(counted, pair, strict=True)
+            ],
+        )
+        for number, name in _classes(pair, names)
+    }
+    result["by_distance"] = _by_distance(pair, truth, predicted, counted)
+    return _as_json(result)
+
+
+def _of_points(
+    truth: Labels, predicted: Labels, counted: list[np.ndarray]
+) -> dict[str, float]:
+    counts = _count(truth, predicted, counted)
+    return {**counts.iou(), **counts.changes()}
+
+
+def _count(
+    truth: Labels, predicted: Labels, counted: list[np.ndarray]
+) -> Counts:
+    code = np.zeros(256, np.int64)
+    for k, labels in enumerate(_CLASSES.values()):
+        code[list(labels)] = k
+    size = len(_CLASSES)
+    table = np.zeros(size * size, np.int64)
+    for true, found, rows in zip(truth, predicted, counted, strict=True):
+        cells = size * code[true[rows]] + code[found[rows]]
+        table += np.bincount(cells, minlength=size * size)
+    return Counts(table.reshape(size, size))
+
+
+def _within(
+    pair: Pair,
+    truth: Labels,
+    predicted: Labels,
+    counted: list[np.ndarray],
+    distance: float,
+) -> dict[str, float]:
+    """Returns precision and recall of changed points up to a distance [m]."""
+    found = {}
+    for k, (name, (_, label)) in enumerate(_CHANGES.items()):
+        points = pair[k].points
+        true = points[counted[k] & (truth[k] == label)]
+        guessed = points[counted[k] & (predicted[k] == label)]
+        found[f"precision_{name}"] = _share_near(guessed, true, distance)
+        found[f"recall_{name}"] = _share_near(true, guessed, distance)
+    return found
+
+
+def _share_near(
+    points: np.ndarray, others: np.ndarray, distance: float
+) -> float:
+    """Returns the share of points (N, 3) with one of others this near."""
+    if len(points) == 0:
+        return math.nan
+    if len(others) == 0:
+        return 0.0
+    found = nearest(points, others, distance)
+    return float(np.mean(np.isfinite(found)))
+
+
+def nearest(
+    points: np.ndarray, others: np.ndarray, most: float = math.inf
+) -> np.ndarray:
+    """Returns the distance (N,) to the nearest of others; inf beyond `most`.
+
+    Args:
+        points: (N, 3).
+        others: (M, 3).
+        most: greatest distance [m].
+    """
+    if len(others) == 0:
+        return np.full(len(points), math.inf)
+    return KDTree(others, balanced_tree=False).query(
+        points, distance_upper_bound=most, workers=-1
+    )[0]
+
+
+def _by_structure(
+    pair: Pair,
+    truth: Labels,
+    predicted: Labels,
+    counted: list[np.ndarray],
+) -> dict[str, float]:
+    found = {}
+    for k, (name, (side, label)) in enumerate(_CHANGES.items()):
+        true, guessed = (
+            verdicts(pair[k].instances[counted[k]], one[k][counted[k]], side)[2]
+            == label
+            for one in (truth, predicted)
+        )
+        right = (true & guessed).sum()
+        found[f"precision_{name}"] = _ratio(right, guessed.sum())
+        found[f"recall_{name}"] = _ratio(right, true.sum())
+        found[name] = int(true.sum())
+    return found
+
+
+def _updated_map(
+    pair: Pair,
+    truth: Labels,
+    predicted: Labels,
+    counted: list[np.ndarray],
+) -> dict[str, float]:
+    stays = counted[0] & (predicted.A != Label.GONE)
+    comes = counted[1] & (predicted.B != Label.KEPT)
+    observed = stays & (truth.A != Label.UNOBSERVED)
+    target = pair.B.points[counted[1]]
+    updated = np.concatenate([pair.A.points[stays], pair.B.points[comes]])
+    # What B adds lies on B's map.
+    own = np.concatenate(
+        [nearest(pair.A.points[observed], target), np.zeros(comes.sum())]
+    )
+    other = nearest(target, updated)
+    tolerance = _TOLERANCES["within_02m"]
+    if len(own) == 0 or len(other) == 0:
+        return dict.fromkeys(("completeness", "accuracy", "chamfer"), math.nan)
+    chamfer = 0.5 * (own.mean() + other.mean())
+    return {
+        "completeness": float(np.mean(other <= tolerance)),
+        "accuracy": float(np.mean(own <= tolerance)),
+        "chamfer": float(chamfer) if math.isfinite(chamfer) else math.nan,
+    }
+
+
+def _by_distance(
+    pair: Pair, truth: Labels, predicted: Labels, counted: list[np.ndarray]
+) -> dict:
+    """Returns scores by the distance from the other drive."""
+    if not (len(pair.A.X_WS) and len(pair.B.X_WS)):
+        return {}
+    away = [
+        nearest(mine.points, theirs.X_WS[:, :3, 3])
+        for mine, theirs in (pair, pair[::-1])
+    ]
+    found = {}
+    for low, high in itertools.pairwise(_DISTANCES):
+        rows = [
+            one & (far >= low) & (far < high)
+            for one, far in zip(counted, away, strict=True)
+        ]
+        if any(one.any() for one in rows):
+            end = "" if math.isinf(high) else f"{high:g}"
+            found[f"{low:g}-{end}"] = _of_points(truth, predicted, rows)
+    return found
+
+
+def _classes(pair: Pair, names: Mapping[int, str]) -> Iterator[tuple[int, str]]:
+    found = np.unique(np.concatenate([one.classes for one in pair]))
+    for number in found.tolist():
+        yield number, names.get(number, str(number))
+
+
+def _ratio(numerator: float, denominator: float) -> float:
+    return float(numerator / denominator) if denominator else math.nan
+
+
+def _as_json(value: object) -> dict:
+    def convert(one: object) -> object:
+        if isinstance(one, dict):
+            return {key: convert(part) for key, part in one.items()}
+        return json_number(one) if isinstance(one, float) else one
+
+    converted = convert(value)
+    assert isinstance(converted, dict)
+    return converted
+
+
+def all_kept(session: Session) -> np.ndarray:
+    """Returns labels (N,) that call every point kept."""
+    return np.full(len(session.points), SIDES[session.side][1], np.uint8)

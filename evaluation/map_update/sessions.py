@@ -1,0 +1,382 @@
+"""Two drives of one place as maps, with labels for each point.
+
+A folder holds the older drive as `A` and the newer one as `B`. Each has
+
+- `map.ply`: the merged map in the world, one point for each 0.1 m, with `x`,
+  `y`, `z` [m], and, where they are known, `label` (class, SemanticKITTI's ids)
+  and `instance` (number of a structure),
+- `truth.npy`: a label for each point of the map, see `Label`,
+- `Scans/000000.pcd` and on: the scans in the frame of the LiDAR,
+- `poses.txt`: a row for each scan, the upper 3 x 4 of the LiDAR's pose in the
+  world, and `singlesession_posegraph.g2o`, the same as a pose graph.
+
+Scans and poses have the layout that ELite and LT-mapper read.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing, user_errors
+from cns_drake.base.points import encode_pcd, xyz
+from cns_drake.base.progress import Track, silent
+from evaluation.clouds.cloud_files import read_blocks, read_cloud
+from evaluation.drives.sampling import sample_frames
+
+# Side of the cells that keep a point each [m].
+THINNED = 0.1
+# Length of the way between two scans [m].
+SPACING = 1.0
+_MAP_DTYPE = np.dtype(
+    [
+        ("x", "<f8"),
+        ("y", "<f8"),
+        ("z", "<f8"),
+        ("label", "<u2"),
+        ("instance", "<u2"),
+    ]
+)
+_PLY_TYPES = {"f8": "double", "u2": "ushort"}
+# Greatest number of arrays of cells that are searched one by one.
+_MOST_PARTS = 8
+# Cells are numbered by 21 bits for each axis.
+_BITS = 21
+# Moving things, as SemanticKITTI numbers them, and what can drive away.
+_MOVING = range(252, 260)
+_PARKED = (10, 11, 13, 15, 18, 20)
+
+
+class Label(IntEnum):
+    """What became of a point; A's are 0, 1, 2 and B's are 1, 3, 4.
+
+    IGNORED is for labels that a user brings: the point is left out of scores.
+    """
+
+    UNOBSERVED = 0
+    KEPT = 1
+    GONE = 2
+    NEW = 3
+    NEWLY_SEEN = 4
+    IGNORED = 255
+
+
+# Labels of each side: unobserved, kept, changed.
+SIDES = {
+    "A": (Label.UNOBSERVED, Label.KEPT, Label.GONE),
+    "B": (Label.NEWLY_SEEN, Label.KEPT, Label.NEW),
+}
+
+
+@dataclass(frozen=True)
+class Session:
+    """One of both drives.
+
+    Attributes:
+        folder: of its files.
+        points: (N, 3) its map in the world [m].
+        classes: (N,) uint16, SemanticKITTI's ids; 0 if unknown.
+        instances: (N,) uint16, number of a structure; 0 for none.
+        X_WS: (K, 4, 4) poses of its scans; (0, 4, 4) if unknown.
+    """
+
+    folder: Path
+    points: np.ndarray
+    classes: np.ndarray
+    instances: np.ndarray
+    X_WS: np.ndarray
+
+    @property
+    def side(self) -> str:
+        return self.folder.name
+
+    @property
+    def moves(self) -> np.ndarray:
+        """(N,) bool, points of moving and of parked vehicles and people."""
+        return np.isin(self.classes, [*_MOVING, *_PARKED, 30, 31, 32])
+
+    def scan(self, index: int) -> np.ndarray:
+        """Returns a scan (M, 3) in the frame of the LiDAR [m].
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        scan = xyz(read_cloud(self.folder / "Scans" / _scan_name(index)))
+        return scan[np.isfinite(scan).all(axis=1)]
+
+
+class MapBuilder:
+    """Merges scans into a map with one point in each cell of 0.1 m.
+
+    The first point of a cell stays as it is: a mean would lie beside the
+    surface.
+    """
+
+    def __init__(self, origin: np.ndarray):
+        """Starts an empty map; the origin (3,) is near to all points [m]."""
+        self._origin = np.floor(origin / THINNED) - (1 << (_BITS - 1))
+        self._parts: list[np.ndarray] = []
+        self._points: list[np.ndarray] = []
+
+    def add(self, scan: np.ndarray, X_WS: np.ndarray) -> None:
+        """Adds a scan: structured (N,), from a LiDAR at the pose (4, 4)."""
+        points = np.zeros(len(scan), _MAP_DTYPE)
+        p_W = poses.transform(X_WS, xyz(scan))
+        for column, name in enumerate("xyz"):
+            points[name] = p_W[:, column]
+        for name in ("label", "instance"):
+            if name in (scan.dtype.names or ()):
+                points[name] = scan[name]
+        cells = np.floor(p_W / THINNED) - self._origin
+        with np.errstate(invalid="ignore"):
+            inside = ((cells >= 0) & (cells < 1 << _BITS)).all(axis=1)
+        numbers = cells[inside].astype(np.int64)
+        keys = (
+            numbers[:, 0] << (2 * _BITS) | numbers[:, 1] << _BITS
+        ) | numbers[:, 2]
+        keys, first = np.unique(keys, return_index=True)
+        is_new = np.ones(len(keys), bool)
+        for part in self._parts:
+            places = np.minimum(np.searchsorted(part, keys), len(part) - 1)
+            is_new &= part[places] != keys
+        if not is_new.any():
+            return
+        # The scans' order decides on that of the points.
+        self._points.append(points[inside][np.sort(first[is_new])])
+        self._parts.append(keys[is_new])
+        while len(self._parts) > _MOST_PARTS or (
+            len(self._parts) > 1
+            and len(self._parts[-2]) < 2 * len(self._parts[-1])
+        ):
+            last = self._parts.pop()
+            self._parts[-1] = np.union1d(self._parts[-1], last)
+
+    def points(self) -> np.ndarray:
+        """Returns the map: structured (N,) x, y, z [m], label, instance."""
+        return np.concatenate([np.zeros(0, _MAP_DTYPE), *self._points])
+
+
+def write_session(
+    drive: Drive,
+    folder: Path,
+    spacing: float = SPACING,
+    track: Track = silent,
+) -> tuple[Session, np.ndarray]:
+    """Writes map, scans and poses of a drive.
+
+    Args:
+        drive: the drive.
+        folder: the session's; it is made.
+        spacing: length of the way between two scans [m].
+        track: reports progress.
+
+    Returns:
+        The session, and the frames (K,) of the drive that are its scans.
+
+    Raises:
+        InputError: a scan cannot be read, or a file not be written.
+    """
+    frames = sample_frames(drive.X_WS[:, :3, 3], spacing)
+    X_WS = drive.X_WS[frames]
+    builder = MapBuilder(X_WS[0, :3, 3])
+    with user_errors(folder):
+        (folder / "Scans").mkdir(parents=True)
+        for number, frame in enumerate(
+            track(frames.tolist(), f"mapping {drive.name}", len(frames))
+        ):
+            scan = drive.scan(frame)
+            builder.add(scan, X_WS[number])
+            if "intensity" not in (scan.dtype.names or ()):
+                scan = _without_intensity(scan)
+            path = folder / "Scans" / _scan_name(number)
+            path.write_bytes(encode_pcd(scan))
+        rows = X_WS[:, :3].reshape(-1, 12)
+        (folder / "poses.txt").write_text(
+            "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+        )
+        (folder / "singlesession_posegraph.g2o").write_text(_g2o(X_WS))
+        points = builder.points()
+        _write_ply(folder / "map.ply", points)
+    return _session(folder, points, X_WS), frames
+
+
+def read_session(folder: Path) -> Session:
+    """Reads a session; labels, instances and poses may be missing.
+
+    Raises:
+        InputError: there is no map, or a file cannot be read.
+    """
+    path = folder / "map.ply"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; a session needs its map")
+    points = np.concatenate(list(read_blocks(path)))
+    if not np.isfinite(xyz(points)).all():
+        raise InputError(f"{path}: a coordinate is not finite")
+    file = folder / "poses.txt"
+    X_WS = np.zeros((0, 4, 4))
+    if file.is_file():
+        X_WS = _read_poses(file)
+        scans = len(list((folder / "Scans").glob("*.pcd")))
+        if scans != len(X_WS):
+            raise InputError(f"{file}: {len(X_WS)} poses for {scans} scans")
+    return _session(folder, points, X_WS)
+
+
+def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
+    """Reads labels of a session's points.
+
+    Args:
+        path: an array `.npy` of integers, or a cloud `.ply` with a property
+            `truth`, `change` or `prediction` for each point.
+        session: the labelled one.
+        truth: whether points may be left out, as IGNORED.
+
+    Returns:
+        (N,) uint8.
+
+    Raises:
+        InputError: the file cannot be read, or has the wrong length or values.
+    """
+    labels = _read_array(path)
+    count = len(session.points)
+    if labels.ndim != 1 or labels.dtype.kind not in "iub":
+        raise InputError(f"{path}: not one whole number for each point")
+    if len(labels) != count:
+        raise InputError(
+            f"{path}: {len(labels)} labels for the {count} points of "
+            f"{session.folder / 'map.ply'}"
+        )
+    allowed = [*SIDES[session.side], *([Label.IGNORED] if truth else [])]
+    wrong = ~np.isin(labels, allowed)
+    if wrong.any():
+        place = int(wrong.argmax())
+        names = ", ".join(f"{int(one)} {one.name.lower()}" for one in allowed)
+        raise InputError(
+            f"{path}: point {place} has the label {labels[place]}; those of "
+            f"{session.side} are {names}"
+        )
+    return labels.astype(np.uint8)
+
+
+def write_labels(path: Path, labels: np.ndarray) -> None:
+    """Writes labels (N,) as a NumPy array of uint8."""
+    with completing(path) as part, open(part, "wb") as stream:
+        np.save(stream, labels.astype(np.uint8))
+
+
+def _read_array(path: Path) -> np.ndarray:
+    if path.suffix == ".ply":
+        points = np.concatenate(list(read_blocks(path)))
+        for name in ("truth", "change", "prediction"):
+            if name in (points.dtype.names or ()):
+                return points[name]
+        raise InputError(f"{path}: no property truth, change or prediction")
+    try:
+        labels = np.load(path, allow_pickle=False)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    except Exception as error:
+        # NumPy evaluates the header as Python, and can raise any error.
+        raise InputError(f"{path}: not a NumPy array ({error})") from error
+    if not isinstance(labels, np.ndarray):
+        raise InputError(f"{path}: an archive instead of one array")
+    return labels
+
+
+def _session(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
+    columns = {}
+    for name in ("label", "instance"):
+        columns[name] = np.zeros(len(points), np.uint16)
+        if name in (points.dtype.names or ()):
+            columns[name] = points[name].astype(np.uint16)
+    return Session(
+        folder, xyz(points), columns["label"], columns["instance"], X_WS
+    )
+
+
+def _scan_name(number: int) -> str:
+    return f"{number:06d}.pcd"
+
+
+def _without_intensity(scan: np.ndarray) -> np.ndarray:
+    plain = np.zeros(len(scan), [(n, "<f4") for n in (*"xyz", "intensity")])
+    for name in "xyz":
+        plain[name] = scan[name]
+    return plain
+
+
+def _write_ply(path: Path, points: np.ndarray) -> None:
+    lines = ["ply", "format binary_little_endian 1.0"]
+    lines.append(f"element vertex {len(points)}")
+    for name in points.dtype.names or ():
+        kind = _PLY_TYPES[points.dtype[name].str[1:]]
+        lines.append(f"property {kind} {name}")
+    header = "\n".join([*lines, "end_header\n"]).encode()
+    with completing(path) as part, open(part, "wb") as stream:
+        stream.write(header)
+        stream.write(points.tobytes())
+
+
+def _g2o(X_WS: np.ndarray) -> str:
+    """Returns poses (K, 4, 4) as a graph of steps, for LT-mapper."""
+    steps = poses.inverse(X_WS[:-1]) @ X_WS[1:]
+    information = " ".join(
+        "1" if i == j else "0" for i in range(6) for j in range(i, 6)
+    )
+    vertices = (
+        f"VERTEX_SE3:QUAT {k} {row}" for k, row in enumerate(_rows(X_WS))
+    )
+    edges = (
+        f"EDGE_SE3:QUAT {k} {k + 1} {row} {information}"
+        for k, row in enumerate(_rows(steps))
+    )
+    return "\n".join([*vertices, *edges, ""])
+
+
+def _rows(X: np.ndarray) -> Iterable[str]:
+    if len(X) == 0:
+        return []
+    quat_xyzw = Rotation.from_matrix(X[:, :3, :3]).as_quat(canonical=True)
+    numbers = np.hstack([X[:, :3, 3], quat_xyzw]).tolist()
+    return [" ".join(map(repr, row)) for row in numbers]
+
+
+def _read_poses(path: Path) -> np.ndarray:
+    """Returns (K, 4, 4) poses of a file with twelve numbers in a row."""
+    try:
+        rows = np.loadtxt(path, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: {error}") from error
+    if rows.ndim != 2 or rows.shape[1] != 12 or not np.isfinite(rows).all():
+        raise InputError(f"{path}: not twelve numbers in each row")
+    X = np.tile(np.eye(4), (len(rows), 1, 1))
+    X[:, :3] = rows.reshape(-1, 3, 4)
+    return X
+
+
+class Pair(NamedTuple):
+    """Both sessions of a folder."""
+
+    A: Session
+    B: Session
+
+
+def read_pair(folder: Path) -> Pair:
+    """Reads both sessions of a folder.
+
+    Raises:
+        InputError: one of them is missing or cannot be read.
+    """
+    for side in SIDES:
+        if not (folder / side).is_dir():
+            raise InputError(
+                f"{folder}: no folder {side}; cns-drake map-truth makes both"
+            )
+    return Pair(*(read_session(folder / side) for side in SIDES))

@@ -1,0 +1,134 @@
+"""How much of each structure changed, and a verdict for the whole."""
+
+from collections.abc import Mapping, Sequence
+import csv
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.files import completing
+from evaluation.map_update.sessions import SIDES, Pair
+
+
+@dataclass(frozen=True)
+class StructureChange:
+    """A structure in one of both maps.
+
+    Attributes:
+        side: A or B.
+        instance: its number there.
+        structure: its name; empty if unknown.
+        semantic_class: its class; empty if unknown.
+        label: the class as a number.
+        points: number of its points in the map.
+        observed: how many of them the other drive observed.
+        changed: how many of these are gone, or new.
+        verdict: gone (A) or new (B) if most of the observed points are, else
+            kept; unobserved or newly_seen without an observed point.
+    """
+
+    side: str
+    instance: int
+    structure: str
+    semantic_class: str
+    label: int
+    points: int
+    observed: int
+    changed: int
+    verdict: str
+
+
+def verdicts(
+    instances: np.ndarray, labels: np.ndarray, side: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns what became of the structures of a map.
+
+    Args:
+        instances: (N,) number of the structure of each point; 0 for none.
+        labels: (N,) see `Label`.
+        side: A or B.
+
+    Returns:
+        (S,) numbers of the structures; (S, 3) their points in all, observed
+        and changed; (S,) a verdict each, as a `Label`.
+    """
+    unobserved, kept, changed = SIDES[side]
+    rows = np.flatnonzero(instances)
+    numbers, places = np.unique(instances[rows], return_inverse=True)
+    count = np.zeros((len(numbers), 3), np.int64)
+    for column, chosen in enumerate(
+        (
+            np.ones(len(rows), bool),
+            np.isin(labels[rows], (kept, changed)),
+            labels[rows] == changed,
+        )
+    ):
+        count[:, column] = np.bincount(places[chosen], minlength=len(numbers))
+    found = np.where(2 * count[:, 2] > count[:, 1], changed, kept)
+    return numbers, count, np.where(count[:, 1] == 0, unobserved, found)
+
+
+def write_structures(
+    path: Path,
+    pair: Pair,
+    truth: Sequence[np.ndarray],
+    tables: Sequence[Mapping[int, Mapping]],
+) -> list[StructureChange]:
+    """Writes the table of structures of both maps, and returns its rows.
+
+    Args:
+        path: of the CSV file.
+        pair: both sessions.
+        truth: labels of each.
+        tables: instance -> name and class, of each.
+    """
+    rows = []
+    for session, labels, names in zip(pair, truth, tables, strict=True):
+        numbers, counts, found = verdicts(
+            session.instances, labels, session.side
+        )
+        kinds = {label: label.name.lower() for label in SIDES[session.side]}
+        for number, count, verdict in zip(
+            numbers.tolist(), counts.tolist(), found.tolist(), strict=True
+        ):
+            entry = names.get(number, {})
+            rows.append(
+                StructureChange(
+                    session.side,
+                    number,
+                    str(entry.get("name", "")),
+                    str(entry.get("class", "")),
+                    int(entry.get("label", 0)),
+                    *count,
+                    kinds[verdict],
+                )
+            )
+    with (
+        completing(path) as part,
+        open(part, "w", newline="", encoding="utf-8") as stream,
+    ):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(
+            field.name.replace("semantic_class", "class")
+            for field in fields(StructureChange)
+        )
+        writer.writerows(map(astuple, rows))
+    return rows
+
+
+def class_names(folder: Path) -> dict[int, str]:
+    """Returns the names of classes by number, of a table in a folder, if any.
+
+    Raises:
+        InputError: the table cannot be read.
+    """
+    path = folder / "structures.csv"
+    if not path.is_file():
+        return {}
+    return {
+        int(row["label"]): row["class"]
+        for _, row in read_records(path, ("label", "class"))
+        if row["label"].isdecimal()
+    }

@@ -1,0 +1,245 @@
+"""Sessions, baselines and scores on small clouds with counted answers."""
+
+import importlib.util
+import json
+
+from helpers.eval_program import assert_refused, run
+import numpy as np
+import pytest
+
+from evaluation.map_update.baselines import by_distance, by_free_space
+from evaluation.map_update.scores import Labels, all_kept, score
+from evaluation.map_update.sessions import (
+    THINNED,
+    Label,
+    MapBuilder,
+    read_pair,
+    read_session,
+    write_labels,
+)
+from evaluation.map_update.structures import verdicts
+
+
+def write_map(folder, points):
+    """Writes a map by another program's means: text, coordinates only."""
+    folder.mkdir(parents=True)
+    rows = "\n".join(" ".join(map(repr, row)) for row in points.tolist())
+    (folder / "map.ply").write_text(
+        f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"end_header\n{rows}\n"
+    )
+
+
+def clouds(folder, seed=3, size=400):
+    """Two maps of random points with random labels; returns pair and truth."""
+    rng = np.random.default_rng(seed)
+    truth = []
+    for side, labels in (("A", [0, 1, 2]), ("B", [1, 3, 4])):
+        write_map(folder / side, rng.uniform(0.0, 9.0, (size, 3)))
+        chosen = rng.choice(labels, size).astype(np.uint8)
+        write_labels(folder / side / "truth.npy", chosen)
+        truth.append(chosen)
+    return read_pair(folder), Labels(*truth)
+
+
+def test_the_truth_scores_one(tmp_path):
+    pair, truth = clouds(tmp_path)
+    found = score(pair, truth, truth, {})
+    assert found["miou"] == 1.0
+    for part in (found, found["within_02m"], found["within_05m"]):
+        for change in ("gone", "new"):
+            assert part[f"precision_{change}"] == 1.0
+            assert part[f"recall_{change}"] == 1.0
+
+
+def test_all_kept_scores_what_counting_says(tmp_path):
+    pair, truth = clouds(tmp_path)
+    found = score(pair, truth, Labels(*map(all_kept, pair)), {})
+    kept = sum(int((labels == 1).sum()) for labels in truth)
+    assert found["iou_kept"] == kept / 800
+    for name in ("gone", "new", "unobserved"):
+        assert found[f"iou_{name}"] == 0.0
+    assert found["miou"] == kept / 800 / 4.0
+    assert found["recall_gone"] == found["recall_new"] == 0.0
+    assert found["precision_gone"] is None
+
+
+def test_scores_are_those_of_sets(tmp_path):
+    pair, truth = clouds(tmp_path)
+    _, guess = clouds(tmp_path / "other", seed=8)
+    found = score(pair, truth, guess, {})
+    sets = [
+        {(side, i) for side in (0, 1) for i in np.flatnonzero(t[side] == 2)}
+        for t in (truth, guess)
+    ]
+    common = len(sets[0] & sets[1])
+    assert found["iou_gone"] == common / len(sets[0] | sets[1])
+    assert found["precision_gone"] == common / len(sets[1])
+    assert found["recall_gone"] == common / len(sets[0])
+    # By distance, by brute force.
+    points = pair.A.points
+    true, guessed = (points[sorted(i for _, i in one)] for one in sets)
+    apart = np.linalg.norm(true[:, None] - guessed[None], axis=2)
+    near = found["within_05m"]
+    assert near["recall_gone"] == np.mean(apart.min(axis=1) <= 0.5)
+    assert near["precision_gone"] == np.mean(apart.min(axis=0) <= 0.5)
+
+
+def test_points_are_left_out(tmp_path):
+    pair, truth = clouds(tmp_path)
+    guess = Labels(*(labels.copy() for labels in truth))
+    guess.A[:100] = np.where(truth.A[:100] == 1, 2, 1)
+    assert score(pair, truth, guess, {})["miou"] < 1.0
+    truth.A[:100] = Label.IGNORED
+    assert score(pair, truth, guess, {})["miou"] == 1.0
+
+
+def test_a_structure_is_what_most_of_its_observed_points_are():
+    instances = np.array([1, 1, 1, 1, 2, 2, 3, 0, 4, 4], np.uint16)
+    labels = np.array([0, 0, 2, 0, 2, 1, 0, 2, 1, 1])
+    numbers, counts, found = verdicts(instances, labels, "A")
+    assert numbers.tolist() == [1, 2, 3, 4]
+    assert counts.tolist() == [[4, 1, 1], [2, 2, 1], [1, 0, 0], [2, 2, 0]]
+    assert found.tolist() == [2, 1, 0, 1]
+
+
+def test_a_map_has_the_first_point_of_each_cell():
+    rng = np.random.default_rng(5)
+    builder = MapBuilder(np.zeros(3))
+    whole = []
+    for _ in range(30):
+        scan = np.zeros(500, [(n, "f8") for n in "xyz"] + [("instance", "u2")])
+        for name in "xyz":
+            scan[name] = rng.uniform(-1.0, 1.0, 500)
+        scan["instance"] = rng.integers(1, 9, 500)
+        builder.add(scan, np.eye(4))
+        whole.append(scan)
+    whole, seen, expected = np.concatenate(whole), set(), []
+    for point in whole.tolist():
+        cell = tuple(np.floor(np.array(point[:3]) / THINNED))
+        if cell not in seen:
+            seen.add(cell)
+            expected.append(point)
+    points = builder.points()
+    names = ["x", "y", "z", "instance"]
+    assert sorted(points[names].tolist()) == sorted(expected)
+
+
+def test_by_distance_is_brute_force(tmp_path):
+    pair, _ = clouds(tmp_path)
+    apart = np.linalg.norm(
+        pair.A.points[:, None] - pair.B.points[None], axis=2
+    ).min(axis=1)
+    expected = np.where(apart <= 0.5, Label.KEPT, Label.GONE)
+    np.testing.assert_array_equal(by_distance(*pair), expected)
+
+
+def room(size, beams=(200, 60), window=None):
+    """A scan of a box-shaped room around the LiDAR; a window returns nothing.
+
+    Args:
+        size: distance of the walls [m].
+        beams: directions around and upwards.
+        window: whether a direction (N, 3) passes through it.
+    """
+    azimuth, up = np.meshgrid(
+        np.linspace(-np.pi, np.pi, beams[0], endpoint=False),
+        np.linspace(-0.5, 0.5, beams[1]),
+    )
+    d = np.stack(
+        [
+            np.cos(up) * np.cos(azimuth),
+            np.cos(up) * np.sin(azimuth),
+            np.sin(up),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    points = d * (size / np.abs(d).max(axis=1, keepdims=True))
+    return points if window is None else points[~window(points)]
+
+
+def test_free_space_sees_past_what_is_gone(tmp_path):
+    """A's map: a wall at 10 m, a box at 5 m, a thing outside at 30 m.
+
+    B sees the wall, but not the box; what is outside, the wall hides.
+    """
+    rng = np.random.default_rng(1)
+    box = np.array([5.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
+    outside = np.array([30.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
+    wall = room(10.0)[::7]
+    write_map(tmp_path / "A", np.concatenate([wall, box, outside]))
+    write_map(tmp_path / "B", room(10.0))
+    folder = tmp_path / "B" / "Scans"
+    folder.mkdir()
+    rows = "\n".join(" ".join(f"{v:.6f}" for v in p) for p in room(10.0))
+    count = len(room(10.0))
+    (folder / "000000.pcd").write_text(
+        "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+        f"WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\n"
+        f"DATA ascii\n{rows}\n"
+    )
+    (tmp_path / "B" / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    pair = read_pair(tmp_path)
+    labels = by_free_space(*pair)
+    n = len(wall)
+    assert (labels[:n] == Label.KEPT).all()
+    assert (labels[n : n + 200] == Label.GONE).all()
+    # Beyond its reach, which is that of the farthest return, or hidden.
+    assert (labels[n + 200 :] == Label.UNOBSERVED).all()
+
+
+def test_m3c2_measures_a_moved_plane(tmp_path):
+    if importlib.util.find_spec("py4dgeo") is None:
+        pytest.skip("needs the extra map-update")
+    from evaluation.map_update.baselines import by_m3c2
+
+    rng = np.random.default_rng(2)
+    flat = np.c_[rng.uniform(0, 20, (20_000, 2)), rng.normal(0, 0.005, 20_000)]
+    moved = flat + np.where(flat[:, :1] > 10.0, [0, 0, 0.5], [0, 0, 0.0])
+    write_map(tmp_path / "A", flat)
+    write_map(tmp_path / "B", moved)
+    labels = by_m3c2(*read_pair(tmp_path))
+    x = flat[:, 0]
+    assert np.mean(labels[x > 12] == Label.GONE) > 0.95
+    assert np.mean(labels[x < 8] == Label.KEPT) > 0.95
+
+
+def test_real_drives_need_only_labels(towns, tmp_path, capsys):
+    """Maps of any recordings, with labels that a user brings."""
+    output = tmp_path / "maps"
+    drives = towns / "town_01", towns / "town_02"
+    status, out, err = run(capsys, "map-sessions", *drives, "--output", output)
+    assert (status, out) == (0, f"{output}\n"), err
+    for side, label in (("A", 1), ("B", 3)):
+        size = len(read_session(output / side).points)
+        labels = np.full(size, 255, np.uint8)
+        labels[: size // 2] = label
+        np.save(output / side / "truth.npy", labels)
+    status, out, err = run(
+        capsys, "map-update", output, "--baseline", "distance", "--json"
+    )
+    assert status == 0, err
+    found = json.loads(out)
+    assert found["method"] == "distance"
+    assert 0.0 < found["miou"] < 1.0
+
+
+def test_bad_labels_are_refused(tmp_path, capsys):
+    folder = tmp_path / "pair"
+    clouds(folder)
+    good = folder / "B" / "truth.npy"
+    for labels, words in (
+        (np.zeros(3, np.uint8), "3 labels for the 400 points"),
+        (np.full(400, 3, np.uint8), "point 0 has the label 3"),
+        (np.full(400, 0.5), "not one whole number"),
+    ):
+        bad = tmp_path / "bad.npy"
+        np.save(bad, labels)
+        command = ["map-update", folder, "--labels-a", bad, "--labels-b", good]
+        assert_refused(capsys, command, bad, words)
+    assert_refused(
+        capsys, ["map-update", folder, "--labels-a", good], "give both"
+    )
+    assert_refused(capsys, ["map-update", folder], folder / "B", "poses.txt")
+    assert_refused(capsys, ["map-update", tmp_path], "no folder A")
