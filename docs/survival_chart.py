@@ -24,8 +24,8 @@ def read_table(text: str) -> tuple[list[str], list[str], np.ndarray]:
         text: the page.
 
     Returns:
-        Methods; pairs of stages; (P, M, 2) AUC with the change and the kept
-        part, NaN where there is none.
+        Methods; pairs of stages; (P, M, 3) AUC with the change, the kept part,
+        NaN where there is none, and 1 where the field is bold, else 0.
     """
     _, _, section = text.partition("\n## What survives\n")
     rows = [
@@ -35,18 +35,19 @@ def read_table(text: str) -> tuple[list[str], list[str], np.ndarray]:
     ]
     methods = [re.sub(r"\[(.+)\]\(.+\)", r"\1", cell) for cell in rows[0][2:]]
     pairs = [f"{row[0]} {row[1].replace(', ', ' → ')}" for row in rows[2:]]
-    values = np.full((len(pairs), len(methods), 2), np.nan)
+    values = np.full((len(pairs), len(methods), 3), np.nan)
     for p, row in enumerate(rows[2:]):
         for m, cell in enumerate(row[2:]):
             _, changed, kept = _CELL.search(cell.replace("**", "")).groups()
-            values[p, m] = float(changed), float(kept or "nan") / 100.0
+            share = float(kept or "nan") / 100.0
+            values[p, m] = float(changed), share, "**" in cell
     return methods, pairs, values
 
 
 def draw(
     methods: list[str], pairs: list[str], values: np.ndarray, path: Path
 ) -> None:
-    """Draws a field for each pair and method."""
+    """Draws a field for each pair and method; bold ones stay bold."""
     figure = Figure(figsize=(9.2, 4.6), layout="constrained")
     axes = figure.subplots()
     colours = matplotlib.colormaps["viridis"].with_extremes(bad="#d8d8d8")
@@ -54,12 +55,13 @@ def draw(
         values[:, :, 1], cmap=colours, vmin=0.0, vmax=1.0, aspect="auto"
     )
     for p, m in np.ndindex(values.shape[:2]):
-        auc, kept = values[p, m]
+        auc, kept, is_bold = values[p, m]
         share = "" if np.isnan(kept) else f"   {100 * kept:.0f} %"
         dark = kept < 0.55  # On yellow and grey, black is legible.
         axes.text(
             m, p, f"{auc:.2f}{share}", ha="center", va="center",
             color="white" if dark else "black",
+            fontweight="bold" if is_bold else "normal",
         )  # fmt: skip
     axes.set_xticks(range(len(methods)), methods)
     axes.set_yticks(range(len(pairs)), pairs)

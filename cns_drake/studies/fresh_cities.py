@@ -25,7 +25,7 @@ from cns_drake.scenarios.scenario import REAL_DRIVER
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.studies.redrawing import RedrawCity, redrawn_inputs, to_yaml
 from cns_drake.studies.reproduction import reproduce_maps
-from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 
 # Expected time to draw a city with its stages [s].
 _COST = 15.0
@@ -72,7 +72,7 @@ def evaluate_fresh_cities(
     output: Path,
     cluster: Cluster,
     *,
-    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     own_methods: Sequence[Path] = (),
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:

@@ -37,11 +37,13 @@ from evaluation.report.page_data import Illustration, PageDrive, browser_data
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.result_tables import (
     DriveTrack,
+    MethodDifference,
     audit_table,
     change_table,
     cost_numbers,
     cost_table,
     difference_numbers,
+    difference_table,
     fault_numbers,
     fault_table,
     metric_numbers,
@@ -92,6 +94,7 @@ class Report:
         survivals: place recognition of all pairs, with their controls.
         recognitions: the same results without controls, and those of drives
             compared with themselves.
+        differences: AUC of each two methods, compared.
         evidence: (database, query) -> evidence why best places are wrong.
         tracks: drive -> its track, also for the controls.
         drives: name -> drive, for all drives of a pair.
@@ -108,6 +111,7 @@ class Report:
     changes: list[ChangeResult] = field(default_factory=list)
     survivals: list[Survival] = field(default_factory=list)
     recognitions: list[RecognitionResult] = field(default_factory=list)
+    differences: Sequence[MethodDifference] = ()
     evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
     tracks: dict[str, DriveTrack] = field(default_factory=dict)
     drives: dict[str, PageDrive] = field(default_factory=dict)
@@ -148,7 +152,7 @@ def write_report(report: Report, folder: Path) -> Path:
         "place_recognition": audit_table(every, report.reference),
         "poses": pose_numbers(results),
         "metrics": metric_numbers(every),
-        "differences": difference_numbers(results),
+        "differences": difference_numbers(report.differences),
         "why": fault_numbers(results, report.evidence),
         "queries": replace(
             queries,
@@ -164,7 +168,7 @@ def write_report(report: Report, folder: Path) -> Path:
         numbers["costs"] = cost_numbers(report.costs)
     for name, table in numbers.items():
         _write(folder / f"{name}.csv", table.to_csv())
-        if name != "why" and name in tables:
+        if name not in ("why", "differences") and name in tables:
             forms = {
                 "md": map(_captioned, tables[name]),
                 "tex": (shown.to_latex() for shown in tables[name]),
@@ -246,6 +250,7 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
             report.compared,
             report.evidence,
         ),
+        "differences": [difference_table(report.differences)],
         "why": [fault_table(results, report.evidence)],
         "poses": [pose_table(results)],
         "costs": [cost_table(report.costs)],

@@ -60,6 +60,11 @@ _AUDIT_CAPTION = (
     " F1max = 2 TP / (TP + T). AUC strict: the"
     " area with recall = TP / N, which wrong accepted answers lower, too."
 )
+_DIFFERENCE_CAPTION = (
+    "Differences of AUC (mode all) between methods on the same queries, with"
+    " 95 % intervals, by paired bootstrap over blocks of 100 m of the route; p"
+    " is corrected for the number of rows (Holm)."
+)
 _FAULT_CAPTION = (
     "Why best places are wrong: how many of the queries with a wrong best"
     " place have none in the database (no place); got no candidate; were put"
@@ -91,6 +96,8 @@ _COST_CAPTION = (
 _MEASURES = {"AUC": "auc", "strict": "auc_strict", "R@1": "recall_at_1"}
 # The reference has this, too.
 _PUBLISHED = {**_MEASURES, "F1": "f1_max"}
+# A difference with a smaller p-value is beyond doubt.
+_SIGNIFICANCE = 0.05
 # Frame, time and pose of a sensor, as columns of files.
 _MOMENT = ("frame", "stamp_ns", "x", "y", "z", "qx", "qy", "qz", "qw")
 
@@ -391,8 +398,15 @@ def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
     )
 
 
-class _Difference(NamedTuple):
-    """Two results of a pair, with the difference of their AUC."""
+class MethodDifference(NamedTuple):
+    """Two results of a pair, with the difference of their AUC.
+
+    Attributes:
+        result: of the first method.
+        other: of the second one.
+        difference: the first less the second.
+        p_value: corrected for the number of all differences; NaN if unknown.
+    """
 
     result: RecognitionResult
     other: RecognitionResult
@@ -400,12 +414,10 @@ class _Difference(NamedTuple):
     p_value: float
 
 
-def difference_numbers(results: Sequence[RecognitionResult]) -> Table:
-    """Returns AUC differences of methods, as `differences.csv` has them.
-
-    Args:
-        results: for all pairs and methods.
-    """
+def method_differences(
+    results: Sequence[RecognitionResult],
+) -> list[MethodDifference]:
+    """Compares each two methods on each pair (mode all)."""
     both, found = [], []
     for one, other in itertools.combinations(_by_pair_and_method(results), 2):
         if one.pair == other.pair:
@@ -414,11 +426,29 @@ def difference_numbers(results: Sequence[RecognitionResult]) -> Table:
                 auc_difference(one.outcome.outcomes, other.outcome.outcomes)
             )
     corrected = holm(np.array([one.p_value for one in found])).tolist()
+    return [
+        MethodDifference(*pair, one, p)
+        for pair, one, p in zip(both, found, corrected, strict=True)
+    ]
+
+
+def beaten(
+    differences: Iterable[MethodDifference],
+) -> set[tuple[tuple[str, str, str], str]]:
+    """Returns pair and name of methods that another beats beyond doubt."""
+    found = set()
+    for one in differences:
+        if one.p_value < _SIGNIFICANCE:
+            is_first_less = one.difference.value < 0.0
+            worse = one.result if is_first_less else one.other
+            found.add((worse.pair, worse.method))
+    return found
+
+
+def difference_numbers(differences: Sequence[MethodDifference]) -> Table:
+    """Returns AUC differences of methods, as `differences.csv` has them."""
     return Table.of(
-        [
-            _Difference(*pair, one, p)
-            for pair, one, p in zip(both, found, corrected, strict=True)
-        ],
+        differences,
         {
             **_inner({n: _KEYS[n] for n in ("map", "db", "query")}),
             "gate": lambda d: d.result.outcome.protocol.gate,
@@ -430,6 +460,24 @@ def difference_numbers(results: Sequence[RecognitionResult]) -> Table:
             "p": lambda d: d.p_value,
             "protocol": lambda d: d.result.outcome.protocol.name,
         },
+    )
+
+
+def difference_table(differences: Sequence[MethodDifference]) -> Table:
+    """Returns the differences for print."""
+    names = "map", "DB → query"
+    return Table.of(
+        differences,
+        {
+            **_inner({name: _SHOWN[name] for name in names}),
+            "method A": lambda d: title(d.result.method),
+            "method B": lambda d: title(d.other.method),
+            "A - B": lambda d: d.difference.value,
+            "low": lambda d: d.difference.interval.low,
+            "high": lambda d: d.difference.interval.high,
+            "p": lambda d: d.p_value,
+        },
+        _DIFFERENCE_CAPTION,
     )
 
 

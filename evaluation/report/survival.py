@@ -1,6 +1,6 @@
 """The survival of each method under structural change: tables and figure."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 import math
 from pathlib import Path
 
@@ -176,16 +176,23 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
     return " ".join(parts)
 
 
-def draw_survival(survivals: Sequence[Survival], stem: Path) -> None:
+def draw_survival(
+    survivals: Sequence[Survival],
+    stem: Path,
+    beaten: Collection[tuple[tuple[str, str, str], str]] = (),
+) -> None:
     """Draws AUC without and with the change, for each pair and method.
 
     A hollow marker is AUC without the change, a full one AUC with it; the kept
-    share stands beside them. Pairs without a control are left out.
+    share stands beside them. Pairs without a control are left out. Of a pair
+    with beaten methods, the names of the others are bold.
 
     Args:
         survivals: one for each pair and method; at least one has a
             control.
         stem: path to write, without ending.
+        beaten: pair and name of methods that another beats with the change,
+            beyond doubt.
     """
     groups = by_pair([one for one in survivals if one.unchanged is not None])
     rows = sum(_TITLE_ROWS + len(group) for group in groups.values())
@@ -194,7 +201,10 @@ def draw_survival(survivals: Sequence[Survival], stem: Path) -> None:
     )
     axes = figure.subplots()
     height, ticks = 0.0, []
-    for (map_name, *stages), group in groups.items():
+    with_beaten = {pair for pair, _ in beaten}
+    leading = []
+    for pair, group in groups.items():
+        map_name, *stages = pair
         height += _TITLE_ROWS
         axes.text(
             0.0,
@@ -207,9 +217,13 @@ def draw_survival(survivals: Sequence[Survival], stem: Path) -> None:
         for one in group:
             _draw_row(axes, one, height)
             ticks.append((height, plain(title(one.method))))
+            is_beaten = (pair, one.method) in beaten
+            leading.append(pair in with_beaten and not is_beaten)
             height += 1.0
     axes.set_yticks(*zip(*ticks, strict=True), fontsize=_FONT_SIZE)
     axes.set(xlim=(0.0, 1.0), ylim=(height - 0.2, 0.0))
+    for label, is_leading in zip(axes.get_yticklabels(), leading, strict=True):
+        label.set_fontweight("bold" if is_leading else "normal")
     axes.tick_params(axis="x", labelsize=_FONT_SIZE)
     axes.tick_params(axis="y", length=0, pad=6)
     _write_beside(axes, "kept", 0.0)

@@ -11,7 +11,11 @@ from evaluation.recognition.survival import Survival
 from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
 from evaluation.report.page import Report, write_report
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.result_tables import DriveTrack
+from evaluation.report.result_tables import (
+    DriveTrack,
+    beaten,
+    method_differences,
+)
 from evaluation.report.survival import draw_survival
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
@@ -80,6 +84,7 @@ def assemble(
         report.notes = nothing_to_compare(cities)
     for note in report.notes:
         on_note(note)
+    report.differences = method_differences(report.recognitions)
     if report.recognitions:
         title = reference.title if report.compared else ""
         shown = auc_illustration(files.figures, title)
@@ -93,7 +98,8 @@ def assemble(
         report.illustrations.insert(0, shown)
     if any(one.unchanged is not None for one in report.survivals):
         shown = survival_illustration(files.figures)
-        draw_survival(report.survivals, shown.stem)
+        behind = beaten(report.differences)
+        draw_survival(report.survivals, shown.stem, behind)
         report.illustrations.insert(0, shown)
     if with_costs and any(city.recognition_pairs() for city in cities):
         report.costs = files.costs.read()

@@ -181,7 +181,8 @@ def survival_illustration(folder: Path) -> Illustration:
     return Illustration(
         folder / "survival",
         "AUC without the change (hollow) and with it (full), and the share"
-        " that is kept",
+        " that is kept; bold: no other method is better beyond doubt, while"
+        " some are worse",
         "svg",
         section="survival",
     )

@@ -27,6 +27,7 @@ def test_numbers_are_those_of_the_table(tmp_path):
     assert pairs == ["old town 01 → 04", "old town 02 → 04"]
     np.testing.assert_array_equal(values[:, :, 0], [[0.84, 0.88], [0.05, 0.52]])
     np.testing.assert_allclose(values[:, :, 1], [[0.91, np.nan], [0.05, 1.09]])
+    assert values[:, :, 2].tolist() == [[0, 0], [1, 0]]
     survival_chart.draw(methods, pairs, values, tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 1000
 

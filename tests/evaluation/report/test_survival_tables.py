@@ -105,7 +105,8 @@ def test_figure_shows_the_pairs_that_have_a_control(monkeypatch, tmp_path):
     monkeypatch.setattr(
         survival, "save", lambda figure, stem: drawn.append(figure)
     )
-    draw_survival([*SOME, NO_CONTROL], tmp_path / "survival")
+    beaten = {(("town", "01", "03"), "solid")}
+    draw_survival([*SOME, NO_CONTROL], tmp_path / "survival", beaten)
     (axes,) = drawn[0].axes
     texts = [text.get_text() for text in axes.texts]
     assert texts == [
