@@ -184,8 +184,8 @@ def draw_survival(
     """Draws AUC without and with the change, for each pair and method.
 
     A hollow marker is AUC without the change, a full one AUC with it; the kept
-    share stands beside them. Pairs without a control are left out. Of a pair
-    with beaten methods, the names of the others are bold.
+    share stands beside them. Pairs without a control are left out. Where
+    some methods of a pair are beaten, the names of the others are bold.
 
     Args:
         survivals: one for each pair and method; at least one has a
