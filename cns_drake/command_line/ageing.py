@@ -159,6 +159,13 @@ def years(
         ),
     ] = 1.0,
     rates: RatesFile = None,
+    localise: Annotated[
+        bool,
+        typer.Option(
+            "--localise",
+            help="Also localise the queries in the maps of the databases.",
+        ),
+    ] = False,
     method: MethodFiles = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
@@ -187,7 +194,8 @@ def years(
         choose_methods(method or ()),
         study.QUICK_PROTOCOL if quick else study.YEARS_PROTOCOL,
         (FORWARD,) if quick else (FORWARD, BACKWARD),
-        note,
+        localises=localise,
+        on_note=note,
     )
     typer.echo(path)
     typer.echo(text)

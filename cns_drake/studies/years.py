@@ -27,9 +27,16 @@ from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.ladder import RungPlan, query_drives
-from cns_drake.studies.ladder_rungs import NEAR, NONE, Rung, plain_drives
+from cns_drake.studies.ladder_rungs import (
+    NEAR,
+    NONE,
+    Rung,
+    RungDrives,
+    plain_drives,
+)
 from evaluation.change.tcr import temporal_change
 from evaluation.drives.sampling import sample_frames
+from evaluation.localisation.localise import is_right
 from evaluation.maps.voxel_maps import VoxelAccumulator
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report.years import (
@@ -43,6 +50,11 @@ from evaluation.report.years import (
     year_text,
 )
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.localisation import (
+    FAR_STARTS,
+    SHIPPED,
+    measure_localisation,
+)
 from evaluation.study.parts import MakePart, Part, StudyFiles
 
 YEARS = (1, 2, 5, 10, 20, 40)
@@ -119,6 +131,8 @@ def measure_years(
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol = YEARS_PROTOCOL,
     directions: Sequence[str] = (FORWARD, BACKWARD),
+    *,
+    localises: bool = False,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> tuple[Path, str]:
     """Measures what years cost; writes tables, chart and findings.
@@ -138,6 +152,7 @@ def measure_years(
         protocol: that of place recognition.
         directions: whether the database is of today, the query, or both in
             turn.
+        localises: also localise the queries in the maps of the databases.
         on_note: receives the progress.
 
     Returns:
@@ -175,12 +190,34 @@ def measure_years(
     files = StudyFiles(output)
     jobs: dict[str, Job] = {}
     found: list[tuple[Scenario, int, int, str, Part, Part, Part]] = []
+    ends: list[Part] = []
+
+    def localise(name: str, drives: RungDrives) -> None:
+        if not localises:
+            return
+        part = files.localised(name)
+        step = MakePart(
+            part,
+            measure_localisation,
+            (
+                DriveSimulation(drives.database),
+                DriveSimulation(drives.query),
+                SHIPPED,
+                ("",) * len(SHIPPED),
+                FAR_STARTS,
+                protocol.query_spacing,
+            ),
+        )
+        jobs[f"localise {name}"] = Job(f"localise {name}", step, cost=_MAP_COST)
+        ends.append(part)
+
     for drive in drives:
         plan = RungPlan(drive, NEAR, methods, protocol, files)
         plain = plain_drives(drive)
         today = _map_job(drive, files, jobs)
         part = plan.add_rung(Rung(NONE, 0, 0, "", plain))
         found.append((drive, 0, 0, FORWARD, part, today, today))
+        localise(drive.name, plain)
         for seed in seeds:
             folder = cities[drive.name, seed].folder
             for k, year in enumerate(wanted):
@@ -208,6 +245,9 @@ def measure_years(
                     found.append(
                         (drive, year, seed, direction, part, today, mapped)
                     )
+                    localise(
+                        f"{drive.name}_{ending} {direction}", pairs[direction]
+                    )
         jobs |= plan.jobs
     run_jobs(jobs.values(), cluster)
     pairs_found = [
@@ -220,8 +260,13 @@ def measure_years(
             if year
             else 0.0,
             part.read(),
+            dict(zip(SHIPPED, map(is_right, of_pair.read()), strict=True))
+            if of_pair is not None
+            else {},
         )
-        for drive, year, seed, direction, part, before, after in found
+        for (drive, year, seed, direction, part, before, after), of_pair in zip(
+            found, ends or [None] * len(found), strict=True
+        )
     ]
     return _write(pairs_found, output)
 

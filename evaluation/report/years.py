@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 import math
 from pathlib import Path
 
@@ -40,6 +40,8 @@ class AgedPair:
         direction: `FORWARD` or `BACKWARD`.
         tcr_sym: change of the city along the query's way; NaN if unknown.
         outcomes: one for each method, without and with the gate.
+        localised: estimator -> whether each query ends right in the map of the
+            database, (Q,) bool.
     """
 
     map_name: str
@@ -48,6 +50,7 @@ class AgedPair:
     direction: str
     tcr_sym: float
     outcomes: Sequence[RungOutcome]
+    localised: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -56,10 +59,10 @@ class YearRow:
 
     Attributes:
         pair: the drives.
-        task: `place` or `pose`.
+        task: `place`, `pose` or `localise`.
         method: its name.
         gate: whether the gate was used.
-        value: AUC, or the share of right poses.
+        value: AUC, or the share of right poses or ends.
         today: the value without years between.
         interval: 95 % interval of `kept` by bootstrap over queries.
         r1: R@1.
@@ -99,13 +102,30 @@ def year_rows(pairs: Sequence[AgedPair]) -> list[YearRow]:
         if pair.year == 0
         for one in pair.outcomes
     }
-    return [
+    found = [
         row
         for pair in pairs
         for one in pair.outcomes
         for row in _rows(
             pair, one, none[pair.map_name, one.method, one.is_gated]
         )
+    ]
+    today = {pair.map_name: pair.localised for pair in pairs if pair.year == 0}
+    return found + [
+        YearRow(
+            pair,
+            "localise",
+            method,
+            False,
+            float(is_right.mean()),
+            float(today[pair.map_name][method].mean()),
+            Interval(math.nan, math.nan),
+            math.nan,
+            math.nan,
+            len(is_right),
+        )
+        for pair in pairs
+        for method, is_right in pair.localised.items()
     ]
 
 

@@ -34,6 +34,7 @@ from evaluation.study.surveys import DriveSource
 
 # Near starts measure accuracy, far ones the basin [m, deg].
 STARTS = (Starts(0.5, 2.0), Starts(2.0, 10.0))
+FAR_STARTS = STARTS[1:]
 # Those of the wheel that this package needs.
 SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
 _COST = 60.0

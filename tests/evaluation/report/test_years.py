@@ -103,3 +103,29 @@ def test_words_and_chart(rows, tmp_path):
     assert "town, 20 years: TCR_sym 0.100, visible change 30.0%" in text
     draw_years(rows, tmp_path / "years")
     assert (tmp_path / "years.png").stat().st_size > 1000
+
+
+def test_localised_queries_are_a_task_of_their_own():
+    def ends(right):
+        return {"gicp": np.arange(10) < right}
+
+    pairs = [
+        AgedPair(
+            "town",
+            year,
+            seed,
+            FORWARD,
+            0.0,
+            [],
+            {"gicp": np.arange(10) < right},
+        )
+        for year, seed, right in ((0, 0, 8), (5, 1, 6), (5, 2, 2))
+    ]
+    found = year_rows(pairs)
+    assert [row.task for row in found] == ["localise"] * 3
+    assert [row.value for row in found] == [0.8, 0.6, 0.2]
+    assert [row.kept for row in found] == pytest.approx([1.0, 0.75, 0.25])
+    # In the mean half is left after five years.
+    table = lifetime_table(found)
+    (line,) = table.rows
+    assert line[table.header.index("half")] == "5.0"
