@@ -190,10 +190,11 @@ def measure_years(
     files = StudyFiles(output)
     jobs: dict[str, Job] = {}
     found: list[tuple[Scenario, int, int, str, Part, Part, Part]] = []
-    ends: list[Part] = []
+    ends: list[Part | None] = []
 
     def localise(name: str, drives: RungDrives) -> None:
         if not localises:
+            ends.append(None)
             return
         part = files.localised(name)
         step = MakePart(
@@ -265,7 +266,7 @@ def measure_years(
             else {},
         )
         for (drive, year, seed, direction, part, before, after), of_pair in zip(
-            found, ends or [None] * len(found), strict=True
+            found, ends, strict=True
         )
     ]
     return _write(pairs_found, output)
