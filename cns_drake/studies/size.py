@@ -103,13 +103,13 @@ def measure_sizes(
         for method in methods:
             name = f"size {number} {method.name}"
             part = files.rung(name)
-            first, *rest = (one.described(method) for one in places)
+            first, *rest = (one.described(method.name) for one in places)
             step = MakePart(
                 part,
                 measure_size,
                 (
                     first,
-                    asking.described(method),
+                    asking.described(method.name),
                     tuple(rest) if number else (),
                     number,
                     method,
