@@ -67,6 +67,8 @@ _PLOT_WIDTHS, _PLOT_DEPTH, _SETBACKS = (22.0, 16.0, 11.0), 14.0, (3.0, 22.0)
 _STEEPEST = 0.6
 # On small plots no towers are built [m].
 _HIGHEST_NEW = 20.0
+# Free plots farther from all buildings are open country [m].
+_IN_TOWN = 30.0
 _GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
 _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
 
@@ -319,7 +321,6 @@ class City:
         ]
         open_ground = world.open_ground.difference(shapely.union_all(solid))
         open_ground = open_ground.difference(self._kept_free.buffer(2.0))
-        heights = [lot.height for lot in self._lots]
         usual = shapely.STRtree([lot.plot.area for lot in self._lots])
         lots: list[_Lot] = []
         if open_ground.is_empty:
@@ -338,12 +339,16 @@ class City:
                     start += 4.0
                     continue
                 z = world.ground.heights(shapely.get_coordinates(area))
-                if np.isfinite(z).all() and np.ptp(z) < _STEEPEST:
+                near = int(usual.nearest(area))
+                lot = self._lots[near]
+                is_town = lot.plot.area.distance(area) < _IN_TOWN
+                if is_town and np.isfinite(z).all() and np.ptp(z) < _STEEPEST:
                     plot = Plot.facing(area, streets, float(z.min()))
                     taken.append(area)
-                    near = min(heights[int(usual.nearest(area))], _HIGHEST_NEW)
+                    side = min(plot.room().bounds[2:])
+                    high = min(lot.height, _HIGHEST_NEW, 2.4 * side)
                     number = len(self._lots) + len(lots)
-                    lots.append(_Lot(number, plot, near, None, []))
+                    lots.append(_Lot(number, plot, high, None, []))
                 start += 24.0
         return lots
 

@@ -377,9 +377,14 @@ def balconies_on(
     for k, z in enumerate(
         np.arange(_STOREY + 0.2, inside[:, :, 2].max() - 3.5, _STOREY)
     ):
-        cut = section(inside, z + 1.0)
+        # A balcony that is there already, or a bay, shows at one of these.
+        cuts = [section(inside, z + up) for up in (-0.3, 0.4, 1.0, 1.8)]
         for j, x in enumerate(xs):
-            walls = [-last(-cut, -x - at) for at in (-1.2, -0.5, 0.5, 1.2)]
+            walls = [
+                -last(-cut, -x - at)
+                for cut in cuts
+                for at in (-1.7, -0.8, 0.8, 1.7)
+            ]
             if np.ptp(walls) < 0.3 and abs(min(walls) - y0) < 1.0:
                 y = max(walls) - 0.6
                 middle = (float(x), y, float(z))
