@@ -9,7 +9,7 @@ from cns_drake.base.terminal import example
 from cns_drake.command_line.ageing import age, years
 from cns_drake.command_line.laddering import ladder, levels, size
 from cns_drake.command_line.learning import export_pairs, train
-from cns_drake.command_line.map_truthing import map_truth
+from cns_drake.command_line.map_truthing import map_pairs, map_truth
 from cns_drake.command_line.maps import city, import_city, list_drives
 from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
@@ -72,6 +72,9 @@ app.command(
         "cns-drake map-truth metropolis_01 metropolis_04 --output changed",
     )
 )(map_truth)
+app.command(epilog=example("cns-drake map-pairs suburbia_5 --output pairs"))(
+    map_pairs
+)
 app.command(
     epilog=example("cns-drake ladder metropolis --output ladder --quick")
 )(ladder)

@@ -1,4 +1,4 @@
-"""The command `cns-drake map-truth`."""
+"""The commands `cns-drake map-truth` and `map-pairs`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,6 +7,7 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.interrupts import uninterrupted
+from evaluation.command_line.map_updating import BaselineName
 from evaluation.command_line.options import SessionSpacing
 
 _Drive = Annotated[str, typer.Argument(metavar="RECORDING|NAME|SCENARIO.yaml")]
@@ -41,3 +42,49 @@ def map_truth(
         )
         terminal.note(f"{side}: {text}")
     print(output)
+
+
+def map_pairs(
+    pairs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="PAIR", help="Test pairs; all by default."),
+    ] = None,
+    *,
+    output: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder to write.")
+    ],
+    files: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Folder of the imported cities' files."
+        ),
+    ] = None,
+    baseline: Annotated[
+        list[BaselineName] | None,
+        typer.Option(
+            help="Baseline to score; free-space and distance by default."
+        ),
+    ] = None,
+    spacing: SessionSpacing = 1.0,
+) -> None:
+    """Make and score the frozen test pairs.
+
+    Twelve pairs of maps, four of them of imported cities, by seeds that were
+    drawn before any method ran on them. Writes cities, labelled maps and
+    map_pairs.csv. What is there already stays.
+    """
+    with uninterrupted():
+        from cns_drake.studies.map_pairs import measure_pairs
+
+    chosen = baseline or (BaselineName.FREE_SPACE, BaselineName.DISTANCE)
+    print(
+        measure_pairs(
+            pairs or (),
+            [one.value for one in chosen],
+            output,
+            files,
+            spacing,
+            terminal.note,
+            terminal.track,
+        )
+    )

@@ -131,9 +131,7 @@ def open_survey(place: str | Path) -> Survey:
     """
     path = Path(place)
     if not path.exists() or not holds_mcap(path):
-        scenario = load_scenario(place)
-        simulated = SimulatedDrive(scenario)
-        return Survey(simulated, simulated, scenario)
+        return simulate_survey(load_scenario(place))
     folder = path if path.is_dir() else path.parent
     if not (folder / "scenario.yaml").is_file():
         raise InputError(
@@ -153,6 +151,16 @@ def open_survey(place: str | Path) -> Survey:
             f"{path}: its poses are not those of its scenario.yaml"
         )
     return Survey(drive, simulated, scenario)
+
+
+def simulate_survey(scenario: Scenario) -> Survey:
+    """Returns a drive that is simulated when its scans are read.
+
+    Raises:
+        InputError: the scenario cannot be run.
+    """
+    simulated = SimulatedDrive(scenario)
+    return Survey(simulated, simulated, scenario)
 
 
 def write_truth(

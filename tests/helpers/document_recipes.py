@@ -813,6 +813,8 @@ NOT_RUN = {
     "them; `.ci/run` runs all",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
+    "cns-drake map-pairs suburbia_5": "ages and surveys a whole city, for "
+    "minutes; test_map_pairs reads its table",
     "cns-drake ladder --levels": "hours of work; the recipe ladder climbs some "
     "of it",
     "cns-drake simulate metropolis_03 --returns calibrated": "records two "
