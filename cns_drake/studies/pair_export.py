@@ -267,7 +267,8 @@ def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
             "non_negatives": np.array(sorted(wide[number]), int),
             "position": positions[number],
         }
-        one = _tuple_class()()
+        kind = _tuple_class()
+        one = kind.__new__(kind)
         one.__dict__.update(values)
         found[number] = one
     return found

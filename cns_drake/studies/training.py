@@ -541,6 +541,7 @@ def make_weights(
         scans, plan.steps, plan.seed, work / "state.npz", digest, track
     )
     seen = scans.images.any(axis=(1, 3)).mean(axis=1)
+    least = float(seen.min()) * (1.0 - _HIDDEN_DEG[1] / 360.0)
     made_by = {
         "command": command,
         "version": __version__,
@@ -548,7 +549,7 @@ def make_weights(
         "scans": len(scans.xy),
         "plan": asdict(plan),
     }
-    write_weights(output, values, (seen.min(), seen.max()), made_by)
+    write_weights(output, values, (least, float(seen.max())), made_by)
     picture = output.with_suffix(".png")
     _draw_curve(curve, picture)
     return picture
