@@ -1,12 +1,20 @@
 """The learned descriptor: images, network, scores, files of weights."""
 
+import json
+
 import numpy as np
 import pytest
 from scipy import ndimage
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
-from evaluation.methods.learned import FEATURES, LAYERS, TURNS, _infer
+from evaluation.methods.learned import (
+    FEATURES,
+    LAYERS,
+    SHIPPED,
+    TURNS,
+    _infer,
+)
 from evaluation.methods.polar_images import RINGS, SECTORS, polar_image
 
 RNG = np.random.default_rng(7)
@@ -149,6 +157,19 @@ def test_faulty_weights(tmp_path, changes, fault):
     assert str(error.value).startswith(f"{path}: ")
     assert fault in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_the_shipped_weights():
+    assert SHIPPED.stat().st_size < 5_000_000
+    with np.load(SHIPPED, allow_pickle=False) as file:
+        made_by = json.loads(str(file["made_by"]))
+    assert made_by["command"].startswith("cns-drake train ")
+    assert len(made_by["digest"]) == 32
+    method = make_method("learned", {})
+    scenes = [scene(seed) for seed in range(3)]
+    database = method.build_database([method.describe(s) for s in scenes])
+    query = method.describe(turned(scenes[1], 1.0))
+    assert method.score(query, database).argmax() == 1
 
 
 def test_other_weights_are_another_method(tmp_path):
