@@ -19,6 +19,7 @@ from cns_drake.traffic.vehicles import (
     VEHICLE,
     Occupants,
     find_ahead,
+    find_prior,
     free_acceleration,
     interaction,
 )
@@ -184,6 +185,7 @@ class Follower:
         streets: Streets,
         cars: np.ndarray,
         occupants: Occupants,
+        crossings: np.ndarray,
         k: int,
     ) -> None:
         """Moves the car on, the last one of N records `VEHICLE`."""
@@ -192,7 +194,12 @@ class Follower:
             self.u.append(u)
             return
         wanted = free_acceleration(car, car["top"])
-        gap, speed, line = self._ahead(streets, car, occupants, len(cars) - 1)
+        who = len(cars) - 1
+        gap, speed, line = self._ahead(streets, car, occupants, who)
+        stop, gap_2, speed_2 = find_prior(streets, cars, crossings, who)
+        line = min(line, stop)
+        if gap_2 < gap:
+            gap, speed = gap_2, speed_2
         loss = interaction(
             car, line + STANDSTILL_GAP - BEFORE_LINE, float(car["v"])
         )

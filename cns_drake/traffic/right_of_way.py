@@ -1,8 +1,10 @@
 """The right to enter a junction: one after the other, by arrival.
 
-A vehicle may enter its whole way under three conditions: no crossing way is in
-use or about to be used, there is room for it behind the way, and its signal is
-green. Vehicles never stop on a way, so that none waits for ever.
+A vehicle may enter its whole way under three conditions: those on ways that
+meet it will have passed when it comes there, there is room for it behind the
+way, and its signal is green, or it has stopped before the line. If another one
+is slower than expected, it waits on its way for those that entered before it,
+which never wait for it: none waits for ever.
 """
 
 import math
@@ -12,16 +14,34 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 from cns_drake.traffic.lane_graph import LaneGraph
-from cns_drake.traffic.streets import WAIT, Streets, is_ego_far
-from cns_drake.traffic.vehicles import CURRENT, Occupants, choose_way
+from cns_drake.traffic.streets import MERGE, SPLIT, WAIT, Streets, is_ego_far
+from cns_drake.traffic.vehicles import (
+    CURRENT,
+    Occupants,
+    choose_way,
+    rear_on_way,
+)
 
-# Signals: duration of a green phase, and of red for all after it [s]. Red holds
-# only while another direction has vehicles.
+# Where there is no signal, a driver has to stand for a while before the line
+# [s]: to be slower than this [m/s], and this near [m].
+_STOPS, _STANDS, _AT_LINE = 3.0, 0.5, 4.0
+# Signals: duration of a green phase, and of red for all after it [s].
 _GREEN, _RED = 27.0, 4.0
+# After this time they change for a driver [s], while no other direction has any
+# within this distance [m].
+_ALONE, _SEEN_FROM = 8.0, 30.0
 # Traffic ahead of the ego car, if it comes within this time, goes first and
 # does not wait for signals [s].
-_EGO_IS_NEAR = 45.0
+_EGO_IS_NEAR = 80.0
 _GOES_FIRST = 1e6
+# Expected wait on a way at most [s]; after this time at a stop line no later
+# driver enters a way that meets one's own [s]. Accelerations that are assumed
+# for a driver and others [m/s^2], and the others' part of the allowed speed.
+_SLACK, _LONG = 2.0, 20.0
+_OWN, _OTHERS, _PACE = 2.0, 1.0, 0.8
+# If the ego car comes within this time, a vehicle enters its way only once no
+# other is in its way [s].
+_EGO_COMES = 20.0
 # No vehicle enters a way if the ego car will be there within this time [s].
 _EGO_MARGIN = 3.0
 # Assumed wait at the end of a lane of a driver who goes first [s].
@@ -39,14 +59,16 @@ _PATIENCE = 3.0
 WALK_GROUP = 3.0
 _WALKING, _DAWDLING = 1.0, 3.0
 # Time for vehicles after a group has left a crossing [s].
-_REST = 12.0
+_REST = 20.0
 
-_CROSSING = np.dtype(
+CROSSING = np.dtype(
     [
         ("waits", float),  # Time since which walkers wait, inf for none [s].
         ("opened", float),  # Time at which it was opened [s].
         ("closed", float),  # Time at which it was last left [s].
         ("length", float),  # [m]
+        ("order", int),  # As of `VEHICLE`, 0 while no walkers ask.
+        ("is_open", bool),  # Whether walkers are on it.
     ]
 )
 
@@ -56,7 +78,7 @@ class Permits(NamedTuple):
 
     Attributes:
         users: (C,) numbers of walkers with a permit.
-        crossings: (C,) records `_CROSSING`.
+        crossings: (C,) records `CROSSING`.
     """
 
     users: np.ndarray
@@ -65,7 +87,7 @@ class Permits(NamedTuple):
 
 def make_permits(graph: LaneGraph) -> Permits:
     """Returns permits without any holder."""
-    crossings = np.zeros(len(graph.crossings), _CROSSING)
+    crossings = np.zeros(len(graph.crossings), CROSSING)
     crossings["waits"] = np.inf
     crossings["opened"] = crossings["closed"] = -np.inf
     crossings["length"] = [
@@ -98,14 +120,20 @@ def grant_ways(
     t, pieces, num_cars = k * dt, streets.pieces, len(cars)
     users, crossings = permits
     first = np.full(len(pieces), -1)
+    asked = np.zeros((len(streets.phases), streets.phases.max()), np.bool_)
     for i in range(num_cars):
         lane = cars[i].path[CURRENT]
-        if lane < 0 or pieces[lane].is_way or cars[i].granted:
+        if lane < 0 or pieces[lane].is_way:
+            continue
+        if pieces[lane].length - cars[i].s < _SEEN_FROM:
+            phase = pieces[streets.after[pieces[lane].after_first]].phase
+            if phase >= 0:
+                asked[pieces[lane].junction, phase] = True
+        if cars[i].granted:
             continue
         if first[lane] < 0 or cars[i].s > cars[first[lane]].s:
             first[lane] = i
     since = np.full(num_cars + len(crossings), np.inf)
-    asked = np.zeros((len(streets.phases), streets.phases.max()), np.bool_)
     for lane in range(len(pieces)):
         if first[lane] < 0:
             continue
@@ -116,69 +144,213 @@ def grant_ways(
             continue
         braking = car.v**2 / (2.0 * car.b)
         asked_from = max(_ASKED_FROM, _ASKED_BRAKING * braking + 5.0)
-        if pieces[lane].length - car.s <= asked_from:
-            if car.since == np.inf:
-                car.since = t
-            since[first[lane]] = car.since
+        left = pieces[lane].length - car.s
+        if left <= asked_from:
+            phase = pieces[streets.after[pieces[lane].after_first]].phase
             if 0.0 < streets.until[k, lane] < _EGO_IS_NEAR:
                 since[first[lane]] = streets.until[k, lane] - _GOES_FIRST
-            phase = pieces[streets.after[pieces[lane].after_first]].phase
-            if phase >= 0:
-                asked[pieces[lane].junction, phase] = True
+            elif phase < 0 and car.since == np.inf:
+                # Every driver stops where there is no signal.
+                if car.v > _STANDS or left > _AT_LINE:
+                    continue
+            else:
+                since[first[lane]] = car.since
+            if car.since == np.inf:
+                car.since = t
+                since[first[lane]] = min(since[first[lane]], t)
     for c in range(len(crossings)):
         since[num_cars + c] = crossings[c].waits
+        if users[c] == 0 and (crossings[c].is_open or since[num_cars + c] > t):
+            crossings[c].order, crossings[c].is_open = 0, False
     # What small and what large vehicles must not enter now.
     taken = np.zeros((2, len(pieces) + len(crossings)), np.bool_)
+    last = 0
     for i in range(num_cars):
         if cars[i].held >= 0:
+            last = max(last, cars[i].order)
             _take(
                 streets,
                 taken,
                 cars[i].held,
                 cars[i].large,
-                _rear(streets, cars[i]),
+                rear_on_way(streets, cars[i]),
             )
     for c in range(len(crossings)):
-        if users[c] > 0:
+        last = max(last, crossings[c].order)
+        if crossings[c].order > 0:
             _take(streets, taken, len(pieces) + c, False, 0.0)
     blocked = np.zeros(taken.shape[1], np.bool_)
     for who in np.argsort(since):
         if since[who] == np.inf:
             break
-        if who < num_cars:
-            car = cars[who]
-            if car.path[CURRENT + 1] < 0:
-                choose_way(streets, cars, who, seed)
-            place, is_large = car.path[CURRENT + 1], car.large
-            ready = _is_green(streets, car, asked, k, dt) and _has_room(
-                streets, cars, occupants, who, k, dt, seed
-            )
-        else:
-            c = who - num_cars
-            place, is_large = len(pieces) + c, False
-            needed = crossings[c].length / _WALKING + WALK_GROUP + _DAWDLING
-            ready = (
-                users[c] == 0
-                and t >= crossings[c].closed + _REST
-                and streets.until[k, place] >= needed
-            )
-        if not ready or blocked[place]:
+        if who >= num_cars:
+            last = _serve(streets, cars, permits, who - num_cars, k, dt, last)
+            if crossings[who - num_cars].order > 0:
+                place = len(pieces) + who - num_cars
+                _take(streets, taken, place, False, 0.0)
             continue
-        if taken[int(is_large), place]:
-            # Later arrivals must not always go first.
-            exclusions = streets.large if is_large else streets.small
-            for other in range(len(blocked)):
-                blocked[other] |= exclusions[place, other] > 0.0
+        car = cars[who]
+        if car.path[CURRENT + 1] < 0:
+            choose_way(streets, cars, who, seed)
+        way, is_large = car.path[CURRENT + 1], car.large
+        if (
+            not _is_ready(streets, car, asked, k, dt)
+            or not _has_room(streets, cars, occupants, who, k, dt, seed)
+            or blocked[way]
+        ):
             continue
-        _take(streets, taken, place, is_large, 0.0)
-        if who < num_cars:
-            car = cars[who]
-            car.granted, car.held = True, place
-            car.since, car.refused = np.inf, 0.0
-        else:
-            # A placeholder holds the permit until the group has begun to walk.
-            users[who - num_cars] += 1
-            crossings[who - num_cars].opened = t
+        # The ego car's plan leaves no time to wait on a way.
+        is_near = streets.until[k, way] < _EGO_COMES
+        if taken[int(is_large), way] and (
+            is_near or not _is_soon_free(streets, cars, crossings, who, way, t)
+        ):
+            if is_near or t > since[who] + _LONG:
+                # Later arrivals must not always go first.
+                blocked |= streets.clear[int(is_large), way] > 0.0
+            continue
+        _take(streets, taken, way, is_large, 0.0)
+        last += 1
+        car.granted, car.held, car.order = True, way, last
+        car.since, car.refused = np.inf, 0.0
+
+
+@compiled
+def _is_soon_free(
+    streets: Streets,
+    cars: np.ndarray,
+    crossings: np.ndarray,
+    i: int,
+    way: int,
+    t: float,
+) -> bool:
+    """Returns whether the i-th vehicle need hardly wait on a way.
+
+    Walkers, and vehicles on other ways, will have passed the places where they
+    meet it when it comes there.
+
+    Args:
+        streets: the lanes.
+        cars: (N,) records `VEHICLE`.
+        crossings: (C,) records `CROSSING`.
+        i: number of the vehicle, in the lane before the way.
+        way: its way.
+        t: time [s].
+    """
+    car, pieces = cars[i], streets.pieces
+    size = int(car.large)
+    front = car.s - pieces[car.path[CURRENT]].length
+    pace = streets.speed[pieces[way].first]
+    for c in range(len(crossings)):
+        place = streets.begin[size, way, len(pieces) + c]
+        if crossings[c].order > 0 and place < np.inf:
+            lasts = crossings[c].length / _WALKING + _DAWDLING
+            if crossings[c].opened >= 0.0:
+                lasts += WALK_GROUP + crossings[c].opened - t
+            elif crossings[c].is_open:
+                lasts += crossings[c].closed - t
+            else:
+                lasts += WALK_GROUP
+            if lasts > _duration(place - front, car.v, _OWN, pace):
+                return False
+    for j in range(len(cars)):
+        other = cars[j]
+        if j == i or other.held < 0:
+            continue
+        size, held = int(car.large or other.large), other.held
+        place = streets.begin[size, way, held]
+        rear = rear_on_way(streets, other)
+        last = streets.clear[size, held, way]
+        if place == np.inf or rear >= last:
+            continue
+        if streets.joint[size, way, held] == SPLIT and rear > 0.0:
+            continue
+        if streets.joint[size, way, held] == MERGE:
+            # Behind it the vehicle follows it.
+            last = min(last, streets.begin[size, held, way] + other.length)
+        arrives = _duration(place - front, car.v, _OWN, pace)
+        its_pace = _PACE * streets.speed[pieces[held].first]
+        leaves = _duration(last - rear, other.v, _OTHERS, its_pace)
+        if leaves > arrives + _SLACK:
+            return False
+    return True
+
+
+@compiled
+def _duration(distance: float, v: float, a: float, pace: float) -> float:
+    """Returns the time for a distance, from a speed up to a pace [s]."""
+    if distance <= 0.0:
+        return 0.0
+    v = min(v, pace)
+    before = (pace**2 - v**2) / (2.0 * a)
+    if distance < before:
+        return ((v**2 + 2.0 * a * distance) ** 0.5 - v) / a
+    return (pace - v) / a + (distance - before) / pace
+
+
+@compiled
+def _serve(
+    streets: Streets,
+    cars: np.ndarray,
+    permits: Permits,
+    c: int,
+    k: int,
+    dt: float,
+    last: int,
+) -> int:
+    """Opens a crossing for walkers once the vehicles before them have passed.
+
+    Args:
+        streets: the lanes, and the ego car.
+        cars: (N,) records `VEHICLE`.
+        permits: the users so far.
+        c: number of the crossing, where walkers wait.
+        k: number of the time.
+        dt: the step [s].
+        last: the highest `order` so far.
+
+    Returns:
+        The highest `order`.
+    """
+    one, place, t = permits.crossings[c], len(streets.pieces) + c, k * dt
+    if permits.users[c] > 0:
+        return last
+    needed = one.length / _WALKING + WALK_GROUP + _DAWDLING
+    if one.order == 0:
+        if t < one.closed + _REST:
+            return last
+        if _until_green(streets, streets.beside[c], t) < min(needed, _GREEN):
+            return last
+        last += 1
+        one.order = last
+    if streets.until[k, place] < needed:
+        one.order = 0
+        return last
+    for i in range(len(cars)):
+        car = cars[i]
+        if (
+            car.held >= 0
+            and car.order < one.order
+            and rear_on_way(streets, car)
+            < streets.clear[int(car.large), car.held, place]
+        ):
+            return last
+    # A placeholder holds the permit until the group has begun to walk.
+    permits.users[c], one.opened, one.is_open = 1, t, True
+    return last
+
+
+@compiled
+def _until_green(streets: Streets, way: int, t: float) -> float:
+    """Returns the time until the signal of a way is green next [s].
+
+    That is 0 while it is green, inf for no way.
+    """
+    if way < 0:
+        return np.inf
+    row, phase = streets.pieces[way], _GREEN + _RED
+    cycle = phase * streets.phases[row.junction]
+    left = (row.phase * phase - t) % cycle
+    return 0.0 if left > cycle - _GREEN else left
 
 
 @compiled
@@ -195,29 +367,18 @@ def _take(
         rear: of the vehicle, along the way [m].
     """
     for other in range(taken.shape[1]):
-        is_near = rear < streets.large[place, other]
+        is_near = rear < streets.clear[1, place, other]
         taken[1, other] |= is_near
         taken[0, other] |= (
-            is_near if is_large else rear < streets.small[place, other]
+            is_near if is_large else rear < streets.clear[0, place, other]
         )
 
 
 @compiled
-def _rear(streets: Streets, car: Any) -> float:
-    """Returns the place of a vehicle's rear along the way it holds [m]."""
-    rear = car.s - car.length
-    if car.path[CURRENT] == car.held:
-        return rear
-    if car.path[CURRENT - 1] == car.held:
-        return rear + streets.pieces[car.held].length
-    return 0.0
-
-
-@compiled
-def _is_green(
+def _is_ready(
     streets: Streets, car: Any, asked: np.ndarray, k: int, dt: float
 ) -> bool:
-    """Returns whether a vehicle need not wait for a signal.
+    """Returns whether a vehicle has waited for a signal, or at a stop line.
 
     Args:
         streets: the lanes, and the ego car.
@@ -226,18 +387,17 @@ def _is_green(
         k: number of the time.
         dt: the step [s].
     """
-    way = streets.pieces[car.path[CURRENT + 1]]
-    if (
-        way.phase < 0
-        or 0.0 < streets.until[k, car.path[CURRENT]] < _EGO_IS_NEAR
-    ):
+    t, way = k * dt, car.path[CURRENT + 1]
+    row = streets.pieces[way]
+    if 0.0 < streets.until[k, car.path[CURRENT]] < _EGO_IS_NEAR:
         return True
-    cycle = (_GREEN + _RED) * streets.phases[way.junction]
-    at = k * dt % cycle
-    now = int(at // (_GREEN + _RED))
-    if at - now * (_GREEN + _RED) >= _GREEN:
-        return False
-    return now == way.phase or not asked[way.junction, now]
+    if row.phase < 0:
+        return t >= car.since + _STOPS
+    if _until_green(streets, way, t) == 0.0:
+        return True
+    # A signal changes for one who waits alone.
+    now = int(t // (_GREEN + _RED)) % streets.phases[row.junction]
+    return t > car.since + _ALONE and not asked[row.junction, now]
 
 
 @compiled

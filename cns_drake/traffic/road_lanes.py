@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 import itertools
+import math
 
 import numpy as np
 import shapely
@@ -38,6 +39,9 @@ _LANES_WITHOUT_SIGNAL = 2
 _MARGIN = 0.45
 _CROSSING_HALF_WIDTH = 0.8
 _LEAST_HALF_WIDTH = 0.3
+# Distance from the kerb at which walkers wait, and the least length of a way
+# from the walked strip to there [m].
+_BEFORE_KERB, _SHORTEST_SPUR = 1.4, 1.5
 # Distance of the walked strip from the kerb on any sidewalk; furniture is
 # beside the kerb or the houses [m].
 _WIDEST = 3.0
@@ -281,14 +285,29 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
             if (road.name, end, 1) in nodes and np.allclose(
                 crossing.line, _crossing_line(road, end)
             ):
-                left, right = (nodes[road.name, end, side] for side in (1, -1))
-                line = np.array(
-                    [
-                        places[road.name, end, 1][:3],
-                        *crossing.line,
-                        places[road.name, end, -1][:3],
-                    ]
-                )
+                ends = []
+                for side, kerb in zip((1, -1), crossing.line, strict=True):
+                    number = nodes[road.name, end, side]
+                    start = places[road.name, end, side][:3]
+                    ahead = kerb[:2] - start[:2]
+                    distance = math.dist(kerb[:2], start[:2])
+                    if distance > _BEFORE_KERB + _SHORTEST_SPUR:
+                        # Where a sidewalk is wide, walkers wait at the kerb.
+                        part = 1.0 - _BEFORE_KERB / distance
+                        stop = np.append(start[:2] + part * ahead, start[2])
+                        node, number = number, 2 * len(nodes) + len(found)
+                        found.append(
+                            Walkway(
+                                resampled(np.array([start, stop])),
+                                _CROSSING_HALF_WIDTH,
+                                node,
+                                number,
+                            )
+                        )
+                        start = stop
+                    ends.append((number, start))
+                (left, first), (right, last) = ends
+                line = np.array([first, *crossing.line, last])
                 found.append(
                     Walkway(
                         resampled(line), _CROSSING_HALF_WIDTH, left, right, k

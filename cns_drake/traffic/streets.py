@@ -28,6 +28,11 @@ _HALF_LANE = 1.45
 # the speed limit, and this wait at its end [s].
 _SLOW_PART, WAIT = 0.6, 20.0
 
+# A crossing so near to the stop line lies before it [m].
+_AT_LINE = 6.0
+# How two ways meet that share the lane before them, or that behind them.
+SPLIT, MERGE = 1, 2
+
 # A piece of the lane graph: see `Piece`.
 PIECE = np.dtype(
     [
@@ -56,7 +61,9 @@ class Streets(NamedTuple):
         speed: (M,) allowed speed there, with regard to bends [m/s].
         after: numbers of the pieces that follow each piece.
         phases: (J,) number of phases of a junction's signals.
-        small, large: (P + C, P + C) exclusions [m], see `find_conflicts`.
+        begin, clear, joint: (2, P + C, P + C) see `find_conflicts`.
+        beside: (C,) number of a way with a signal that begins at each crossing,
+            -1 for none.
         until: (K, P + C) float32 time until the ego car is there, 0 while it
             is, inf if it never will be [s].
         ego_rear, ego_front: (K, P) float32 distance of its ends along a piece
@@ -69,8 +76,10 @@ class Streets(NamedTuple):
     speed: np.ndarray
     after: np.ndarray
     phases: np.ndarray
-    small: np.ndarray
-    large: np.ndarray
+    begin: np.ndarray
+    clear: np.ndarray
+    joint: np.ndarray
+    beside: np.ndarray
     until: np.ndarray
     ego_rear: np.ndarray
     ego_front: np.ndarray
@@ -139,13 +148,21 @@ def make_streets(
     for name in ("length", "is_way", "left", "right", "junction", "phase"):
         rows[name] = [getattr(piece, name) for piece in pieces]
     rows["step"] = rows["length"] / (count - 1)
+    conflicts = find_conflicts(graph)
+    signals = np.flatnonzero(rows["phase"] >= 0)
+    beside = np.full(len(graph.crossings), -1)
+    for c in range(len(beside)):
+        begins = conflicts[0][0, signals, len(pieces) + c]
+        if len(signals) and begins.min() < _AT_LINE:
+            beside[c] = signals[begins.argmin()]
     return Streets(
         rows,
         np.concatenate([piece.points for piece in pieces]),
         np.concatenate([_speeds(piece) for piece in pieces]),
         np.array([a for piece in pieces for a in piece.after]),
         np.array(graph.phases or (1,)),
-        *find_conflicts(graph),
+        *conflicts,
+        beside,
         *_find_ego(graph, box, xy, yaw, dt),
     )
 
@@ -173,25 +190,32 @@ def _speeds(piece: Piece) -> np.ndarray:
     return speed
 
 
-def find_conflicts(graph: LaneGraph) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how long pieces and crossings exclude each other.
+def find_conflicts(
+    graph: LaneGraph,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns where pieces and crossings exclude each other.
 
     Two different ways exclude each other if their swept areas meet; lanes
-    exclude nothing. A vehicle on a way excludes the other until its rear has
-    passed the last place where the areas meet.
+    exclude nothing. The matrices are over pieces and then crossings, first
+    while all vehicles are small, and then while one is large.
 
     Returns:
-        Two (P + C, P + C) matrices over pieces and then crossings: while all
-        vehicles are small, and while one is large. Entry (a, b) is the least
-        distance of a rear along a at which b is free again [m]: zero if the
-        two never meet, inf if a is a crossing.
+        (2, P + C, P + C) places of a front along a, where the area of a first
+        meets that of b, inf if the two never meet [m];
+        those of a rear along a, from which on b is free again, 0 if the two
+        never meet, inf if a is a crossing [m];
+        and `SPLIT` or `MERGE` where two ways meet at their beginning or end
+        alone, in the lane that they share.
     """
     small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)
-    results = []
-    for size, axles in (
-        (SMALL_SIZE, small_axles),
-        (LARGEST.size[:2], LARGEST.axles),
+    number = num_pieces + len(graph.crossings)
+    begin = np.full((2, number, number), np.inf)
+    clear = np.zeros(begin.shape)
+    joint = np.zeros(begin.shape, np.int8)
+    origin = {way: k for k in graph.lanes for way in graph.pieces[k].after}
+    for k, (size, axles) in enumerate(
+        ((SMALL_SIZE, small_axles), (LARGEST.size[:2], LARGEST.axles))
     ):
         swept = [
             swept_hulls(piece, size, axles) if piece.is_way else None
@@ -203,19 +227,27 @@ def find_conflicts(graph: LaneGraph) -> tuple[np.ndarray, np.ndarray]:
         ]
         areas += [crossing.area for crossing in graph.crossings]
         tree = shapely.STRtree(areas)
-        matrix = np.zeros((len(areas), len(areas)))
         pairs = tree.query(areas, predicate="intersects").T.tolist()
         shapely.prepare(areas)
         for one, other in pairs:
             if one >= num_pieces > other:
-                matrix[one, other] = np.inf
+                clear[k, one, other] = np.inf
             elif one < num_pieces and one != other:
                 front, hulls = swept[one]
-                meets = shapely.intersects(areas[other], hulls)
-                last = front[1:][meets][-1]
-                matrix[one, other] = max(last - size[0], _STEP)
-        results.append(matrix)
-    return results[0], results[1]
+                meets = np.flatnonzero(shapely.intersects(areas[other], hulls))
+                first, last = meets[0], meets[-1]
+                begin[k, one, other] = front[first]
+                clear[k, one, other] = max(front[last + 1] - size[0], _STEP)
+                if other >= num_pieces or last - first >= len(meets):
+                    continue
+                if first == 0 and origin.get(one, -1) == origin.get(other, -2):
+                    joint[k, one, other] = SPLIT
+                elif (
+                    last == len(hulls) - 1
+                    and graph.pieces[one].after == graph.pieces[other].after
+                ):
+                    joint[k, one, other] = MERGE
+    return begin, clear, np.minimum(joint, joint.transpose(0, 2, 1))
 
 
 def swept_hulls(

@@ -313,9 +313,10 @@ class Trial:
             past_walkers.append(crowd.walkers.copy())
             find_occupants(occupants, streets, cars, k)
             grant_ways(streets, cars, occupants, permits, k, STEP, self._seed)
-            wanted = accelerations(streets, cars, occupants)
+            crossings = permits.crossings
+            wanted = accelerations(streets, cars, occupants, crossings)
             if self._follower is not None:
-                self._follower.step(streets, cars, occupants, k)
+                self._follower.step(streets, cars, occupants, crossings, k)
             change_lanes(streets, cars, occupants, k)
             advance(streets, cars, wanted, STEP, self._seed)
             crowd.step(k * STEP, STEP, self._seed + 1)

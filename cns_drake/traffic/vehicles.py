@@ -14,7 +14,14 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import arcsin, arctan2
 from cns_drake.traffic.lane_graph import LaneGraph
-from cns_drake.traffic.streets import Streets, is_ego_far, places_on, speed_on
+from cns_drake.traffic.streets import (
+    MERGE,
+    SPLIT,
+    Streets,
+    is_ego_far,
+    places_on,
+    speed_on,
+)
 from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP, VehicleKind
 
 # Columns of a vehicle's path: the piece of the front bumper, with as many
@@ -72,6 +79,7 @@ VEHICLE = np.dtype(
         ("v", float),  # Speed [m/s].
         ("granted", bool),  # Whether it may leave its lane.
         ("held", int),  # The way that is kept free for it, -1 for none.
+        ("order", int),  # Among the vehicles with a way: lower ones go first.
         ("since", float),  # Start of its wait for its way, inf for none [s].
         ("refused", float),  # Time without room beyond its way [s].
         ("left_lane", int),  # The lane that it is changing from, or -1.
@@ -355,10 +363,89 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 
 
 @compiled
+def find_prior(
+    streets: Streets, cars: np.ndarray, crossings: np.ndarray, i: int
+) -> tuple[float, float, float]:
+    """Returns what the i-th vehicle has to wait for on the way it holds.
+
+    It stops before a crossing that walkers use, and before the place where its
+    way meets that of a vehicle that got its way earlier and has not yet passed
+    the place. Where both leave one lane or enter one, it follows the other.
+    Thus vehicles wait only for those with a lower `order`, the first for none,
+    and never for ever.
+
+    Args:
+        streets: the lanes.
+        cars: (N,) records `VEHICLE`.
+        crossings: (C,) records `CROSSING`.
+        i: number of the vehicle.
+
+    Returns:
+        The distance to the place where it has to stop, inf for none [m]; gap to
+        one it follows, inf for none [m], and its speed.
+    """
+    line, gap, speed = np.inf, np.inf, 0.0
+    car, pieces = cars[i], streets.pieces
+    way = car.held
+    if way < 0:
+        return line, gap, speed
+    if car.path[CURRENT] == way:
+        front = car.s
+    elif car.path[CURRENT + 1] == way:
+        front = car.s - pieces[car.path[CURRENT]].length
+    else:
+        return line, gap, speed
+    size = int(car.large)
+    for c in range(len(crossings)):
+        place = streets.begin[size, way, len(pieces) + c]
+        if 0 < crossings[c].order < car.order and front <= place:
+            line = min(line, place - front)
+    for j in range(len(cars)):
+        other = cars[j]
+        if j == i or other.held < 0 or other.order > car.order:
+            continue
+        size = int(car.large or other.large)
+        place = streets.begin[size, way, other.held]
+        rear = rear_on_way(streets, other)
+        if place == np.inf or rear >= streets.clear[size, other.held, way]:
+            continue
+        kind = streets.joint[size, way, other.held]
+        if kind == MERGE:
+            rear += pieces[way].length - pieces[other.held].length
+        if kind in (SPLIT, MERGE) and rear > place:
+            if rear - front < gap:
+                gap, speed = rear - front, other.v
+        else:
+            line = min(line, place - front)
+    return line, gap, speed
+
+
+@compiled
+def rear_on_way(streets: Streets, car: Any) -> float:
+    """Returns the place of a vehicle's rear along the way it holds [m]."""
+    rear = car.s - car.length
+    if car.path[CURRENT] == car.held:
+        return rear
+    if car.path[CURRENT - 1] == car.held:
+        return rear + streets.pieces[car.held].length
+    return rear - streets.pieces[car.path[CURRENT]].length
+
+
+@compiled
 def accelerations(
-    streets: Streets, cars: np.ndarray, occupants: Occupants
+    streets: Streets,
+    cars: np.ndarray,
+    occupants: Occupants,
+    crossings: np.ndarray,
 ) -> np.ndarray:
-    """Returns the (N,) accelerations [m/s^2]."""
+    """Returns the (N,) accelerations [m/s^2].
+
+    Args:
+        streets: the lanes.
+        cars: (N,) records `VEHICLE`.
+        occupants: the vehicles on each piece.
+        crossings: (C,) records `CROSSING`.
+    """
     result = np.zeros(len(cars))
     pieces = streets.pieces
     for i in range(len(cars)):
@@ -390,6 +477,10 @@ def accelerations(
             if gap == np.inf:
                 gap, speed = find_ahead(occupants, piece, -begin, i)
             begin += pieces[piece].length
+        stop, gap_2, speed_2 = find_prior(streets, cars, crossings, i)
+        line = min(line, stop)
+        if gap_2 < gap:
+            gap, speed = gap_2, speed_2
         # The driver brakes as for a vehicle behind the stop line.
         loss = interaction(car, line + STANDSTILL_GAP - BEFORE_LINE, v)
         needed = v**2 / (2.0 * max(line, _NO_GAP))

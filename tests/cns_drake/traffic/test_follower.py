@@ -14,6 +14,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.loaded_drive import plan_scenario_traffic
 from cns_drake.traffic.follower import make_follower
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.traffic.right_of_way import make_permits
 from cns_drake.traffic.streets import EgoBox, make_streets
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
 from cns_drake.traffic.vehicles import (
@@ -57,6 +58,7 @@ class Street:
         self.cars["left_lane"] = -1
         self.cars[1] = self.follower.record(self.streets)[0]
         self.occupants = make_occupants(3, 2)
+        self.crossings = make_permits(graph).crossings
 
     def put(self, s, v):
         """Puts the other vehicle, of 4 m, to a place of the first lane."""
@@ -67,7 +69,11 @@ class Street:
     def step(self):
         find_occupants(self.occupants, self.streets, self.cars, 0)
         self.follower.step(
-            self.streets, self.cars, self.occupants, len(self.follower.u) - 1
+            self.streets,
+            self.cars,
+            self.occupants,
+            self.crossings,
+            len(self.follower.u) - 1,
         )
 
     def drive(self):

@@ -351,7 +351,7 @@ def test_graphs_have_no_dead_end(name):
 
 def test_ways_that_cross_exclude_each_other():
     _, graph, _ = roads("suburbia")
-    small, large = find_conflicts(graph)
+    _, (small, large), _ = find_conflicts(graph)
     num = len(graph.pieces)
     lines = [shapely.LineString(p.points[:, :2]) for p in graph.pieces]
     for a in range(num):
@@ -378,10 +378,48 @@ def test_a_way_is_free_behind_the_last_place_where_it_meets_another():
             np.column_stack([20 + 0 * x, x - 20, 0 * x]),
         )
     ]
-    small, large = find_conflicts(LaneGraph(tuple(ways)))
-    for size, found in ((SMALL_SIZE, small), (LARGEST.size, large)):
+    begin, (small, large), joint = find_conflicts(LaneGraph(tuple(ways)))
+    assert not joint.any()
+    for first, size, found in zip(
+        begin, (SMALL_SIZE, LARGEST.size), (small, large), strict=True
+    ):
+        # They are mirror images of each other, but for the length.
+        before = 20.0 - size[1] / 2 - 0.25
+        assert before - 1.01 <= first[0, 1] <= before
+        assert np.isinf(first[0, 0])
         # Half a vehicle with 0.25 m beside it on either way, and the step.
         expected = 20.0 + size[1] / 2 + 0.25
         assert expected <= found[0, 1] <= expected + 1.01
         assert found[1, 0] == pytest.approx(found[0, 1], abs=1.0)
         assert found[0, 0] == found[1, 1] == 0.0
+
+
+@pytest.mark.parametrize(
+    "name", ["downtown", "riverside", "suburbia", "metropolis"]
+)
+def test_traffic_flows(name):
+    """Signals and walkers hold vehicles up for a while, and never for ever."""
+    _, graph, walkways = roads(name)
+
+    def far(t):
+        return np.tile((9000.0, 0.0), (len(t), 1)), np.zeros(len(t))
+
+    traffic = plan_traffic(
+        graph,
+        walkways,
+        vehicles=60,
+        walkers=60,
+        seed=1,
+        duration=300.0,
+        ego=far,
+        ego_box=BOX,
+    )
+    assert traffic.left_out == 0
+    xy = traffic.vehicles.values[:, :, :2]
+    stands = np.linalg.norm(np.diff(xy, axis=0), axis=2) < 0.05
+    assert 0.1 < stands.mean() < 0.5
+    assert stands.mean(axis=0).max() < 0.85
+    # No vehicle stays within ten metres for more than two and a half minutes.
+    for first in range(0, len(xy) - 1500, 250):
+        apart = np.linalg.norm(xy[first : first + 1501] - xy[first], axis=2)
+        assert (apart.max(axis=0) > 10.0).all()

@@ -1,0 +1,215 @@
+"""Vehicles on ways that cross, split and join: closed forms."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cns_drake.traffic.lane_graph import LaneGraph, Piece, make_crossing
+from cns_drake.traffic.right_of_way import grant_ways, make_permits
+from cns_drake.traffic.streets import MERGE, SPLIT, EgoBox, make_streets
+from cns_drake.traffic.vehicles import (
+    CURRENT,
+    VEHICLE,
+    accelerations,
+    advance,
+    find_occupants,
+    find_prior,
+    make_occupants,
+)
+
+DT = 0.1
+C, S = np.cos(0.4), np.sin(0.4)
+R = np.array([[C, -S, 0.0], [S, C, 0.0], [0.0, 0.0, 1.0]])
+
+
+def line(start, end):
+    """Returns points half a metre apart on a line, turned by 0.4 rad."""
+    start, end = np.array([*start, 0.0]), np.array([*end, 0.0])
+    count = int(np.linalg.norm(end - start) / 0.5) + 1
+    return np.linspace(start, end, count) @ R.T
+
+
+def junction(phases=(-1, -1), walkers=False):
+    """Two straight ways of 40 m that cross at right angles at their 20 m."""
+    pieces = [
+        piece
+        for first, along, phase in zip(
+            (0, 3), ((1, 0), (0, 1)), phases, strict=True
+        )
+        for piece in (
+            Piece(
+                line(*(np.multiply(along, s) for s in (-120, -20))),
+                10.0,
+                False,
+                (first + 1,),
+                junction=0,
+            ),
+            Piece(
+                line(*(np.multiply(along, s) for s in (-20, 20))),
+                10.0,
+                True,
+                (first + 2,),
+                junction=0,
+                phase=phase,
+            ),
+            Piece(
+                line(*(np.multiply(along, s) for s in (20, 120))),
+                10.0,
+                False,
+                (first + 1,),
+                junction=0,
+            ),
+        )
+    ]
+    crossings = []
+    if walkers:
+        ends = np.array([[10.0, 4.0, 0.0], [10.0, -4.0, 0.0]]) @ R.T
+        crossings = [make_crossing(ends, 2.4)]
+    graph = LaneGraph(tuple(pieces), tuple(crossings), (1 + max(phases) or 1,))
+    far = np.tile((1e4, 0.0), (1200, 1))
+    streets = make_streets(
+        graph, EgoBox(-1.0, 3.0, 1.0), far, np.zeros(1200), DT
+    )
+    return graph, streets
+
+
+def vehicles(*states):
+    """Returns records of vehicles: the lane, the place on it, the speed."""
+    cars = np.zeros(len(states), VEHICLE)
+    for name in ("held", "left_lane", "path"):
+        cars[name] = -1
+    cars["since"], cars["change_length"] = np.inf, 1.0
+    cars["length"], cars["top"], cars["factor"] = 4.0, 20.0, 1.0
+    cars["a"], cars["b"], cars["headway"] = 1.5, 2.0, 1.3
+    for car, (lane, s, v) in zip(cars, states, strict=True):
+        car["path"][CURRENT : CURRENT + 3] = lane, lane + 1, lane + 2
+        car["s"], car["v"] = s, v
+    return cars
+
+
+def on_way(cars, i, way, s, order):
+    cars["path"][i, CURRENT - 1 : CURRENT + 2] = way - 1, way, way + 1
+    cars["s"][i], cars["held"][i], cars["order"][i] = s, way, order
+
+
+def test_later_ones_wait_for_earlier_ones_alone():
+    _, streets = junction()
+    cars = vehicles((0, 0, 0), (3, 0, 0))
+    none = np.zeros(0, make_permits(LaneGraph(())).crossings.dtype)
+    on_way(cars, 0, 1, 5.0, 7)
+    on_way(cars, 1, 4, 8.0, 8)
+    # The strips are 2.26 m wide, with 0.25 m beside them.
+    before = 20.0 - 2.26 / 2 - 0.25
+    stop, gap, _ = find_prior(streets, cars, none, 1)
+    assert before - 8.0 - 1.01 <= stop <= before - 8.0
+    assert gap == np.inf
+    assert find_prior(streets, cars, none, 0)[:2] == (np.inf, np.inf)
+    cars["order"] = 8, 7
+    assert find_prior(streets, cars, none, 1)[:2] == (np.inf, np.inf)
+    # Once the rear of the first has passed, the second goes on.
+    cars["order"] = 7, 8
+    for rear, waits in ((21.0, True), (22.6, False)):
+        cars["s"][0] = rear + 4.0
+        assert np.isfinite(find_prior(streets, cars, none, 1)[0]) == waits
+
+
+@pytest.mark.parametrize("order", [3, 9])
+def test_vehicles_wait_for_walkers_who_asked_before(order):
+    graph, streets = junction(walkers=True)
+    permits = make_permits(graph)
+    permits.crossings["order"] = order
+    cars = vehicles((0, 0, 0))
+    on_way(cars, 0, 1, 12.0, 5)
+    stop, *_ = find_prior(streets, cars, permits.crossings, 0)
+    if order == 3:
+        # The crossing begins at 28.8 m.
+        assert 28.8 - 12.0 - 1.01 <= stop <= 28.8 - 12.0
+    else:
+        assert stop == np.inf
+
+
+def test_follows_on_ways_from_one_lane_and_to_one():
+    """Bends of 90 deg to either side, from one lane or into one."""
+    angle = np.linspace(0.0, np.pi / 2, 40)
+    left = np.column_stack([np.sin(angle), 1 - np.cos(angle), 0 * angle]) * 15
+    right = left * (1, -1, 1)
+    far = np.tile((1e4, 0.0), (2, 1))
+    box = EgoBox(-1.0, 3.0, 1.0)
+    for sign, kind in ((1, SPLIT), (-1, MERGE)):
+        ways = [sign * one[::sign] for one in (left, right)]
+        lanes = [
+            line((-60, 0), (0, 0)) @ R
+            if kind == SPLIT
+            else line((0, 0), (60, 0)) @ R
+        ]
+        pieces = [Piece(p @ R.T, 9.0, False, junction=0) for p in lanes]
+        pieces += [
+            Piece(p @ R.T, 9.0, True, (0,) * (kind == MERGE), junction=0)
+            for p in ways
+        ]
+        if kind == SPLIT:
+            pieces[0] = Piece(lanes[0] @ R.T, 9.0, False, (1, 2), junction=0)
+        graph = LaneGraph(tuple(pieces), phases=(1,))
+        streets = make_streets(graph, box, far, np.zeros(2), DT)
+        assert streets.joint[0, 1, 2] == streets.joint[0, 2, 1] == kind
+        cars = vehicles((0, 0, 0), (0, 0, 0))
+        cars["path"] = -1
+        length = streets.pieces["length"][1]
+        places = (5.5, 0.5) if kind == SPLIT else (length - 0.5, length - 5.5)
+        for i, s in enumerate(places):
+            cars["path"][i, CURRENT], cars["s"][i] = 1 + i, s
+            cars["held"][i], cars["order"][i], cars["v"][i] = 1 + i, i, 6.0 - i
+        none = np.zeros(0, make_permits(LaneGraph(())).crossings.dtype)
+        stop, gap, speed = find_prior(streets, cars, none, 1)
+        assert stop == np.inf
+        assert gap == pytest.approx(1.0, abs=0.01)
+        assert speed == 6.0
+
+
+def drive(phases, states, steps=600, walkers=False):
+    """Returns places and speeds (T, N) along the way of vehicles."""
+    graph, streets = junction(phases, walkers)
+    cars, permits = vehicles(*states), make_permits(graph)
+    occupants = make_occupants(len(graph.pieces), len(cars))
+    along = {0: -100.0, 1: 0.0, 2: 40.0, 3: -100.0, 4: 0.0, 5: 40.0}
+    places = []
+    for k in range(steps):
+        places.append([along[c["path"][CURRENT]] + c["s"] for c in cars])
+        find_occupants(occupants, streets, cars, k)
+        grant_ways(streets, cars, occupants, permits, k, DT, 1)
+        wanted = accelerations(streets, cars, occupants, permits.crossings)
+        advance(streets, cars, wanted, DT, 1)
+    return SimpleNamespace(s=np.array(places), cars=cars)
+
+
+def test_two_who_cross_never_are_there_together():
+    found = drive((-1, -1), ((0, 60.0, 8.0), (3, 61.0, 8.0)))
+    inside = (found.s > 20 - 1.13) & (found.s - 4.0 < 20 + 1.13)
+    assert inside.any(axis=0).all()
+    assert not inside.all(axis=1).any()
+
+
+def test_every_driver_stops_where_there_is_no_signal():
+    found = drive((-1, -1), ((0, 40.0, 9.0),), 300)
+    speed = np.diff(found.s[:, 0]) / DT
+    stands = np.flatnonzero(speed < 0.5)
+    # For 3 s, and the time of slowing down and starting.
+    assert 3.0 <= len(stands) * DT < 5.0
+    assert (np.abs(found.s[stands, 0] + 1.0) < 3.0).all()
+    assert found.s[-1, 0] > 60.0
+
+
+def test_red_holds_vehicles_while_others_have_green():
+    """Green is from 0 to 27 s and from 31 to 58 s; one of each at 20 s."""
+    found = drive((0, 1), ((0, 80.0, 9.0), (3, 80.0, 9.0)))
+    entered = (found.s > 0.0).argmax(axis=0) * DT
+    assert entered[0] < 5.0
+    # The second waits alone for eight seconds, and the signal changes.
+    assert 8.0 < entered[1] < 15.0
+    queue = tuple((0, 98.0 - 7.0 * k, 0.0) for k in range(14))
+    found = drive((0, 1), ((3, 98.0, 0.0), *queue))
+    entered = (found.s > 0.0).argmax(axis=0) * DT
+    assert 31.0 < entered[0] < 34.0
+    later = entered[entered > 27.0]
+    assert (later > 31.0).all()
