@@ -10,6 +10,8 @@ import zipfile
 
 import pytest
 
+from cns_drake.base.version import __version__
+
 ROOT = Path(__file__).parents[2]
 # As in a workflow of a repository.
 REPOSITORY = {
@@ -49,7 +51,7 @@ def test_it_is_small_and_has_its_notices(wheel):
         said = files.read(metadata).decode()
     assert {"LICENSE", "NOTICE.md", "py.typed"} <= names
     assert "\nLicense-Expression: BSD-3-Clause\n" in said
-    assert "\nVersion: 1.0.0\n" in said
+    assert f"\nVersion: {__version__}\n" in said
     assert f"\nProject-URL: Source, {PAGE}\n" in said
     assert "\nProject-URL: Paper, https://arxiv.org/" in said
     pictures = re.findall(r"!\[[^]]*\]\((.*?)\)", said)
