@@ -8,15 +8,24 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.poses import transform
+from cns_drake.base.poses import make_pose, transform
 from evaluation.drives import open_drive
 from evaluation.drives.query_sensor import QuerySensor
 from evaluation.drives.sampling import gather
-from evaluation.methods import Method, MethodConfig
+from evaluation.methods import (
+    Method,
+    MethodConfig,
+    make_method,
+)
 from evaluation.methods.btc import align
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.place_recognition import run
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import (
+    FAIR_PROTOCOL,
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+    check_one_protocol,
+)
 from evaluation.recognition.retrieval import retrieve
 
 P_WL = np.random.default_rng(5).uniform(-30.0, 30.0, (200, 3))
@@ -208,6 +217,58 @@ def test_overlaps_do_not_depend_on_the_heading(drives):
         for one in (protocol, turned)
     )
     np.testing.assert_allclose(other, plain, atol=1e-9)
+
+
+def test_protocols_have_names():
+    assert (FAIR_PROTOCOL.name, PAPER_PROTOCOL.name) == ("fair", "paper")
+    assert replace(FAIR_PROTOCOL, radius=12.0, gate=True).name == "fair"
+    assert replace(FAIR_PROTOCOL, seed=1).name == "own"
+    assert RetrievalProtocol().name == "recorded"
+    assert RetrievalProtocol(hide_sector=30.0).name == "own"
+    check_one_protocol([FAIR_PROTOCOL, replace(FAIR_PROTOCOL, radius=3.0)])
+    with pytest.raises(InputError, match="fair and paper in one table"):
+        check_one_protocol([FAIR_PROTOCOL, PAPER_PROTOCOL])
+
+
+@pytest.mark.parametrize("turn_deg", [90.0, 180.0, 270.0])
+def test_turns_of_a_grid_change_nothing(turn_deg):
+    """Scan Context ignores headings but for its grids' steps."""
+    method = make_method("scan-context++", {})
+    rng = np.random.default_rng(4)
+    walls = rng.uniform([-40.0, -40.0, -1.5], [40.0, 40.0, 6.0], (4000, 3))
+    walls[::2, 0] = np.round(walls[::2, 0] / 20.0) * 20.0 + 0.37
+    places = [walls, np.add(walls, (3.0, -2.0, 0.0)), walls * (0.8, 1.1, 1.0)]
+    database = method.build_database(
+        [method.describe_batch([one], of_places=True)[0] for one in places]
+    )
+    # Quarters of a turn, to the last bit.
+    c, s = (round(f(np.radians(turn_deg))) for f in (np.cos, np.sin))
+    turned = walls @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    asked, expected = (
+        method.score(
+            method.describe_batch([one], of_places=False)[0],
+            database,
+            exhaustive=True,
+        )
+        for one in (turned, walls)
+    )
+    assert expected[0] > expected[2]
+    np.testing.assert_allclose(asked, expected, rtol=0.0, atol=1e-9)
+
+
+def test_a_turn_of_360_deg_is_none(drives, monkeypatch):
+    once = retrieve(*drives, Corresponding(), RetrievalProtocol())
+
+    R = Rotation.from_euler("z", 2.0 * np.pi)
+
+    def whole(*arguments):
+        return QuerySensor(make_pose(R.as_matrix(), np.zeros(3)))
+
+    monkeypatch.setattr(QuerySensor, "draw", whole)
+    turning = RetrievalProtocol(turn_queries=True)
+    again = retrieve(*drives, Corresponding(), turning)
+    np.testing.assert_allclose(again.scores, once.scores, atol=1e-9)
+    assert (again.matches == once.matches).all()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ METHODS = ("a", "b", "c", "d")
 HEADER = ("map", "db", "query", "method", "correct", "has_match", "score")
 
 
-def write_report(folder, pairs, number=200):
+def write_report(folder, pairs, number=200, protocols=()):
     """Writes a report in which all scores of a method are equal.
 
     AUC is then the part of its best places that are right.
@@ -22,17 +22,20 @@ def write_report(folder, pairs, number=200):
         folder: to write.
         pairs: pair -> part that is right, of each method.
         number: of queries of each pair.
+        protocols: names in a further column, which repeats the table.
     """
     folder.mkdir()
     with (folder / "queries.csv").open("w", newline="") as stream:
         table = csv.writer(stream)
-        table.writerow(HEADER)
+        table.writerow((*HEADER, "protocol") if protocols else HEADER)
         for pair, parts in pairs.items():
             for method, part in zip(METHODS, parts, strict=False):
                 for k in range(number):
                     right = int(k < part * number)
                     row = ("town", "01", pair, method, right, 1, 0.5)
-                    table.writerow(row)
+                    table.writerows((*row, one) for one in protocols)
+                    if not protocols:
+                        table.writerow(row)
     return folder
 
 
@@ -108,3 +111,26 @@ def test_bad_tables_are_named(tmp_path, text, fault):
     bad.write_text(text)
     with pytest.raises(InputError, match=fault):
         rank_agreement(good, bad)
+
+
+def test_rows_of_one_protocol_count(tmp_path):
+    parts = {"02": (0.1, 0.4, 0.7, 0.9)}
+    plain = write_report(tmp_path / "plain", parts)
+    both = write_report(tmp_path / "both", parts, 200, ("paper", "fair"))
+    alone = write_report(tmp_path / "alone", parts, 200, ("recorded",))
+    expected = rank_agreement(plain, plain)
+    np.testing.assert_allclose(expected.second, parts["02"])
+    for one in (both, alone):
+        found = rank_agreement(plain, one)
+        assert found.to_json() == expected.to_json()
+    two = write_report(tmp_path / "two", parts, 20, ("paper", "own"))
+    with pytest.raises(InputError, match="paper and own in one table"):
+        rank_agreement(plain, two)
+    rank_agreement(plain, two, protocol="paper")
+    with pytest.raises(InputError, match="no query by protocol fair"):
+        rank_agreement(plain, two, protocol="fair")
+    with pytest.raises(InputError, match="'mine' is unknown"):
+        rank_agreement(plain, two, protocol="mine")
+    odd = write_report(tmp_path / "odd", parts, 20, ("fiar",))
+    with pytest.raises(InputError, match="line 2: protocol: 'fiar'"):
+        rank_agreement(odd, plain)
