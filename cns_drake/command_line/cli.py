@@ -51,9 +51,7 @@ app.command(
     epilog=example("cns-drake reproduce metropolis --output study --quick")
 )(reproduce)
 app.command(
-    epilog=example(
-        "cns-drake fresh suburbia --number 1 --number 2 --output fresh"
-    )
+    epilog=example("cns-drake fresh suburbia --number 2 --output fresh")
 )(fresh)
 app.command(
     epilog=example(
@@ -69,7 +67,8 @@ app.command(
 )(overlap)
 app.command(
     epilog=example(
-        "cns-drake map-truth metropolis_01 metropolis_04 --output changed",
+        "cns-drake map-truth metropolis_01 metropolis_04 \\",
+        "    --output maps",
     )
 )(map_truth)
 app.command(epilog=example("cns-drake map-pairs suburbia_5 --output pairs"))(
@@ -89,11 +88,9 @@ app.command(
         "    --format pointnetvlad --output pairs",
     ),
 )(export_pairs)
-app.command(
-    epilog=example(
-        "cns-drake size metropolis --places 0 --places 1000 --output size"
-    )
-)(size)
+app.command(epilog=example("cns-drake size suburbia --places 0 --output size"))(
+    size
+)
 app.command(
     "import",
     epilog=example(

@@ -210,7 +210,7 @@ def turned(values: Any, turn_deg: float) -> Any:
         return [turned(one, turn_deg) for one in values]
     if not isinstance(values, Mapping):
         return values
-    result = {}
+    result: dict[str, Any] = {}
     for name, value in values.items():
         if name in _PLACES and isinstance(value, list):
             result[name] = _turned_place(value, turn_deg)

@@ -309,7 +309,7 @@ def _viewpoint(
     drives: RungDrives, offset: tuple[float, float], _: int
 ) -> RungDrives:
     left, heading_deg = offset
-    plain_left, _ = VIEWPOINTS[NEAR]
+    plain_left = VIEWPOINTS[NEAR][0]
     moved = mapped_from(drives.database, 0.0, left - plain_left, heading_deg)
     return replace(drives, database=moved)
 

@@ -268,7 +268,7 @@ def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
             "position": positions[number],
         }
         kind = _tuple_class()
-        one = kind.__new__(kind)
+        one = kind()
         one.__dict__.update(values)
         found[number] = one
     return found

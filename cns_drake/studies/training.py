@@ -310,7 +310,7 @@ def train(
         )
         return cross.mean(), (best > 0.0).mean()
 
-    @jax.jit
+    @jax.jit  # type: ignore[untyped-decorator]  # JAX is no dependency.
     def update(
         values: Parameters,
         first: Parameters,

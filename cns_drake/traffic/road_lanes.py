@@ -306,8 +306,8 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                         )
                         start = stop
                     ends.append((number, start))
-                (left, first), (right, last) = ends
-                line = np.array([first, *crossing.line, last])
+                (left, one), (right, other) = ends
+                line = np.array([one, *crossing.line, other])
                 found.append(
                     Walkway(
                         resampled(line), _CROSSING_HALF_WIDTH, left, right, k

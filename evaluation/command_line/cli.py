@@ -186,7 +186,7 @@ def pr(
     *,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Place recognition of one drive in another.
+    """Place recognition between two drives.
 
     Measures how well the scans of QUERY find their place in DATABASE. Both are
     recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in
@@ -313,8 +313,8 @@ def scores(
 
 app.command(
     epilog=example(
-        "cns-eval localise drives/metropolis_01 drives/metropolis_04 \\",
-        "    --method gicp --start 1 --start-turn 5",
+        "cns-eval localise drives/metropolis_01 \\",
+        "    drives/metropolis_04 --method gicp --start 1 --start-turn 5",
     )
 )(localise)
 

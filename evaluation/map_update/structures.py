@@ -90,7 +90,7 @@ def write_structures(
             session.instances, labels, session.side
         )
         kinds = {label: label.name.lower() for label in SIDES[session.side]}
-        for number, count, verdict in zip(
+        for number, (points, observed, changed), verdict in zip(
             numbers.tolist(), counts.tolist(), found.tolist(), strict=True
         ):
             entry = names.get(number, {})
@@ -101,7 +101,9 @@ def write_structures(
                     str(entry.get("name", "")),
                     str(entry.get("class", "")),
                     int(entry.get("label", 0)),
-                    *count,
+                    points,
+                    observed,
+                    changed,
                     kinds[verdict],
                 )
             )

@@ -1,6 +1,13 @@
 """Place-recognition methods, one a file, all behind one interface."""
 
-from evaluation.methods import btc, layered_overlap, ringpp, scan_context, solid  # noqa: F401  (register themselves)
+from evaluation.methods import (  # noqa: F401  (register themselves)
+    btc,
+    layered_overlap,
+    learned,
+    ringpp,
+    scan_context,
+    solid,
+)
 from evaluation.methods.method import (
     Method,
     MethodConfig,

@@ -196,10 +196,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 _METHODS: dict[str, type[Method]] = {}
 # Methods that run only if they are named: name -> module. Some need another
 # package.
-_OPTIONAL = {
-    "learned": "evaluation.methods.learned",
-    "map-closures": "evaluation.methods.map_closures",
-}
+_OPTIONAL = {"map-closures": "evaluation.methods.map_closures"}
 
 # The methods of the interface, which the author may have written.
 _CALLED = (

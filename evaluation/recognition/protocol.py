@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cns_drake.base.errors import InputError
 
@@ -154,7 +154,7 @@ class RetrievalProtocol:
         return "recorded" if self.place == "middle" else "paper"
 
     @property
-    def _asked(self) -> dict[str, object]:
+    def _asked(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in _ASKED}
 
     @property

@@ -306,7 +306,8 @@ def ladder_table(
         {name: name for name in _OPTIONS},
         lambda row, name: getattr(protocol, name),
     )
-    options |= {
+    options = {
+        **options,
         "viewpoint": lambda _: viewpoint,
         "protocol": lambda _: protocol.name,
         "auc_strict": lambda row: row.mean(_strict_auc),
@@ -381,9 +382,9 @@ def crossed_rows(
             strongest[key] = row
     found = []
     for pair in pairs:
-        key = pair.rung.map_name, pair.method, pair.is_gated
+        drive = pair.rung.map_name, pair.method, pair.is_gated
         one, other = (
-            strongest[(*key, cause)] for cause in pair.rung.cause.split("+")
+            strongest[(*drive, cause)] for cause in pair.rung.cause.split("+")
         )
         draws = (pair.unchanged, one.draws, other.draws, pair.draws)
         weights = resampled_weights(
@@ -404,11 +405,14 @@ def crossed_rows(
 
 def pair_table(rows: Sequence[LadderRow], pairs: Iterable[LadderRow]) -> Table:
     """Returns a row for each pair of causes, method and gate."""
-    keys: Columns[CrossedRow] = {
-        name: (lambda crossed, value=value: value(crossed.pair))
-        for name, value in _keys().items()
-        if name not in ("cause", "level")
-    }
+    keys: Columns[CrossedRow] = keyed(
+        {
+            name: value
+            for name, value in _keys().items()
+            if name not in ("cause", "level")
+        },
+        lambda crossed, value: value(crossed.pair),
+    )
     return Table.of(
         crossed_rows(rows, pairs),
         {

@@ -257,8 +257,11 @@ def protocol_columns(path: str) -> Columns[Any]:
     Args:
         path: attributes that lead from the item to its protocol.
     """
-    options = {name: attrgetter(f"{path}.{name}") for name in PROTOCOL_COLUMNS}
-    return {**options, "protocol": attrgetter(f"{path}.name")}
+    columns = keyed(
+        {name: name for name in PROTOCOL_COLUMNS},
+        lambda item, name: attrgetter(f"{path}.{name}")(item),
+    )
+    return {**columns, "protocol": attrgetter(f"{path}.name")}
 
 
 def _rows(values: Sequence[object]) -> list[tuple[object, ...]]:

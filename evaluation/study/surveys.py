@@ -414,8 +414,8 @@ class Survey(Step):
     def _write(
         self, found: RecordingSurvey, missing: Mapping[Part, Mapping]
     ) -> None:
-        for part, one in self._described().items():
-            key = one.key if isinstance(one, Description) else one.name
+        for part, what in self._described().items():
+            key = what.key if isinstance(what, Description) else what.name
             if part in missing and key in found.described:
                 # Each value is dropped when it is written.
                 value = found.drive.placed, found.described.pop(key)

@@ -280,7 +280,7 @@ def measure_database(
     change = temporal_change(
         database.drive.coarse.centroids_W, query_track.coarse.centroids_W
     )
-    points = []
+    points: list[TrendPoint] = []
     visible_change = math.nan
     for method, part in zip(running, described, strict=True):
         _, queries = part.read()
@@ -325,7 +325,7 @@ def _visible_change(
     protocol: RetrievalProtocol,
 ) -> float:
     """Returns the mean over queries, see `PairEvidence`."""
-    is_match = retrieval.matches.any(axis=0)
+    is_match = np.any(retrieval.matches, axis=0).tolist()
     place_scans = [
         gather(database, frame, 1, protocol.max_range)
         if is_needed

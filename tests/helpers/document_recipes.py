@@ -677,11 +677,24 @@ RECIPES = {
         prints=("exact.csv",),
     ),
     "localisation": Recipe(
-        ".venv/bin/cns-eval localise",
+        ".venv/bin/cns-eval localise output/metropolis_01 "
+        "output/metropolis_04 --method gicp --start",
         changes=(_FIRST, _LAST),
         after=("own city",),
         prints=("within 0.3 m and 1 deg",),
         makes=("localisation/localisation.csv",),
+    ),
+    "home: place recognition": Recipe(
+        ".venv/bin/cns-drake reproduce metropolis --output output",
+        changes=(("reproduce metropolis", "reproduce town"),),
+        after=("own city",),
+    ),
+    "home: localisation": Recipe(
+        ".venv/bin/cns-eval localise output/metropolis_01 "
+        "output/metropolis_04 --method gicp --track",
+        changes=(_FIRST, _LAST, ("output localisation", "output tracked")),
+        after=("own city",),
+        makes=("tracked/track.png",),
     ),
     "pairs": Recipe(
         ".venv/bin/cns-drake export-pairs riverside_01 riverside_02 "
@@ -720,7 +733,7 @@ RECIPES = {
         prints=("overlaps/overlaps.npz",),
     ),
     "map truth": Recipe(
-        ".venv/bin/cns-drake map-truth",
+        ".venv/bin/cns-drake map-truth metropolis",
         changes=(
             (
                 "metropolis_01 metropolis_04",
@@ -728,8 +741,8 @@ RECIPES = {
             ),
         ),
         after=("own city",),
-        prints=("changed",),
-        makes=("changed/A/truth.npy", "changed/index.html"),
+        prints=("maps",),
+        makes=("maps/A/truth.npy", "maps/index.html"),
     ),
     "help: map-truth": Recipe(
         "cns-drake map-truth metropolis_01",
@@ -738,7 +751,7 @@ RECIPES = {
                 "metropolis_01 metropolis_04",
                 "town/sequence_01.yaml town/sequence_02.yaml --spacing 20",
             ),
-            ("output changed", "output shown"),
+            ("output maps", "output shown"),
         ),
         after=("own city",),
         prints=("shown",),
@@ -749,13 +762,13 @@ RECIPES = {
         prints=("mean IoU", "by structure"),
     ),
     "help: map-update": Recipe(
-        "cns-eval map-update changed",
+        "cns-eval map-update maps",
         after=("map truth",),
         prints=("mean IoU",),
     ),
     "map sessions": Recipe(
         ".venv/bin/cns-eval map-sessions",
-        changes=(_FIRST, _LAST),
+        changes=(_FIRST, _LAST, ("drives/", "output/")),
         after=("own city",),
         prints=("real",),
         makes=("real/A/map.ply",),
@@ -763,8 +776,8 @@ RECIPES = {
     "help: map-sessions": Recipe(
         "cns-eval map-sessions mulran",
         changes=(
-            ("mulran/KAIST01", "drives/town_01"),
-            ("mulran/KAIST02", "drives/town_02"),
+            ("mulran/KAIST01", "output/town_01"),
+            ("mulran/KAIST02", "output/town_02"),
             ("kaist", "sessions"),
         ),
         after=("own city",),
@@ -838,6 +851,12 @@ NOT_RUN = {
     "pip install '.[kiss-matcher]'": "installs another extra",
     "python -m pydrake.visualization.meldis": "a server, which does not end; "
     "test_example_diagrams runs the scenario",
+    ".venv/bin/python diagrams/hardware_scenario.py": "runs in real time; "
+    "test_example_diagrams runs it, too",
+    ".venv/bin/cns-drake map-truth suburbia": "drives through a shipped city, "
+    "for minutes",
+    ".venv/bin/cns-drake import neukolln": "needs the file that is not shipped",
+    "/** A batch of rays": "C++ of a design",
     "lidars: typing.Mapping": "lines of an example of Drake's",
     "for _, lidar in scenario": "likewise",
     "@misc{song2025city": "a citation",

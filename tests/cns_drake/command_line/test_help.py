@@ -90,7 +90,7 @@ def test_options_have_units():
         for each in find(*words).params
         for unit in re.findall(r"\[.*?\]", each.help or "")
     }
-    assert units == {"[m]", "[m, rad]", "[s]"}
+    assert units == {"[m]", "[m, rad]", "[deg]", "[s]"}
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

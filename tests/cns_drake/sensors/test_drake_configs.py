@@ -98,8 +98,8 @@ def test_yaml_and_back():
     again = yaml_load_typed(schema=LidarConfig, data=text)
     assert yaml_dump_typed(again, schema=LidarConfig) == text
     assert "preset: vlp-16" in text
-    with pytest.raises(RuntimeError, match="columms"):
-        yaml_load_typed(schema=LidarConfig, data="{columms: 3}")
+    with pytest.raises(RuntimeError, match="furrows"):
+        yaml_load_typed(schema=LidarConfig, data="{furrows: 3}")
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,7 @@ def test_text_stands_out(browser, address, scheme):
 def test_table_ii_fits_its_box(browser, content, tmp_path):
     path = tmp_path / "report.html"
     results = [make_result(name, [0, 1, 4, 6, 3]) for name in known_methods()]
-    assert len(results) == 5
+    assert len(results) == 6
     page = replace(
         content, recognitions=results, evidence={}, reference=paper()
     )

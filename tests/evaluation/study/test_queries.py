@@ -94,7 +94,8 @@ def test_place_recognition(report):
     # Two modes; two pairs by each method, and the paper's own by its protocol.
     of_paper = [key for key in groups if key[-1] == "paper"]
     assert {key[3] for key in of_paper} == set(known_methods()) - {
-        "layered-overlap"
+        "layered-overlap",
+        "learned",
     }
     assert len(table) == 2 * len(groups)
     assert len(groups) - len(of_paper) == 2 * len(known_methods())
