@@ -201,13 +201,14 @@ def make_imported(
             Part(part, MeshShape(f"{name}_{part}"), rgb=colours.get(part))
             for part in filled
         ),
-        {f"{name}_{part}": _to_mesh(some) for part, some in filled.items()},
+        {f"{name}_{part}": to_mesh(some) for part, some in filled.items()},
         hull_of(triangles.reshape(-1, 3)[:, :2]),
     )
     structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
     return Imported(structure, kind, year, triangles, until, tags or {}, lod)
 
 
-def _to_mesh(triangles: np.ndarray) -> Mesh:
+def to_mesh(triangles: np.ndarray) -> Mesh:
+    """Returns triangles (M, 3, 3) as a mesh [m]."""
     corners = np.arange(3 * len(triangles)).reshape(-1, 3)
     return Mesh(triangles.reshape(-1, 3), tuple(map(tuple, corners.tolist())))

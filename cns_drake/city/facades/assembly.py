@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades import massing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes, object_mesh
@@ -260,7 +261,7 @@ class Assembly:
             mesh = merge_meshes(*pieces).moved(translation, yaw)
             self._pieces[material] = [mesh]
 
-    def finish(self, footprint: Polygon) -> Model:
+    def finish(self, footprint: BaseGeometry) -> Model:
         """Adds a part for each material in use; returns the building."""
         for material, pieces in self._pieces.items():
             self.add(material, *pieces, rgb=self._colours[material])

@@ -10,7 +10,7 @@ that a ledge runs around them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 import itertools
 import math
@@ -290,16 +290,6 @@ def _face(*corners: tuple[tuple[float, float], float]) -> list[Corner]:
     return [Corner(x, z, depth, 0) for (x, z), depth in corners]
 
 
-__all__ = [
-    "Arch",
-    "Band",
-    "Facade",
-    "Layout",
-    "Patch",
-    "Relief",
-    "facade_mesh",
-    "glass_mesh",
-]
 Layout = Callable[[int, float], Sequence[Relief]]
 _Strip = TypeVar("_Strip", Band, Relief)
 
@@ -330,12 +320,12 @@ class Facade:
 
     def stacked(self, count: int) -> Facade:
         """Returns `count` copies of these storeys on top of one another."""
-        bands = tuple(_lifted(b, k * self.height) for k in range(count)
+        bands = tuple(lifted(b, k * self.height) for k in range(count)
                       for b in self.bands)  # fmt: skip
 
         def layout(edge: int, length: float) -> Sequence[Relief]:
             return tuple(
-                _lifted(relief, k * self.height)
+                lifted(relief, k * self.height)
                 for relief in self.layout(edge, length)
                 for k in range(count)
             )
@@ -344,7 +334,8 @@ class Facade:
         return Facade(height, bands, layout, self.glass, self.plain)
 
 
-def _lifted(item: _Strip, dz: float) -> _Strip:
+def lifted(item: _Strip, dz: float) -> _Strip:
+    """Returns a band or a relief higher up by `dz` [m]."""
     moved = {
         name: getattr(item, name) + dz
         for name in item._fields
@@ -374,6 +365,42 @@ def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
 def glass_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
     """Returns the glass that `facade_mesh` leaves out."""
     return _quads_mesh(points, facade, z0, glass_quads)
+
+
+def single_wall(
+    length: float,
+    height: float,
+    reliefs: Sequence[Relief],
+    fronts: Sequence[Iterable[float]],
+) -> list[Mesh]:
+    """Returns a wall that meets no other, in the coordinates of a wall.
+
+    Args:
+        length, height: [m].
+        reliefs: painted in order; they stay clear of both ends.
+        fronts: the depths whose fronts, as glass, are a mesh of their own, for
+            each of these [m].
+
+    Returns:
+        The wall without these fronts, then each of them.
+
+    Raises:
+        ValueError: a relief leaves the wall.
+    """
+    zs = breaks(height, [v for r in reliefs for v in (r.z0, r.z1)])
+    rows = np.zeros(len(zs) - 1, dtype=int)
+    grid = WallCells.painted(length, zs, rows, (), reliefs)
+    left_out = tuple(itertools.chain(*fronts))
+    found = [wall_quads(grid, left_out)]
+    found += [glass_quads(grid, tuple(depths)) for depths in fronts]
+    meshes = []
+    for quads in found:
+        corners = [(x, -depth, z) for quad in quads for x, z, depth, _ in quad]
+        # These coordinates are left-handed.
+        faces = np.arange(len(corners)).reshape(-1, 4)[:, ::-1].tolist()
+        vertices = np.array(corners).reshape(-1, 3)
+        meshes.append(_welded(vertices, list(map(tuple, faces))))
+    return meshes
 
 
 def _quads_mesh(

@@ -9,10 +9,11 @@ from embreex.rtcore_scene import EmbreeScene
 import numpy as np
 from scipy.spatial import KDTree
 import shapely
-from shapely.geometry import LineString, MultiLineString
+from shapely.geometry import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.structures import MeshShape, Model, Part
+from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.geometry.structures import MeshShape, Model
 from cns_drake.city.geometry.upper_sides import (
     UpperSides,
     looks_up,
@@ -20,11 +21,10 @@ from cns_drake.city.geometry.upper_sides import (
 )
 from cns_drake.imports.dressing.facade_pieces import (
     FacadePlan,
-    Faces,
     add_facade,
+    add_roof_pieces,
     is_flat_roof,
     plan_facade,
-    roof_pieces,
     with_doors,
     with_shops,
 )
@@ -36,7 +36,12 @@ from cns_drake.imports.dressing.wall_panels import (
     joined,
 )
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import Imported, Street, random_generator
+from cns_drake.imports.foreign_city import (
+    Imported,
+    Street,
+    random_generator,
+    to_mesh,
+)
 from cns_drake.imports.ground import Ground
 
 # A building whose feet are farther from the ground was sunk into it [m].
@@ -344,18 +349,30 @@ def _dressed(
         paths: paths of the drives.
         seed: seed of the random draws.
     """
-    faces = Faces()
+    structure, style = some.one.structure, some.style
+    footprint = structure.model.footprint
+    out = Assembly(Site(Polygon(), structure.name), some.rng)
+    out.paint(
+        body=style.wall,
+        doors=style.door,
+        frames=style.frame,
+        glass=style.glass,
+        roof=style.roof,
+        sign=style.sign,
+        trim=style.trim,
+    )
     walls = _undressed_walls(some, [plan for plan, _ in plans])
-    faces.add("body", walls)
-    faces.add("body", some.rest)
-    faces.add("roof", some.roof)
+    out.add_to("body", to_mesh(walls), to_mesh(some.rest))
+    out.add_to("roof", to_mesh(some.roof))
+    counts: Counter[str] = Counter()
     for plan, distance in plans:
-        name = _wall_name(plan.panel)
-        rng = random_generator(seed, name, some.one.draw_name)
-        add_facade(faces, plan, distance, rng)
-    roof = _roof(some, paths)
-    faces.counts["roof equipment and chimneys"] += len(roof.parts)
-    return _assembled(some, faces, roof), faces.counts
+        rng = random_generator(seed, _wall_name(plan.panel), some.one.draw_name)
+        counts += add_facade(out, plan, distance, rng)
+    has_own_roof = some.one.lod >= _OWN_ROOF or not len(some.roof)
+    if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
+        add_roof_pieces(out, some.roof, style, some.is_flat)
+    counts["roof equipment and chimneys"] = len(out.parts)
+    return out.finish(footprint), counts
 
 
 def _plans(
@@ -483,7 +500,7 @@ def _front(
     members: Sequence[int], plans: Sequence[FacadePlan], to_way: np.ndarray
 ) -> int | None:
     """Returns the number of the wall that gets a building's door."""
-    possible = [k for k in members if plans[k].street_openings.any()]
+    possible = [k for k in members if plans[k].on_street]
     return min(possible, key=lambda k: (to_way[k], k)) if possible else None
 
 
@@ -496,50 +513,7 @@ def _undressed_walls(some: Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
     return np.array(kept).reshape(-1, 3, 3)
 
 
-def _roof(some: Bare, paths: BaseGeometry) -> Model:
-    near = False
-    if len(some.roof) and some.one.lod < _OWN_ROOF and not paths.is_empty:
-        outline = some.one.structure.model.footprint
-        near = bool(shapely.dwithin(outline, paths, _ROOFS_WITHIN))
-    roof = some.roof if near else np.zeros((0, 3, 3))
-    if not near:
-        return Model((), {}, some.one.structure.model.footprint)
-    return roof_pieces(
-        roof, some.style, some.is_flat, some.rng, some.one.structure.name
-    )
-
-
 def _wall_name(panel: Panel) -> str:
     """Returns a name of a wall that does not depend on the map's origin."""
     heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
     return f"wall {panel.length:.1f} {heading:.0f}"
-
-
-def _assembled(some: Bare, faces: Faces, roof: Model) -> Model:
-    style, structure = some.style, some.one.structure
-    colours = {
-        "body": style.wall,
-        "roof": style.roof,
-        "glass": style.glass,
-        "frames": style.frame,
-        "trim": style.trim,
-        "doors": style.door,
-        "sign": style.sign,
-    }
-    meshes = {
-        f"{structure.name}_{material}": mesh
-        for material, mesh in faces.meshes().items()
-    }
-    parts = tuple(
-        Part(
-            material := name.removeprefix(f"{structure.name}_"),
-            MeshShape(name),
-            rgb=colours[material],
-        )
-        for name in meshes
-    )
-    return Model(
-        parts + roof.parts,
-        {**meshes, **roof.meshes},
-        structure.model.footprint,
-    )

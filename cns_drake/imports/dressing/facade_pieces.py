@@ -1,39 +1,38 @@
 """The dressed walls and roofs of imported buildings.
 
-A wall gets windows, of which some become doors and shops, and their faces;
-a roof gets equipment or chimneys.
+A wall is divided into storeys and bays, which are filled like those of
+generated buildings; a roof gets equipment or chimneys.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 import math
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from shapely.geometry import Polygon, box
 
-from cns_drake.city.facades import details
-from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.facades import bays, details
+from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
+from cns_drake.city.facades.walls import Relief, lifted, single_wall
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.geometry.polygons import triangulate
 from cns_drake.city.geometry.upper_sides import (
     UpperSides,
     long_normals,
     unit_normals,
 )
 from cns_drake.imports.dressing.styles import Style, Use
-from cns_drake.imports.dressing.wall_panels import (
-    Openings,
-    Panel,
-    boxes_on,
-    framed,
-    open_wall,
-)
+from cns_drake.imports.dressing.wall_panels import Panel
+from cns_drake.imports.faces import parts_of
+from cns_drake.imports.foreign_city import to_mesh
 
-# Between the end of a wall and its first window [m].
+# Between the end of a wall and its first bay [m].
 _MARGIN = 0.5
 # Windows keep this distance from the foot and the top of their wall, and from
 # the ground [m].
@@ -42,22 +41,38 @@ _FROM_FOOT, _FROM_TOP, _FROM_GROUND = 0.3, 0.12, 0.4
 _LEAST_PART = 0.7
 # Probes are this far in front of a wall [m].
 _BEFORE = 0.4
-# The paving before a door is looked at this far from its wall [m].
-_STEP = 0.15
+# The paving before a door is looked at this far from its wall, and the walls
+# beside it are this wide [m].
+_STEP, _JAMB = 0.15, 0.3
 # One door for each such length of a front [m].
 _DOOR_EVERY = 16.0
 _DOOR_HEIGHT, _LEAST_DOOR = 2.2, 1.8
-_DOOR_WIDTH = 1.15
-_GATE_WIDTH = 2.5
-# Least wall between a door and the window beside it [m].
-_BESIDE_DOOR = 0.3
-_SILL, _THRESHOLD = 0.45, 0.04
-_SHOP_HEIGHT = 2.9
-_PIER = 0.5
-# A door is this much deeper than a window [m].
-_DOOR_DEEPER = 0.12
+_DOOR_WIDTH, _GATE_WIDTH = 1.15, 2.5
+_THRESHOLD, _SHOP_HEIGHT, _SHOP_WIDTH = 0.04, 2.9, 2.2
+# Depths of doors behind windows, and those of shop windows and gates [m].
+_DOOR_DEEPER, _SHOP_DEPTH, _GATE_DEPTH = 0.1, 0.35, 0.3
 # A wall stands on the ground if it begins at most this high above it [m].
 _ON_GROUND = 0.6
+
+
+class Opening(NamedTuple):
+    """A window or a door of a wall, in the panel's coordinates.
+
+    Attributes:
+        row: number of its storey.
+        nth: number of its bay from the nearer end of the wall.
+        x0, x1: limits of its bay [m].
+        z0, z1: bottom and top [m].
+        kind: `window`, `shop`, `door` or `gate`.
+    """
+
+    row: int
+    nth: int
+    x0: float
+    x1: float
+    z0: float
+    z1: float
+    kind: str = "window"
 
 
 @dataclass(frozen=True)
@@ -68,46 +83,51 @@ class FacadePlan:
         panel: the wall.
         style: style of its building.
         openings: its openings.
-        spacing: from one window to the next [m].
         floor: height of the lowest floor in the panel [m].
         ground: height of the ground in front, in the panel's coordinates [m].
         top_is_free: whether nothing is built against its upper edge.
-        shop: whether its ground floor is a shop.
     """
 
     panel: Panel
     style: Style
-    openings: Openings
-    spacing: float
+    openings: Sequence[Opening]
     floor: float
     ground: float
     top_is_free: bool = True
-    shop: bool = False
 
     @property
     def stands_on_ground(self) -> bool:
         return self.ground > -_ON_GROUND
 
     @property
-    def street_openings(self) -> np.ndarray:
-        """Returns which (N,) openings are on the ground floor."""
-        return np.asarray(self.openings.row == 0) & self.stands_on_ground
+    def on_street(self) -> list[Opening]:
+        """The openings on the ground floor."""
+        on_ground = self.stands_on_ground
+        return [o for o in self.openings if o.row == 0 and on_ground]
 
     def probes(self) -> np.ndarray:
         """Returns places (N + 1, 3) before the openings, and at the top."""
-        o, panel = self.openings, self.panel
-        x = np.append((o.x0 + o.x1) / 2.0, panel.length / 2.0)
-        z = np.append((o.z0 + o.z1) / 2.0, panel.height - _FROM_FOOT)
+        panel = self.panel
+        at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
+        at.append((panel.length / 2, panel.height - _FROM_FOOT))
+        x, z = np.transpose(at)
         return panel.place(x, z, _BEFORE)
 
     def thresholds(self) -> np.ndarray:
         """Returns places (D, 9, 3) before and in the recesses of its doors."""
-        o = self.openings.chosen(self.openings.is_door)
-        x = np.stack([o.x0, (o.x0 + o.x1) / 2.0, o.x1])[:, None]
-        deep = np.stack([np.full(len(o.depth), -_STEP), o.depth / 2, o.depth])
-        x, out = np.broadcast_arrays(x, -deep)
-        at = np.moveaxis(np.stack([x, out]).reshape(2, 9, -1), 2, 1)
-        return self.panel.place(at[0], np.zeros(at[0].shape), at[1])
+        doors = [o for o in self.openings if o.kind != "window"]
+        deep = np.array([self._depth(o) for o in doors])
+        x0, x1 = np.array([(o.x0, o.x1) for o in doors]).reshape(-1, 2).T
+        x = np.stack([x0 + _JAMB, (x0 + x1) / 2, x1 - _JAMB], axis=1)
+        out = np.stack([np.full(len(deep), _STEP), -deep / 2, -deep], axis=1)
+        x, out = np.repeat(x, 3, axis=1), np.tile(out, 3)
+        return self.panel.place(x, np.zeros(x.shape), out)
+
+    def _depth(self, opening: Opening) -> float:
+        depth = self.style.depth + _DOOR_DEEPER
+        return {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}.get(
+            opening.kind, depth
+        )
 
     def standing_on(self, heights: np.ndarray) -> FacadePlan:
         """Returns the plan with doors a step above the paving before them.
@@ -116,14 +136,17 @@ class FacadePlan:
             heights: (D,) of the highest paving at each door; one far above or
                 below the ground does not count [m].
         """
-        o = self.openings
-        z0, low = o.z0.copy(), heights - self.panel.origin[2]
-        is_near = np.abs(low - self.ground) < _ON_GROUND
-        low = np.where(is_near, np.maximum(low + _THRESHOLD, 0.0), -np.inf)
-        top = o.z1[o.is_door]
-        fits = is_near & (top - low > _LEAST_DOOR)
-        z0[o.is_door] = np.where(fits, low, z0[o.is_door])
-        return replace(self, openings=o._replace(z0=z0))
+        lows = iter((heights - self.panel.origin[2]).tolist())
+        openings = []
+        for o in self.openings:
+            if o.kind != "window":
+                low = next(lows)
+                if abs(low - self.ground) < _ON_GROUND:
+                    low = max(low + _THRESHOLD, 0.0)
+                    if o.z1 - low > _LEAST_DOOR:
+                        o = o._replace(z0=low)
+            openings.append(o)
+        return replace(self, openings=openings)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
         """Returns the plan without hidden openings.
@@ -131,9 +154,10 @@ class FacadePlan:
         Args:
             is_hidden: (N + 1,) whether something stands at the probes.
         """
+        pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
             self,
-            openings=self.openings.chosen(~is_hidden[:-1]),
+            openings=[o for o, is_gone in pairs if not is_gone],
             top_is_free=not is_hidden[-1],
         )
 
@@ -150,126 +174,74 @@ def plan_facade(
         ground: height of the ground before the panel [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
-    room = panel.length - 2.0 * _MARGIN
-    count = int(room / style.pitch + 0.5)
-    if count == 0 and room >= style.width:
-        count = 1
-    spacing = room / max(count, 1)
-    first = max(0, int(np.floor(-floor / style.storey)))
-    last = int(np.ceil((panel.height - floor) / style.storey))
+    cells = bays.stretches(panel.length, style.pitch, _MARGIN)
+    first = max(0, math.floor(-floor / style.storey))
+    last = math.ceil((panel.height - floor) / style.storey)
     if style.use is Use.CHURCH:
         last = min(last, 1)
-    rows = np.arange(first, max(first, last))
-    low = floor + rows * style.storey + style.sill
     top = panel.height - _FROM_TOP - style.cornice
-    lowest = max(_FROM_FOOT, ground + _FROM_GROUND)
-    fits = (low >= lowest) & (low + _LEAST_PART * style.height <= top)
-    rows, low = rows[fits], low[fits]
-    middles = _MARGIN + (np.arange(count) + 0.5) * spacing
-    row, x = (v.ravel() for v in np.meshgrid(rows, middles, indexing="ij"))
-    z0 = np.repeat(low, count)
-    half = min(style.width, spacing - 0.3, panel.length - 0.4) / 2.0
-    openings = Openings(
-        row,
-        x - half,
-        x + half,
-        z0,
-        np.minimum(z0 + style.height, top),
-        np.full(len(row), style.depth),
-        np.zeros(len(row), dtype=bool),
-    )
-    if half < 0.2:
-        openings = openings.chosen(np.zeros(len(row), dtype=bool))
-    return FacadePlan(panel, style, openings, spacing, floor, ground)
+    openings = []
+    for row in range(first, last):
+        low = floor + row * style.storey + style.sill
+        if (
+            low >= max(_FROM_FOOT, ground + _FROM_GROUND)
+            and low + _LEAST_PART * style.height <= top
+        ):
+            high = min(low + style.height, top)
+            openings += [
+                Opening(row, min(k, len(cells) - 1 - k), x0, x1, low, high)
+                for k, (x0, x1) in enumerate(cells)
+            ]
+    return FacadePlan(panel, style, openings, floor, ground)
 
 
 def with_shops(plan: FacadePlan) -> FacadePlan:
     """Returns a wall whose windows on the ground floor are shop windows."""
-    is_shop = plan.street_openings
-    half = min(plan.spacing - _PIER, 4.0) / 2.0
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)
-    if not is_shop.any() or half < 0.6 or top < plan.ground + _LEAST_DOOR:
+    low = max(plan.ground + _THRESHOLD, 0.0)
+    street = set(plan.on_street)
+    if top < low + _LEAST_DOOR:
         return plan
-    o = plan.openings
-    middle = (o.x0 + o.x1) / 2.0
-    is_door = is_shop & (np.cumsum(is_shop) % 3 == 2)
-    low = np.where(is_door, plan.ground + _THRESHOLD, plan.ground + _SILL)
-    changed = o._replace(
-        x0=np.where(is_shop, middle - half, o.x0),
-        x1=np.where(is_shop, middle + half, o.x1),
-        z0=np.where(is_shop, np.maximum(low, 0.0), o.z0),
-        z1=np.where(is_shop, top, o.z1),
-        depth=np.where(is_door, o.depth + _DOOR_DEEPER, o.depth),
-        is_door=o.is_door | is_door,
-    )
-    return replace(plan, openings=changed, shop=True)
+    openings = [
+        o._replace(z0=low, z1=top, kind="shop")
+        if o in street and o.x1 - o.x0 >= _SHOP_WIDTH
+        else o
+        for o in plan.openings
+    ]
+    return replace(plan, openings=openings)
 
 
 def with_doors(plan: FacadePlan) -> FacadePlan:
     """Returns a wall with doors in place of windows on its ground floor."""
-    o = plan.openings
-    places = np.flatnonzero(plan.street_openings)
-    if plan.shop or not len(places):
+    street = plan.on_street
+    if not street or any(o.kind == "shop" for o in street):
+        return plan
+    is_gate = plan.style.use in (Use.SHED, Use.INDUSTRIAL)
+    kind, width = ("gate", _GATE_WIDTH) if is_gate else ("door", _DOOR_WIDTH)
+    low = max(plan.ground + _THRESHOLD, 0.0)
+    # A door must not reach into the windows above.
+    above = min((o.z0 for o in plan.openings if o.row > 0), default=np.inf)
+    high = min(low + _DOOR_HEIGHT, plan.panel.height - _JAMB, above - 0.2)
+    if high < low + _LEAST_DOOR:
         return plan
     number = max(1, round(plan.panel.length / _DOOR_EVERY))
     wanted = (np.arange(number) + 0.5) * plan.panel.length / number
-    middle = (o.x0 + o.x1) / 2.0
-    nearest = np.abs(middle[places] - wanted[:, None]).argmin(axis=1)
-    is_door = np.zeros(len(middle), dtype=bool)
-    is_door[places[nearest]] = True
-    is_gate = plan.style.use in (Use.SHED, Use.INDUSTRIAL)
-    width = _GATE_WIDTH if is_gate else _DOOR_WIDTH
-    aside = 0.0
-    room = plan.spacing / 2.0 - _BESIDE_DOOR
-    if is_door[places].all() and room >= width:
-        # A house with a door only would have no window to the street.
-        aside = plan.spacing / 4.0
-    half = min(width, plan.spacing - 0.3, plan.panel.length - 0.4) / 2.0
-    low = max(plan.ground + _THRESHOLD, 0.0)
-    high = min(low + _DOOR_HEIGHT, plan.panel.height - 0.2)
-    # A door must not reach into the windows above.
-    above = o.z0[o.row > 0]
-    high = min(high, float(above.min(initial=np.inf)) - 0.2)
-    if high < low + _LEAST_DOOR:
-        return plan
-    changed = o._replace(
-        x0=np.where(is_door, middle - aside - half, o.x0),
-        x1=np.where(is_door, middle - aside + half, o.x1),
-        z0=np.where(is_door, low, o.z0),
-        z1=np.where(is_door, high, o.z1),
-        depth=np.where(is_door, o.depth + _DOOR_DEEPER, o.depth),
-        is_door=o.is_door | is_door,
-    )
-    if aside > 0.0:
-        narrow = np.minimum(o.x1 - o.x0, room)[is_door] / 2.0
-        windows = o.chosen(is_door)._replace(
-            x0=middle[is_door] + aside - narrow,
-            x1=middle[is_door] + aside + narrow,
-        )
-        changed = changed.joined(windows)
-    return replace(plan, openings=changed)
-
-
-def balcony_windows(plan: FacadePlan) -> np.ndarray:
-    """Returns which (N,) windows have a balcony: every other above ground."""
-    o = plan.openings
-    column = np.round(((o.x0 + o.x1) / 2.0 - _MARGIN) / plan.spacing - 0.5)
-    count = round((plan.panel.length - 2.0 * _MARGIN) / plan.spacing)
-    from_end = np.minimum(column, count - 1 - column)
-    return np.asarray((o.row >= 1) & (from_end % 2 == 1))
-
-
-def opened_to_floor(plan: FacadePlan, which: np.ndarray) -> FacadePlan:
-    """Returns a wall some of whose windows begin at their floor."""
-    o = plan.openings
-    floor = plan.floor + o.row * plan.style.storey + 0.1
-    return replace(
-        plan,
-        openings=o._replace(
-            z0=np.where(which, np.maximum(np.minimum(floor, o.z0), 0.0), o.z0)
-        ),
-    )
+    middles = np.array([(o.x0 + o.x1) / 2 for o in street])
+    nearest = np.abs(middles - wanted[:, None]).argmin(axis=1)
+    doors = {street[k] for k in nearest.tolist()}
+    openings = []
+    for o in plan.openings:
+        middle = (o.x0 + o.x1) / 2
+        if o not in doors:
+            openings.append(o)
+        elif len(doors) == len(street) and middle - o.x0 >= width + 2 * _JAMB:
+            # A house with a door only would have no window to the street.
+            door = o._replace(x1=middle, z0=low, z1=high, kind=kind)
+            openings += [door, o._replace(x0=middle)]
+        else:
+            openings.append(o._replace(z0=low, z1=high, kind=kind))
+    return replace(plan, openings=openings)
 
 
 _PLINTH_REACH = 0.06
@@ -278,210 +250,268 @@ _GUTTER, _GUTTER_REACH = 0.15, 0.14
 _SIGN_REACH, _SIGN_HEIGHT = 0.15, 0.5
 _BALCONY_REACH, _BALCONY_WIDTH = 1.15, 3.0
 _AWNING_REACH, _AWNING_HEIGHT = 1.1, 0.55
-_SILL_HEIGHT, _SILL_BESIDE, _SILL_REACH = 0.08, 0.08, 0.07
-# Windows farther from drives have no sills, or no frames, or lie on their wall
+_SILL_REACH = 0.07
+# Windows farther from drives have no sills, or no bars, or lie on their wall
 # and not in recesses, and walls have no plinths [m].
-_SILLS_WITHIN, _FRAMES_WITHIN, _RECESSES_WITHIN = 12.0, 20.0, 25.0
+_SILLS_WITHIN, _BARS_WITHIN, _RECESSES_WITHIN = 12.0, 20.0, 25.0
+# Narrower and lower windows have no bars [m].
+_TWO_LEAVES, _TWO_PANES = 1.0, 1.5
 # Nothing lower than this may hang over a car's path, within this distance of
 # its middle [m].
 _TALLEST_CAR, _BESIDE = 4.0, 2.5
 # Cornices of lower walls would collide with doors [m].
 _LEAST_WALL = 2.5
-
-
-@dataclass
-class Faces:
-    """Faces of a building by material, and counts of added details.
-
-    Attributes:
-        quads: material -> (K, 4, 3) arrays [m].
-        triangles: material -> (M, 3, 3) arrays [m].
-        counts: kind of detail added at random -> number.
-    """
-
-    quads: dict[str, list[np.ndarray]] = field(default_factory=dict)
-    triangles: dict[str, list[np.ndarray]] = field(default_factory=dict)
-    counts: Counter[str] = field(default_factory=Counter)
-
-    def add(self, material: str, faces: np.ndarray) -> None:
-        """Adds quads (K, 4, 3) or triangles (M, 3, 3) [m]."""
-        if len(faces):
-            group = self.quads if faces.shape[1] == 4 else self.triangles
-            group.setdefault(material, []).append(faces)
-
-    def meshes(self) -> dict[str, Mesh]:
-        """Returns a mesh for each material."""
-        found = {}
-        for material in sorted({*self.quads, *self.triangles}):
-            quads = self.quads.get(material, [])
-            triangles = self.triangles.get(material, [])
-            vertices = np.concatenate(
-                [some.reshape(-1, 3) for some in (*quads, *triangles)]
-            )
-            ends = 4 * sum(map(len, quads))
-            four = np.arange(ends).reshape(-1, 4).tolist()
-            three = np.arange(ends, len(vertices)).reshape(-1, 3).tolist()
-            faces = (*map(tuple, four), *map(tuple, three))
-            found[material] = Mesh(vertices, faces)
-        return found
+# Materials of the fronts of openings, and their depths where these lie on their
+# wall [m].
+_ON_WALL = {"glass": -0.02, "doors": -0.03, "frames": 0.0}
+# Distance of openings from the edge of a panel that is no rectangle [m].
+_FROM_EDGE = 0.1
+_EXACT, _LEAST_AREA = 1e-3, 1e-4
 
 
 def add_facade(
-    faces: Faces,
+    out: Assembly,
     plan: FacadePlan,
     to_drive: float,
     rng: np.random.Generator,
-) -> None:
-    """Adds all faces of a wall.
+) -> Counter[str]:
+    """Adds all parts of a wall; returns how many details of each kind.
 
     Args:
-        faces: faces of the building.
+        out: the building.
         plan: plan of the wall.
         to_drive: distance from the wall to the nearest drive [m].
         rng: random draws of the building.
     """
+    counts: Counter[str] = Counter()
     panel, style = plan.panel, plan.style
     has_balconies = style.balconies and bool(rng.random() < 0.6)
     if has_balconies:
-        plan = opened_to_floor(plan, balcony_windows(plan))
-    has_recesses = to_drive < _RECESSES_WITHIN
-    wall = open_wall(panel, plan.openings, has_recesses)
-    if wall is None:
-        faces.add("body", panel.triangles)
+        floor = plan.floor + 0.1
+        openings = [
+            o._replace(z0=max(min(floor + o.row * style.storey, o.z0), 0.0))
+            if _has_balcony(o)
+            else o
+            for o in plan.openings
+        ]
+        plan = replace(plan, openings=openings)
+    plan, reliefs, area = _in_outline(plan, to_drive)
+    if not reliefs:
+        out.add_to("body", to_mesh(panel.triangles))
     else:
-        plan = replace(plan, openings=wall.openings)
-        faces.add("body", wall.quads)
-        faces.add("body", wall.triangles)
-        is_glass = ~plan.openings.is_door | plan.shop
-        faces.add("doors", wall.backs[~is_glass])
-        if to_drive < _FRAMES_WITHIN:
-            frames, panes = framed(panel, plan.openings.chosen(is_glass))
-            faces.add("frames", frames)
-            faces.add("glass", panes)
-        else:
-            faces.add("glass", wall.backs[is_glass])
-        if to_drive < _SILLS_WITHIN:
-            _add_sills(faces, plan)
-        faces.counts["windows"] += int((~plan.openings.is_door).sum())
-        faces.counts["doors"] += int(plan.openings.is_door.sum())
+        _add_wall(out, panel, reliefs, area, to_drive < _RECESSES_WITHIN)
+        counts["windows"] = sum(o.kind == "window" for o in plan.openings)
+        counts["doors"] = sum(o.kind in ("door", "gate") for o in plan.openings)
         if has_balconies:
-            _add_balconies(faces, plan, to_drive)
-        if plan.shop:
-            _add_signs(faces, plan, to_drive, rng)
-    if to_drive < _RECESSES_WITHIN:
-        _add_plinth(faces, plan)
-    _add_cornice(faces, plan)
+            counts["balconies"] = _add_balconies(out, plan, to_drive)
+        counts += _add_signs(out, plan, to_drive, rng)
+    if panel.outline is None and plan.top_is_free:
+        if to_drive < _RECESSES_WITHIN:
+            counts["plinths"] = _add_plinth(out, plan, reliefs)
+        if style.cornice and panel.height > _LEAST_WALL:
+            is_gutter = style.cornice < _GUTTER
+            reach = _GUTTER_REACH if is_gutter else _CORNICE_REACH
+            low = panel.height - style.cornice
+            limits = (-reach, panel.length + reach, low, panel.height, reach)
+            _put(out, "trim", panel, details.board(*limits))
+            counts["gutters" if is_gutter else "cornices"] = 1
+    return counts
 
 
-def _add_sills(faces: Faces, plan: FacadePlan) -> None:
-    o = plan.openings.chosen(~plan.openings.is_door)
-    low = o.z0 - _SILL_HEIGHT
-    is_sill = low > 0.05
-    x0, x1 = (o.x0 - _SILL_BESIDE)[is_sill], (o.x1 + _SILL_BESIDE)[is_sill]
-    sills = boxes_on(
-        plan.panel, x0, x1, low[is_sill], o.z0[is_sill], _SILL_REACH
-    )
-    faces.add("trim", sills)
+def _put(out: Assembly, material: str, panel: Panel, *meshes: Mesh) -> None:
+    """Adds meshes given in a wall's coordinates."""
+    z = float(panel.origin[2])
+    out.add_to(material, *(panel.frame.place(mesh, z) for mesh in meshes))
 
 
-def _add_plinth(faces: Faces, plan: FacadePlan) -> None:
-    panel, style = plan.panel, plan.style
-    top = plan.ground + style.plinth
-    if (
-        style.plinth
-        and plan.stands_on_ground
-        and plan.top_is_free
-        and 0.1 < top < panel.height
-        and panel.outline is None
-    ):
-        start, end = _between(plan, top)
-        reach = _PLINTH_REACH
-        start[start == 0.0] -= reach
-        end[end == panel.length] += reach
-        faces.add("trim", boxes_on(panel, start, end, 0.0, top, reach))
-        faces.counts["plinths"] += 1
+def _in_outline(
+    plan: FacadePlan, to_drive: float
+) -> tuple[FacadePlan, list[tuple[Relief, str]], tuple[float, ...]]:
+    """Returns a plan without the rows that leave the outline of its panel.
+
+    Returns:
+        The plan, its reliefs with their materials, and the rectangle x0, z0,
+        x1, z1 that holds them [m].
+    """
+    panel = plan.panel
+    area = (0.0, 0.0, panel.length, panel.height)
+    outline = panel.outline
+    if outline is not None:
+        outline = shapely.buffer(outline, _EXACT, join_style="mitre")
+    while True:
+        reliefs = [
+            r for o in plan.openings for r in _reliefs(o, plan, to_drive)
+        ]
+        if outline is None or not reliefs:
+            return plan, reliefs, area
+        sides = np.array([(r.x0, r.z0, r.x1, r.z1) for r, _ in reliefs])
+        low = np.maximum(sides.min(axis=0)[:2] - _FROM_EDGE, area[:2])
+        high = np.minimum(sides.max(axis=0)[2:] + _FROM_EDGE, area[2:])
+        inner = tuple(np.round([*low, *high], 3).tolist())
+        if outline.contains(box(*inner)):
+            return plan, reliefs, inner
+        last = max(o.row for o in plan.openings)
+        kept = [o for o in plan.openings if o.row < last]
+        plan = replace(plan, openings=kept)
 
 
-def _add_cornice(faces: Faces, plan: FacadePlan) -> None:
-    panel, style = plan.panel, plan.style
-    if (
-        style.cornice
-        and plan.top_is_free
-        and panel.height > _LEAST_WALL
-        and panel.outline is None
-    ):
-        is_gutter = style.cornice < _GUTTER
-        reach = _GUTTER_REACH if is_gutter else _CORNICE_REACH
-        low = panel.height - style.cornice
-        cornice = boxes_on(
-            panel, -reach, panel.length + reach, low, panel.height, reach
+def _reliefs(
+    opening: Opening, plan: FacadePlan, to_drive: float
+) -> list[tuple[Relief, str]]:
+    """Returns the reliefs of an opening, with the materials of their fronts."""
+    style, kind = plan.style, opening.kind
+    x0, x1, z0 = opening.x0, opening.x1, opening.z0
+    height = opening.z1 - z0
+    if kind == "shop":
+        is_even = opening.nth % 2 == 0
+        bay = bays.shop_front(height, _SHOP_DEPTH, door=is_even)
+    elif kind == "gate":
+        bay = bays.gate(_GATE_WIDTH, height, _GATE_DEPTH)
+    elif kind == "door":
+        depth = style.depth + _DOOR_DEEPER
+        bay = bays.house_door(_DOOR_WIDTH, 0.0, height, depth)
+    else:
+        has_bars = to_drive < _BARS_WITHIN
+        has_sill = to_drive < _SILLS_WITHIN and z0 > 0.2
+        bay = bays.window(
+            style.width,
+            0.0,
+            height,
+            style.depth,
+            mullions=int(has_bars and style.width > _TWO_LEAVES),
+            transom=0.7 * height if has_bars and height > _TWO_PANES else None,
+            ledge=_SILL_REACH * has_sill,
+            pier=0.15,
         )
-        faces.add("trim", cornice)
-        faces.counts["gutters" if is_gutter else "cornices"] += 1
+    found = []
+    for relief in bay(x0, x1):
+        depth, material = relief.depth, "body"
+        if kind == "window" and depth > 0.0:
+            material = "glass" if depth == style.depth else "frames"
+        elif kind == "shop" and depth >= _SHOP_DEPTH:
+            material = "glass"
+        elif kind in ("door", "gate") and depth > 0.0:
+            material = "doors"
+        found.append((lifted(relief, z0), material))
+    if to_drive < _RECESSES_WITHIN:
+        return found
+    first = next((pair for pair in found if pair[1] in _ON_WALL), None)
+    if first is None:
+        return []
+    return [(first[0]._replace(depth=_ON_WALL[first[1]]), first[1])]
 
 
-def _between(plan: FacadePlan, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the stretches of a wall without openings below a height."""
-    o = plan.openings
-    low = o.z0 < top + 0.05
-    order = np.argsort(o.x0[low])
-    start = np.append(0.0, o.x1[low][order])
-    end = np.append(o.x0[low][order], plan.panel.length)
-    wide = end - start > 0.05
-    return start[wide], end[wide]
+def _add_wall(
+    out: Assembly,
+    panel: Panel,
+    reliefs: Sequence[tuple[Relief, str]],
+    area: tuple[float, ...],
+    has_recesses: bool,
+) -> None:
+    """Adds a wall with its openings.
+
+    Args:
+        out: the building.
+        panel: the wall.
+        reliefs: its reliefs, with the materials of their fronts.
+        area: the rectangle that is cut out of it for them, see `_in_outline`.
+        has_recesses: whether they are cut into the wall; if not, panes and
+            doors lie on it, which takes far fewer triangles.
+    """
+    x0, z0, x1, z1 = area
+    fronts = [
+        {relief.depth for relief, name in reliefs if name == material}
+        for material in _ON_WALL
+    ]
+    moved = [
+        lifted(relief._replace(x0=relief.x0 - x0, x1=relief.x1 - x0), -z0)
+        for relief, _ in reliefs
+    ]
+    wall, *others = single_wall(x1 - x0, z1 - z0, moved, fronts)
+    for material, mesh in zip(_ON_WALL, others, strict=True):
+        _put(out, material, panel, mesh.moved((x0, 0.0, z0)))
+    if not has_recesses:
+        out.add_to("body", to_mesh(panel.triangles))
+        return
+    _put(out, "body", panel, wall.moved((x0, 0.0, z0)))
+    if panel.outline is not None:
+        rest = shapely.difference(
+            panel.outline, box(x0, z0, x1, z1), grid_size=_EXACT
+        )
+        for part in parts_of(rest):
+            if part.area > _LEAST_AREA:
+                x, z = np.moveaxis(triangulate(part), 2, 0)
+                out.add_to("body", to_mesh(panel.place(x, z)))
 
 
-def _add_balconies(faces: Faces, plan: FacadePlan, to_drive: float) -> None:
-    o, panel = plan.openings, plan.panel
-    width = min(_BALCONY_WIDTH, 1.5 * plan.spacing)
-    for k in np.flatnonzero(balcony_windows(plan)):
-        middle = (o.x0[k] + o.x1[k]) / 2.0
-        x0 = max(0.1, middle - width / 2.0)
-        x1 = min(panel.length - 0.1, middle + width / 2.0)
-        z = float(o.z0[k]) - 0.02
-        if _in_the_way(z - plan.ground, _BALCONY_REACH, to_drive):
-            continue
-        mesh = details.balcony(x0, x1, _BALCONY_REACH, z)
-        faces.add("trim", _placed(mesh, panel))
-        faces.counts["balconies"] += 1
+def _add_plinth(
+    out: Assembly, plan: FacadePlan, reliefs: Sequence[tuple[Relief, str]]
+) -> int:
+    """Adds the plinth of a wall; returns whether it has one."""
+    panel, reach = plan.panel, _PLINTH_REACH
+    top = plan.ground + plan.style.plinth
+    is_there = plan.style.plinth and plan.stands_on_ground
+    if not is_there or not 0.1 < top < panel.height:
+        return 0
+    end = panel.length + reach
+    low = [(r.x0, r.x1) for r, _ in reliefs if r.z0 < top + 0.05]
+    start = -reach
+    for x0, x1 in [*sorted(low), (end, end)]:
+        if x0 - start > 0.05:
+            board = details.board(start, x0, 0.0, top, reach)
+            _put(out, "trim", panel, board)
+        start = max(start, x1)
+    return 1
+
+
+def _has_balcony(opening: Opening) -> bool:
+    """Returns whether a window has a balcony: every other above ground."""
+    return opening.row >= 1 and opening.nth % 2 == 1
+
+
+def _add_balconies(out: Assembly, plan: FacadePlan, to_drive: float) -> int:
+    count = 0
+    for o in filter(_has_balcony, plan.openings):
+        middle, z = (o.x0 + o.x1) / 2, o.z0 - 0.02
+        half = min(_BALCONY_WIDTH, 1.5 * (o.x1 - o.x0)) / 2
+        x0 = max(0.1, middle - half)
+        x1 = min(plan.panel.length - 0.1, middle + half)
+        if not _in_the_way(z - plan.ground, _BALCONY_REACH, to_drive):
+            mesh = details.balcony(x0, x1, _BALCONY_REACH, z)
+            _put(out, "trim", plan.panel, mesh)
+            count += 1
+    return count
 
 
 def _add_signs(
-    faces: Faces,
+    out: Assembly,
     plan: FacadePlan,
     to_drive: float,
     rng: np.random.Generator,
-) -> None:
+) -> Counter[str]:
     """Adds the signs and awnings above shop windows."""
-    o, panel = plan.openings, plan.panel
-    shops = np.flatnonzero(plan.street_openings)
-    if not len(shops):
-        return
-    z = float(o.z1[shops].max()) + 0.06
+    shops = [o for o in plan.openings if o.kind == "shop"]
+    if not shops:
+        return Counter()
+    panel = plan.panel
+    z = max(o.z1 for o in shops) + 0.06
     height = min(_SIGN_HEIGHT, panel.height - z - 0.05)
     if height > 0.15:
-        start, end = float(o.x0[shops].min()), float(o.x1[shops].max())
-        sign = boxes_on(panel, start, end, z, z + height, _SIGN_REACH)
-        faces.add("sign", sign)
-    faces.counts["shop windows"] += len(shops)
-    low = z - _AWNING_HEIGHT
-    has_awning = rng.random(len(shops)) < 0.4
+        start, end = min(o.x0 for o in shops), max(o.x1 for o in shops)
+        limits = (start + _JAMB, end - _JAMB, z, z + height)
+        _put(out, "sign", panel, details.board(*limits, _SIGN_REACH))
+    low, high = z - _AWNING_HEIGHT, z + float(panel.origin[2])
+    shape = (_JAMB, _AWNING_REACH, high - _AWNING_HEIGHT, high)
+    cells = [(o.x0, o.x1) for o in shops]
+    awnings = details.awnings(panel.frame, cells, rng, 0.4, shape)
     if _in_the_way(low - plan.ground, _AWNING_REACH, to_drive):
-        return
-    for k in shops[has_awning]:
-        limits = (float(o.x0[k]), float(o.x1[k]), _AWNING_REACH, low, z)
-        faces.add("sign", _placed(details.awning(*limits), panel))
-        faces.counts["awnings"] += 1
+        awnings = []
+    out.add_to("sign", *awnings)
+    return Counter({"shop windows": len(shops), "awnings": len(awnings)})
 
 
 def _in_the_way(height: float, reach: float, to_drive: float) -> bool:
     return height < _TALLEST_CAR and to_drive < reach + _BESIDE
-
-
-def _placed(mesh: Mesh, panel: Panel) -> np.ndarray:
-    """Returns a mesh (x along a wall, y outwards, z up) as (M, 3, 3) [m]."""
-    x, y, z = mesh.vertices.T
-    return panel.place(x, z, y)[mesh.triangles()[:, ::-1]]
 
 
 # A roof is level if the z of its unit normal is at least the first; level parts
@@ -515,29 +545,21 @@ def is_flat_roof(roof: np.ndarray) -> bool:
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
 
 
-def roof_pieces(
-    roof: np.ndarray,
-    style: Style,
-    is_flat: bool,
-    rng: np.random.Generator,
-    name: str,
-) -> Model:
-    """Returns the equipment of a roof, in the world.
+def add_roof_pieces(
+    out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
+) -> None:
+    """Adds the equipment of a roof.
 
     Args:
+        out: the building.
         roof: (M, 3, 3) its upper sides [m].
         style: style of the building.
         is_flat: whether its roof is flat.
-        rng: random draws of the building.
-        name: name of the structure.
     """
-    footprint = box(0.0, 0.0, 1.0, 1.0)
-    out = Assembly(Site(footprint, name), rng)
     if is_flat:
         _equip(out, roof, style)
     elif style.use in _CHIMNEYS:
         _add_chimneys(out, roof)
-    return Model(tuple(out.parts), out.meshes, footprint)
 
 
 def _equip(out: Assembly, roof: np.ndarray, style: Style) -> None:
