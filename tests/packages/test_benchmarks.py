@@ -44,6 +44,7 @@ BY_HAND = {
     "lidar_odometry.py",
     "memory.py",
     "peers.py",
+    "real_or_simulated.py",
     "real_scans.py",
     "source_rays.py",
 }

@@ -1,0 +1,107 @@
+"""The judge of real and simulated scans, on scans of boxes."""
+
+from pathlib import Path
+import sys
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "benchmarks"
+PLACES = 6
+
+
+@pytest.fixture(scope="module")
+def judge():
+    sys.path.insert(0, str(FOLDER))
+    import real_or_simulated
+
+    sys.path.remove(str(FOLDER))
+    return real_or_simulated
+
+
+def make_place(folder, seed, *, rough=0.005, bias=0.0, texture=3.0):
+    """Writes a scan of a ground with two walls, ring by ring.
+
+    Args:
+        folder: gets the scan.
+        seed: of the walls and of all noise.
+        rough: noise of ranges [m].
+        bias: of the range of each ring [m].
+        texture: noise of intensities.
+    """
+    rng = np.random.default_rng(seed)
+    elevation = np.deg2rad(np.linspace(5.0, -25.0, 32))[:, None]
+    azimuth = np.linspace(1e-3, 6.283, 900)
+    ground = np.where(elevation < 0.0, 1.7 / -np.sin(elevation), np.inf)
+    ranges = np.broadcast_to(ground, (32, 900))
+    for side in (1.0, -1.0):
+        across = rng.uniform(6.0, 9.0) / (side * np.sin(azimuth))
+        wall = np.where(across > 0.0, across / np.cos(elevation), np.inf)
+        ranges = np.minimum(ranges, wall)
+    ranges = ranges + rng.normal(0.0, rough, ranges.shape)
+    ranges = ranges + bias * rng.normal(size=(32, 1))
+    d = np.stack(
+        np.broadcast_arrays(
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ),
+        axis=-1,
+    )
+    bright = np.clip(rng.normal(0.3, texture / 100.0, ranges.shape), 0, 0.99)
+    near = ranges < 60.0
+    scan = np.column_stack([ranges[near, None] * d[near], bright[near]])
+    folder.mkdir(parents=True)
+    scan.astype(np.float32).tofile(folder / "000000.bin")
+
+
+def features(judge, folder, seed, **options):
+    for place in range(PLACES):
+        make_place(folder / str(place), 100 * seed + place, **options)
+    return judge.Features(judge.read_places(folder))
+
+
+@pytest.fixture(scope="module")
+def plain(judge, tmp_path_factory):
+    return features(judge, tmp_path_factory.mktemp("plain") / "set", 1)
+
+
+def test_equal_sets_are_not_told_apart(judge, plain, tmp_path):
+    result = judge.judge(plain, features(judge, tmp_path / "set", 2))
+    assert abs(result["auc"]["all"] - 0.5) < 0.15
+    assert abs(result["control"]["all"] - 0.5) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("options", "group", "feature"),
+    [
+        ({"texture": 0.0}, "intensity", "spread among 6"),
+        ({"bias": 0.03}, "roughness", "between rings"),
+    ],
+)
+def test_it_finds_the_difference(
+    judge, plain, tmp_path, options, group, feature
+):
+    other = features(judge, tmp_path / "set", 3, **options)
+    result = judge.judge(plain, other)
+    assert result["auc"][group] > 0.95
+    first = result["features"][0]
+    assert first["feature"].startswith(group)
+    assert any(feature in row["feature"] for row in result["features"][:6])
+    assert first["auc"] > 0.95
+
+
+def test_rings_follow_from_the_order_of_a_file(judge, tmp_path):
+    make_place(tmp_path / "one", 0)
+    [[scan]] = judge.read_places(tmp_path)
+    elevation = np.arcsin(scan[:, 2] / np.linalg.norm(scan[:, :3], axis=1))
+    _, first = np.unique(scan[:, 4], return_index=True)
+    assert np.ptp(np.diff(elevation[first])) < 1e-6
+    assert len(first) >= 25
+
+
+def test_without_a_folder_it_says_so(judge, tmp_path, monkeypatch):
+    words = ["judge", str(tmp_path / "none"), str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit, match=r"none: no folder of scans"):
+        judge.main()
