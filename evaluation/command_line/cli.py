@@ -314,7 +314,7 @@ def scores(
 app.command(
     epilog=example(
         "cns-eval localise drives/metropolis_01 \\",
-        "    drives/metropolis_04 --method gicp --start 1 --start-turn 5",
+        "    drives/metropolis_04 --method gicp --start 1",
     )
 )(localise)
 
