@@ -39,7 +39,7 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     top.set(yscale="log", ylabel="error of position [m]")
     bottom.set(
         xlabel="way [m]",
-        ylabel="scan without map",
+        ylabel="scan\nwithout map",
         ylim=(0.0, max(0.1, 1.05 * float(rows["unmapped"].max()))),
     )
     for axes in (top, bottom):
