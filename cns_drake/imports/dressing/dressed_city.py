@@ -248,64 +248,16 @@ class DressedBuildings:
     by_file: Mapping[str, int]
 
 
-@dataclass(frozen=True)
-class PlannedBuildings:
-    """Buildings with the plans of their walls.
-
-    Attributes:
-        bare: the buildings.
-        plans: number of a building -> its dressed walls.
-        distances: number of a building -> their distances to the drives [m].
-        paths: paths of the drives.
-        seed: seed of the random draws.
-    """
-
-    bare: Sequence[Bare]
-    plans: Mapping[int, list[FacadePlan]]
-    distances: Mapping[int, list[float]]
-    paths: BaseGeometry
-    seed: int
-
-    def dressed(self, paving: np.ndarray = _NO_TRIANGLES) -> DressedBuildings:
-        """Dresses the buildings.
-
-        Args:
-            paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
-                which doors stand [m].
-        """
-        plans = self.plans
-        if plans:
-            plans = _with_steps(plans, UpperSides(turned_up(paving)))
-        at_random: Counter[str] = Counter()
-        by_file: Counter[str] = Counter()
-        dressed = {}
-        for number, some in enumerate(self.bare):
-            walls = zip(
-                plans.get(number, ()),
-                self.distances.get(number, ()),
-                strict=True,
-            )
-            model, counts = _dressed(some, list(walls), self.paths, self.seed)
-            at_random += counts
-            by_file.update(some.style.by_tag)
-            structure = replace(some.one.structure, model=model)
-            dressed[some.one] = replace(some.one, structure=structure)
-        return DressedBuildings(
-            dressed,
-            dict(sorted(at_random.items())),
-            dict(sorted(by_file.items())),
-        )
-
-
-def plan_buildings(
+def dress_buildings(
     structures: Sequence[Imported],
     drives: Sequence[WaypointDrive],
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
     always: Collection[Imported] | None = None,
-) -> PlannedBuildings:
-    """Plans the look of the buildings of a city.
+    paving: np.ndarray = _NO_TRIANGLES,
+) -> DressedBuildings:
+    """Dresses the buildings of a city.
 
     A building looks the same in each stage and each import, since its random
     draws depend on its name. Only the choice of walls with windows depends on
@@ -319,19 +271,33 @@ def plan_buildings(
         seed: seed of the random draws.
         always: structures of all stages, which hide what is behind them; all
             structures if None.
+        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
+            which doors stand [m].
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = all_laid_bare(buildings, ground, seed)
-    plans: Mapping[int, list[FacadePlan]] = {}
-    distances: Mapping[int, list[float]] = {}
+    walls: Mapping[int, list[tuple[FacadePlan, float]]] = {}
     if drives and bare:
         lasting = set(buildings if always is None else always)
         hiding = [b.triangles for b in buildings if b in lasting]
-        solids = joined(hiding)
-        views = DriveViews(drives, ground, solids)
-        plans, distances = _plans(bare, drives, streets, ground, views)
+        views = DriveViews(drives, ground, joined(hiding))
+        paved = UpperSides(turned_up(paving))
+        walls = _plans(bare, drives, streets, ground, views, paved)
     paths = MultiLineString([drive.path for drive in drives])
-    return PlannedBuildings(bare, plans, distances, paths, seed)
+    at_random: Counter[str] = Counter()
+    by_file: Counter[str] = Counter()
+    dressed = {}
+    for number, some in enumerate(bare):
+        model, counts = _dressed(some, walls.get(number, ()), paths, seed)
+        at_random += counts
+        by_file.update(some.style.by_tag)
+        structure = replace(some.one.structure, model=model)
+        dressed[some.one] = replace(some.one, structure=structure)
+    return DressedBuildings(
+        dressed,
+        dict(sorted(at_random.items())),
+        dict(sorted(by_file.items())),
+    )
 
 
 def _dressed(
@@ -381,15 +347,19 @@ def _plans(
     streets: Sequence[Street],
     ground: Ground,
     views: DriveViews,
-) -> tuple[dict[int, list[FacadePlan]], dict[int, list[float]]]:
-    """Returns the walls to dress, and their distance to the drives."""
+    paving: UpperSides,
+) -> dict[int, list[tuple[FacadePlan, float]]]:
+    """Returns the walls to dress, and their distance to the drives [m].
+
+    The key is the number of the building.
+    """
     walls = [
         some.walls if some.one.lod < _OWN_WINDOWS else np.zeros((0, 3, 3))
         for some in bare
     ]
     panels, to_drive = _seen(walls, views)
     if not panels:
-        return {}, {}
+        return {}
     before = np.array(
         [
             panel.place(np.array(panel.length / 2), np.array(0.0), 1.0)
@@ -422,41 +392,17 @@ def _plans(
         ]
     )
     to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
-    found: dict[int, list[FacadePlan]] = {}
-    distances: dict[int, list[float]] = {}
+    found: dict[int, list[tuple[FacadePlan, float]]] = {}
     for number, members in _grouped(plans).items():
         front = _front(members, plans, to_way)
         for k in members:
             plan = plans[k]
             if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
-                plan = with_shops(plan)
+                plan = with_shops(plan, paving)
             if k == front:
-                plan = with_doors(plan)
-            found.setdefault(number, []).append(plan)
-            distances.setdefault(number, []).append(float(to_drive[k]))
-    return found, distances
-
-
-def _with_steps(
-    plans: Mapping[int, list[FacadePlan]], paving: UpperSides
-) -> dict[int, list[FacadePlan]]:
-    """Returns the walls of buildings, with doors above the paving."""
-    every = [plan for some in plans.values() for plan in some]
-    places = [plan.thresholds() for plan in every]
-    heights = paving.heights(
-        np.concatenate(
-            [np.zeros((0, 2)), *(p[..., :2].reshape(-1, 2) for p in places)]
-        )
-    )
-    ends = np.cumsum([len(some) for some in places])[:-1]
-    highest = np.split(heights.reshape(-1, 9).max(axis=1), ends)
-    lifted = iter(
-        plan.standing_on(some)
-        for plan, some in zip(every, highest, strict=True)
-    )
-    return {
-        number: [next(lifted) for _ in some] for number, some in plans.items()
-    }
+                plan = with_doors(plan, paving)
+            found.setdefault(number, []).append((plan, float(to_drive[k])))
+    return found
 
 
 def _seen(

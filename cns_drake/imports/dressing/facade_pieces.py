@@ -113,40 +113,23 @@ class FacadePlan:
         x, z = np.transpose(at)
         return panel.place(x, z, _BEFORE)
 
-    def thresholds(self) -> np.ndarray:
-        """Returns places (D, 9, 3) before and in the recesses of its doors."""
-        doors = [o for o in self.openings if o.kind != "window"]
-        deep = np.array([self._depth(o) for o in doors])
-        x0, x1 = np.array([(o.x0, o.x1) for o in doors]).reshape(-1, 2).T
-        x = np.stack([x0 + _JAMB, (x0 + x1) / 2, x1 - _JAMB], axis=1)
-        out = np.stack([np.full(len(deep), _STEP), -deep / 2, -deep], axis=1)
-        x, out = np.repeat(x, 3, axis=1), np.tile(out, 3)
-        return self.panel.place(x, np.zeros(x.shape), out)
+    def threshold(self, door: Opening, paving: UpperSides) -> float:
+        """Returns the height of a threshold, a step above the paving [m].
 
-    def _depth(self, opening: Opening) -> float:
-        depth = self.style.depth + _DOOR_DEEPER
-        return {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}.get(
-            opening.kind, depth
-        )
-
-    def standing_on(self, heights: np.ndarray) -> FacadePlan:
-        """Returns the plan with doors a step above the paving before them.
-
-        Args:
-            heights: (D,) of the highest paving at each door; one far above or
-                below the ground does not count [m].
+        The highest paving before the door and in its recess counts, unless it
+        is far above or below the ground.
         """
-        lows = iter((heights - self.panel.origin[2]).tolist())
-        openings = []
-        for o in self.openings:
-            if o.kind != "window":
-                low = next(lows)
-                if abs(low - self.ground) < _ON_GROUND:
-                    low = max(low + _THRESHOLD, 0.0)
-                    if o.z1 - low > _LEAST_DOOR:
-                        o = o._replace(z0=low)
-            openings.append(o)
-        return replace(self, openings=openings)
+        depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
+        deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)
+        middle = (door.x0 + door.x1) / 2
+        x, out = np.meshgrid(
+            [door.x0 + _JAMB, middle, door.x1 - _JAMB],
+            [_STEP, -deep / 2, -deep],
+        )
+        places = self.panel.place(x, np.zeros(x.shape), out).reshape(-1, 3)
+        low = float(paving.heights(places[:, :2]).max()) - self.panel.origin[2]
+        is_near = abs(low - self.ground) < _ON_GROUND
+        return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
         """Returns the plan without hidden openings.
@@ -195,36 +178,41 @@ def plan_facade(
     return FacadePlan(panel, style, openings, floor, ground)
 
 
-def with_shops(plan: FacadePlan) -> FacadePlan:
-    """Returns a wall whose windows on the ground floor are shop windows."""
+def with_shops(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
+    """Returns a wall whose windows on the ground floor are shop windows.
+
+    Args:
+        plan: the wall.
+        paving: the ground before it.
+    """
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)
-    low = max(plan.ground + _THRESHOLD, 0.0)
-    street = set(plan.on_street)
-    if top < low + _LEAST_DOOR:
-        return plan
-    openings = [
-        o._replace(z0=low, z1=top, kind="shop")
-        if o in street and o.x1 - o.x0 >= _SHOP_WIDTH
-        else o
-        for o in plan.openings
-    ]
+    street, openings = set(plan.on_street), []
+    for o in plan.openings:
+        if o in street and o.x1 - o.x0 >= _SHOP_WIDTH:
+            shop = o._replace(kind="shop", z1=top)
+            low = plan.threshold(shop, paving)
+            if top >= low + _LEAST_DOOR:
+                o = shop._replace(z0=low)
+        openings.append(o)
     return replace(plan, openings=openings)
 
 
-def with_doors(plan: FacadePlan) -> FacadePlan:
-    """Returns a wall with doors in place of windows on its ground floor."""
+def with_doors(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
+    """Returns a wall with doors in place of windows on its ground floor.
+
+    Args:
+        plan: the wall.
+        paving: the ground before it.
+    """
     street = plan.on_street
     if not street or any(o.kind == "shop" for o in street):
         return plan
     is_gate = plan.style.use in (Use.SHED, Use.INDUSTRIAL)
     kind, width = ("gate", _GATE_WIDTH) if is_gate else ("door", _DOOR_WIDTH)
-    low = max(plan.ground + _THRESHOLD, 0.0)
     # A door must not reach into the windows above.
     above = min((o.z0 for o in plan.openings if o.row > 0), default=np.inf)
-    high = min(low + _DOOR_HEIGHT, plan.panel.height - _JAMB, above - 0.2)
-    if high < low + _LEAST_DOOR:
-        return plan
+    most = min(plan.panel.height - _JAMB, above - 0.2)
     number = max(1, round(plan.panel.length / _DOOR_EVERY))
     wanted = (np.arange(number) + 0.5) * plan.panel.length / number
     middles = np.array([(o.x0 + o.x1) / 2 for o in street])
@@ -233,14 +221,18 @@ def with_doors(plan: FacadePlan) -> FacadePlan:
     openings = []
     for o in plan.openings:
         middle = (o.x0 + o.x1) / 2
-        if o not in doors:
+        has_room = middle - o.x0 >= width + 2 * _JAMB
+        # A house with a door only would have no window to the street.
+        is_alone = len(doors) == len(street) and has_room
+        door = o._replace(kind=kind, x1=middle if is_alone else o.x1)
+        low = plan.threshold(door, paving) if o in doors else np.inf
+        high = min(low + _DOOR_HEIGHT, most)
+        if high < low + _LEAST_DOOR:
             openings.append(o)
-        elif len(doors) == len(street) and middle - o.x0 >= width + 2 * _JAMB:
-            # A house with a door only would have no window to the street.
-            door = o._replace(x1=middle, z0=low, z1=high, kind=kind)
-            openings += [door, o._replace(x0=middle)]
-        else:
-            openings.append(o._replace(z0=low, z1=high, kind=kind))
+            continue
+        openings.append(door._replace(z0=low, z1=high))
+        if is_alone:
+            openings.append(o._replace(x0=middle))
     return replace(plan, openings=openings)
 
 

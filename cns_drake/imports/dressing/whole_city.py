@@ -8,7 +8,7 @@ from typing import Any
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.imports.dressing.dressed_city import plan_buildings
+from cns_drake.imports.dressing.dressed_city import dress_buildings
 from cns_drake.imports.dressing.grounds import (
     guessed_streets,
     is_dense,
@@ -97,8 +97,13 @@ def dress_city(
     always = set.intersection(*map(set, staged.standing.values()))
     is_paved = is_dense(staged.kept)
     laid = _laid(staged, city, drives, ground, is_paved)
-    planned = plan_buildings(
-        staged.kept, drives, city.streets, ground, seed, always
+    paving = [
+        one.triangles
+        for one in [*staged.kept, *laid]
+        if one.is_ground or one.kind == "Sidewalk"
+    ]
+    buildings = dress_buildings(
+        staged.kept, drives, city.streets, ground, seed, always, joined(paving)
     )
     marks = list(lane_marks(city.streets, drives)) if drives else []
     added = [with_kerb(one) if one.kind == "Sidewalk" else one for one in laid]
@@ -113,12 +118,6 @@ def dress_city(
         bottom,
         seed,
     )
-    paving = [
-        one.triangles
-        for one in [*staged.kept, *laid]
-        if one.is_ground or one.kind == "Sidewalk"
-    ]
-    buildings = planned.dressed(joined(paving))
     changed = dict(buildings.buildings)
     at_random = Counter(buildings.at_random)
     at_random += Counter(one.kind for one in added)

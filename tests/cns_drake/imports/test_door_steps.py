@@ -6,7 +6,7 @@ import pytest
 
 from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
-from cns_drake.imports.dressing.dressed_city import plan_buildings
+from cns_drake.imports.dressing.dressed_city import dress_buildings
 from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.ground import ground_of
@@ -54,10 +54,10 @@ def test_floors_rise_with_the_paving(shops):
     )  # fmt: skip
     ground[..., 2] = 0.1 + slope * ground[..., 0]
     for paving, least in ((ground, 0.03), (ground[:0], -1.0)):
-        result = plan_buildings(
+        result = dress_buildings(
             city.structures, [drive], city.streets,
-            ground_of(city.structures), 0,
-        ).dressed(paving)  # fmt: skip
+            ground_of(city.structures), 0, None, paving,
+        )  # fmt: skip
         floors = low_floors(result.buildings.values()).reshape(-1, 3)
         above = floors[:, 2] - (0.1 + slope * floors[:, 0])
         assert len(floors) >= 24

@@ -15,9 +15,10 @@ import yaml
 
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.geometry.structures import part_triangles
+from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
 from cns_drake.imports.cityjson.structures import import_cityjson
-from cns_drake.imports.dressing.dressed_city import plan_buildings
+from cns_drake.imports.dressing.dressed_city import dress_buildings
 from cns_drake.imports.dressing.facade_pieces import (
     add_facade,
     plan_facade,
@@ -40,6 +41,7 @@ from cns_drake.scenarios.drive_table import write_table
 
 # The digest of an import before dressing existed.
 PLAIN = "100f7a75c0f44113"
+NO_PAVING = UpperSides(np.zeros((0, 3, 3)))
 STREET = np.column_stack([np.linspace(-80, 80, 41), np.full(41, -12.0)])
 
 
@@ -66,8 +68,7 @@ def surfaces(one):
 def dressed(city, path=STREET, seed=0):
     drives = [WaypointDrive(path, path)]
     ground = ground_of(city.structures)
-    planned = plan_buildings(city.structures, drives, (), ground, seed)
-    result = planned.dressed()
+    result = dress_buildings(city.structures, drives, (), ground, seed)
     names = {one.structure.name: one for one in result.buildings}
     return {k: result.buildings[v] for k, v in names.items()}, result
 
@@ -220,7 +221,7 @@ def test_a_lower_house_has_the_colours_of_the_whole_one(row):
     assert growth.lower
     drives = [WaypointDrive(STREET, STREET)]
     ground = ground_of(staged.kept)
-    found = plan_buildings(staged.kept, drives, (), ground, 0).dressed()
+    found = dress_buildings(staged.kept, drives, (), ground, 0)
     new = {o.structure.name: o for o in found.buildings.values()}
     for name in growth.lower:
         whole, low = new[name], new[f"{name}_lower"]
@@ -259,14 +260,14 @@ def test_a_house_behind_one_that_always_stands_has_no_windows(
     low = city.structures[0].triangles.min(axis=(0, 1))
     path = STREET * [0.2, 1.0] + low[:2] + [40.0, 6.0]
     always = city.structures if is_lasting else city.structures[1:]
-    result = plan_buildings(
+    result = dress_buildings(
         city.structures,
         [WaypointDrive(path, path)],
         (),
         ground_of(city.structures),
         0,
         always,
-    ).dressed()
+    )
     after = {o.structure.name: o for o in result.buildings.values()}
     has_glass = "glass" in surfaces(after[f"building_w{behind}"])
     assert has_glass is not is_lasting
@@ -459,7 +460,9 @@ def test_a_house_with_one_bay_has_a_window_beside_its_door(length, number):
     corners = [np.column_stack([wall, z]) for z in (low, high)]
     (a, b), (d, c) = corners
     (panel,) = find_panels([np.array([[a, b, c], [a, c, d]])])
-    openings = with_doors(plan_facade(panel, style, 0.0, 0.0)).openings
+    openings = with_doors(
+        plan_facade(panel, style, 0.0, 0.0), NO_PAVING
+    ).openings
     assert [o.kind for o in openings] == ["door", "window"][:number]
     ends = [x for o in openings for x in (o.x0, o.x1)]
     assert ends == pytest.approx(
