@@ -74,18 +74,18 @@ def _in_site(path: str) -> str:
 
 def _reference(package: str) -> str:
     """Returns a page that has mkdocstrings explain the public names."""
-    text = (ROOT / package / "__init__.py").read_text(encoding="utf-8")
-    tree = ast.parse(text)
-    names: list[str] = []
-    homes: dict[str, str] = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Assign) and _names(node) == ["__all__"]:
-            names = ast.literal_eval(node.value)
-        if isinstance(node, ast.ImportFrom) and node.module:
-            homes |= {alias.name: node.module for alias in node.names}
-    lines = [f"# {package}", "", ast.get_docstring(tree) or ""]
-    for name in sorted({*names} - {"__version__"}, key=str.lower):
-        home = homes.get(name, "")
+    folder = ROOT / package
+    text = (folder / "__init__.py").read_text(encoding="utf-8")
+    stub = (folder / "__init__.pyi").read_text(encoding="utf-8")
+    homes = {
+        alias.name: node.module or ""
+        for node in ast.parse(stub).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    lines = [f"# {package}", "", ast.get_docstring(ast.parse(text)) or ""]
+    for name in sorted({*homes} - {"__version__"}, key=str.lower):
+        home = homes[name]
         if home.startswith("cns_drake") and package != "cns_drake":
             # A name has one place in the site.
             link = f"[{name} of cns_drake](cns_drake.md#{home}.{name})"
@@ -93,7 +93,3 @@ def _reference(package: str) -> str:
         else:
             lines += ["", f"::: {home}.{name}"]
     return "\n".join([*lines, ""])
-
-
-def _names(node: ast.Assign) -> list[str]:
-    return [each.id for each in node.targets if isinstance(each, ast.Name)]

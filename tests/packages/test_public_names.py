@@ -68,18 +68,15 @@ def test_programs_load_no_slow_library_that_they_do_not_need(module, slow):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_type_checkers_see_the_same_names(package):
-    tree = ast.parse((ROOT / package / "__init__.py").read_text())
-    (block,) = (node for node in tree.body if isinstance(node, ast.If))
-    seen = {
-        (getattr(node, "module", None), alias.name)
-        for node in block.body
-        for alias in node.names
-    }
-    homes = importlib.import_module(package)._HOMES
-    given = {(home, name) for home, names in homes.items() for name in names}
-    assert seen == given
-    named = {name for _, name in given}
-    assert named == set(PUBLIC[package]) - {"__version__"}
+    tree = ast.parse((ROOT / package / "__init__.pyi").read_text())
+    for node in tree.body:
+        (alias,) = node.names
+        assert alias.asname == alias.name  # Stubs export it only so.
+        home = importlib.import_module(node.module)
+        module = importlib.import_module(package)
+        assert getattr(module, alias.name) is getattr(home, alias.name)
+    named = {node.names[0].name for node in tree.body}
+    assert named == set(PUBLIC[package])
 
 
 @pytest.mark.parametrize(("package", "name"), NAMES)

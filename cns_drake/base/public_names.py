@@ -1,0 +1,35 @@
+"""The public names of a package, each imported when it is first used."""
+
+import ast
+from collections.abc import Callable
+import importlib
+from pathlib import Path
+from typing import Any
+
+
+def attach(
+    package: str, file: str
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Returns `__getattr__`, `__dir__` and `__all__` of a package.
+
+    The stub `__init__.pyi`, which type checkers read, says which names there
+    are and where they are defined.
+
+    Args:
+        package: its name.
+        file: its `__init__.py`.
+    """
+    stub = Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
+    homes = {
+        alias.name: f"{node.module}"
+        for node in ast.parse(stub).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+    def get(name: str) -> Any:
+        if name in homes:
+            return getattr(importlib.import_module(homes[name]), name)
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return get, lambda: sorted(homes), list(homes)
