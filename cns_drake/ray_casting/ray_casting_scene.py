@@ -118,6 +118,10 @@ class RayCastingScene:
         )
         self._moving = MovingGroups(self._groups, self._p_WO)
         self._normal_matrices: np.ndarray | None = None
+        self._group_of = np.zeros(len(self._geometries), np.int64)
+        for row, group in enumerate(self._groups):
+            slots = [member[0] for member in group.members]
+            self._group_of[self._index_of_slot[slots]] = row
 
     def set_frame_poses(
         self,
@@ -140,6 +144,24 @@ class RayCastingScene:
                 placed = placed.below(min(self._planes))
             self._scene.place(placed)
             self._normal_matrices = None
+
+    def surface_frames(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns frames L that move with surfaces, for geometries G.
+
+        L of what is merged is the world, that of anything else its own frame.
+
+        Returns:
+            The (G,) row of each geometry's frame, the (R, 3, 3) inverse
+            transpose of the linear part of each X_WL, and the (R, 3) p_WL.
+        """
+        if self._normal_matrices is None:
+            self._normal_matrices = _calc_normal_matrices(self._groups)
+        p_WLset = [
+            np.zeros(3) if g.is_merged_world else g.X_OL[:, 3] + self._p_WO
+            for g in self._groups
+        ]
+        frames = self._normal_matrices, np.reshape(p_WLset, (-1, 3))
+        return self._group_of, *frames
 
     def cast_rays(
         self,

@@ -29,6 +29,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.config import KALIBR_FILE
+from cns_drake.sensors.lidar.config import describe_unit
 from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
     load_drive,
@@ -210,6 +211,11 @@ def _make_bag(
     described = describe_scenario(scenario)
     kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
     imu_files = {} if kalibr is None else {KALIBR_FILE: kalibr}
+    units = {
+        name: describe_unit(lidar)
+        for name, lidar in scenario.lidars.items()
+        if lidar.returns == "calibrated"
+    }
     return BagWriter(
         folder,
         scenario_topics(scenario),
@@ -233,7 +239,7 @@ def _make_bag(
         },
         # The drive can be simulated again while its files stay in place.
         scenario=describe_scenario(scenario, folder),
-        beside=imu_files,
+        beside=imu_files | ({"calibration.yaml": units} if units else {}),
         custom_data={
             "cns_drake_version": __version__,
             INPUTS_KEY: combined_digest(inputs),

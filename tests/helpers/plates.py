@@ -1,5 +1,7 @@
 """A LiDAR with calibrated returns before surfaces of known reflectivity."""
 
+from dataclasses import replace
+
 import numpy as np
 from pydrake.geometry import (
     Box,
@@ -14,6 +16,7 @@ from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.patterns import DirectionPattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
+from cns_drake.sensors.returns.unit_sheets import Response
 
 
 def plate(name, reflectivity, X_WG, size=(0.1, 400.0, 400.0), shape=None):
@@ -32,13 +35,17 @@ def facing(distance, offset=0.0):
 
 
 def ahead(num_beams, spread=1e-4, max_range=400.0):
-    """Returns beams along x, with a tiny spread."""
+    """Returns beams along x, with a tiny spread, each of its own laser."""
     angle = np.linspace(-spread, spread, num_beams)
     d_Sset = np.stack(
         [np.cos(angle), np.sin(angle), np.zeros(num_beams)], axis=1
     )
     return DirectionPattern(
-        d_Sset, min_range=0.3, max_range=max_range, period=0.05
+        d_Sset,
+        min_range=0.3,
+        max_range=max_range,
+        period=0.05,
+        rings=np.arange(num_beams) % 2**16,
     )
 
 
@@ -82,5 +89,8 @@ def scan(instances, pattern, returns, frame=0, structures=None):
 
 
 def unit(preset="os1-64", **options):
-    """Returns the returns of a preset."""
-    return CalibratedReturns.of_preset(preset, **{"seed": 5, **options})
+    """Returns the returns of a preset whose lasers are all alike."""
+    returns = CalibratedReturns.of_preset(preset, **{"seed": 5, **options})
+    even = Response(gain=0.0, speckle=0.0)
+    sheet = replace(returns.sheet, angle_error_deg=0.0, response=even)
+    return replace(returns, sheet=sheet)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+import math
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -74,6 +75,8 @@ class LidarSection(Mount):
             of the unit's data sheet.
         echoes: the echoes of a beam that calibrated returns report; `dual` is
             the strongest and the last.
+        unit_seed: seed of this very unit's errors of range, angles and gain of
+            each laser, in calibrated returns; drives with one unit share it.
         rate: turns per second.
         layout: the fields of a point in the recording.
     """
@@ -94,6 +97,7 @@ class LidarSection(Mount):
     echoes: Annotated[Echoes, PlainSerializer(lambda echoes: echoes.value)] = (
         field_off_by_default(Echoes.STRONGEST)
     )
+    unit_seed: int = field_off_by_default(0, ge=0)
     rate: Literal[5, 10, 20] = field_off_by_default(20)
     layout: LayoutName = field_off_by_default("cns")
 
@@ -112,6 +116,11 @@ class LidarSection(Mount):
                 raise ValueError(
                     "echoes: only calibrated returns have a choice; add "
                     "returns: calibrated"
+                )
+            if self.unit_seed:
+                raise ValueError(
+                    "unit_seed: only calibrated returns have errors of a unit; "
+                    "add returns: calibrated"
                 )
             return self
         for field in ("range_noise", "dropout", "faint_dropout"):
@@ -170,6 +179,19 @@ def make_pattern(config: LidarSection) -> BeamPattern:
     )
 
 
+def describe_unit(config: LidarSection) -> dict[str, Any]:
+    """Returns what a user gets of a unit with calibrated returns.
+
+    Its lasers' true angles differ from these by the errors of the unit.
+    """
+    nominal = getattr(make_pattern(config), "elevations_rad", ())
+    return {
+        "preset": config.preset,
+        "unit_seed": config.unit_seed,
+        "elevations_deg": [round(math.degrees(one), 6) for one in nominal],
+    }
+
+
 def make_returns(
     config: LidarSection, weather: WeatherConfig, name: str, seed: int
 ) -> CalibratedReturns | None:
@@ -192,6 +214,7 @@ def make_returns(
         weather=weather.weather(),
         seed=seed,
         sensor_name=name,
+        unit_seed=config.unit_seed,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -342,7 +341,7 @@ class Lidar(LeafSystem):
                 seen.scene,
                 seen.materials(is_wet=self._returns.is_wet),
                 self._pattern,
-                turn.calibrated,
+                turn.calibrated(self._returns),
                 p_WSset,
                 R_WSset,
                 times,
@@ -471,11 +470,13 @@ class _Turn:
             beams.t_ns,
             np.argsort(beams.packet_order),
         )
+        self._calibrated: CalibratedTurn | None = None
 
-    @cached_property
-    def calibrated(self) -> CalibratedTurn:
-        """The same for calibrated returns."""
-        return CalibratedTurn(self.beams)
+    def calibrated(self, returns: CalibratedReturns) -> CalibratedTurn:
+        """Returns the same for calibrated returns; always those of one unit."""
+        if self._calibrated is None:
+            self._calibrated = returns.turn(self.beams)
+        return self._calibrated
 
 
 @compiled

@@ -13,11 +13,15 @@ from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides
-from cns_drake.sensors.returns.light import BeamHits, join
+from cns_drake.sensors.returns.light import BeamHits, dot, join, texture
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
-from cns_drake.sensors.returns.random_numbers import frame_key
-from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
+from cns_drake.sensors.returns.random_numbers import frame_key, normal
+from cns_drake.sensors.returns.unit_sheets import (
+    RANGE_BIAS,
+    UNIT_SHEETS,
+    UnitSheet,
+)
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
 
 CLEAR = Weather()
@@ -28,7 +32,8 @@ class CalibratedReturns:
     """Makes returns after the data sheet of a unit.
 
     Random numbers depend only on the seed, the name of the sensor, the frame
-    and the beam.
+    and the beam. Errors of the unit depend on its own seed, its name and the
+    laser: two drives with one unit share them.
 
     Attributes:
         sheet: data sheet of the unit.
@@ -36,6 +41,7 @@ class CalibratedReturns:
         weather: weather of the drive.
         seed: seed of random numbers.
         sensor_name: distinguishes several LiDARs.
+        unit_seed: seed of the errors of the unit.
 
     Example:
         from cns_drake import CalibratedReturns
@@ -48,6 +54,7 @@ class CalibratedReturns:
     weather: Weather = CLEAR
     seed: int = 0
     sensor_name: str = ""
+    unit_seed: int = 0
 
     @classmethod
     def of_preset(
@@ -58,6 +65,7 @@ class CalibratedReturns:
         weather: Weather = CLEAR,
         seed: int = 0,
         sensor_name: str = "",
+        unit_seed: int = 0,
     ) -> CalibratedReturns:
         """Returns the model of a preset's unit.
 
@@ -67,13 +75,19 @@ class CalibratedReturns:
             weather: fog, rain and snowfall.
             seed: seed of random numbers.
             sensor_name: the name of the LiDAR.
+            unit_seed: seed of the errors of the unit.
 
         Raises:
             KeyError: there is no such preset.
             ValueError: there is no such choice of echoes.
         """
         return cls(
-            UNIT_SHEETS[preset], Echoes(echoes), weather, seed, sensor_name
+            UNIT_SHEETS[preset],
+            Echoes(echoes),
+            weather,
+            seed,
+            sensor_name,
+            unit_seed,
         )
 
     @property
@@ -112,6 +126,7 @@ class CalibratedReturns:
                 sheet.resolution,
                 *limits,
                 sheet.retro_from,
+                sheet.response,
                 self.echoes,
                 scattering,
             )
@@ -190,28 +205,81 @@ class CalibratedReturns:
         followed = follow(
             ways, ways_met, materials, receiver.budget, divergence, reach, cast
         )
+        light = join([light, *followed])
+        light = texture(
+            light,
+            turn.orders[1],
+            np.asarray(p_WSset, float),
+            met.d_Wset,
+            materials,
+            *scene.surface_frames(),
+        )
         return report_echoes(
-            join([light, *followed]),
+            light,
             receiver,
             key,
             len(turn.beam),
+            turn.range_error,
+            turn.gain,
         )
+
+    def turn(self, beams: Beams) -> CalibratedTurn:
+        """Returns the beams of a turn, with the errors of the unit."""
+        laser = np.arange(int(beams.ring.max()) + 1)
+        key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
+        sheet = self.sheet
+        angle = np.radians(sheet.angle_error_deg)
+        sizes = (
+            RANGE_BIAS * sheet.range_floor,
+            angle,
+            angle,
+            sheet.response.gain,
+        )
+        # None is farther off than three deviations.
+        errors = [
+            size * np.clip(normal(key, laser, draw), -3.0, 3.0)
+            for draw, size in enumerate(sizes)
+        ]
+        return CalibratedTurn(beams, *(one[beams.ring] for one in errors))
 
 
 class CalibratedTurn:
     """The beams of a turn in the order of casting.
 
     Attributes:
-        d_Sset: (N, 3) directions in the order of casting.
+        d_Sset: (N, 3) true directions in the order of casting.
         beam: (N,) number of each beam, in firing order.
         orders: (2, N) orders of the rays in which neighbours follow each
             other: that of casting, and that of firing, which has the row of
             each beam.
+        range_error: (N,) error of each beam's laser, in firing order [m].
+        gain: (N,) its gain.
     """
 
-    def __init__(self, beams: Beams):
+    def __init__(
+        self,
+        beams: Beams,
+        range_error: np.ndarray,
+        elevation_error: np.ndarray,
+        azimuth_error: np.ndarray,
+        gain_error: np.ndarray,
+    ):
+        """Takes the beams and the (N,) errors of each."""
+        self.range_error, self.gain = range_error, 1.0 + gain_error
+        x, y, z = beams.d_Sset.T
+        across = np.maximum(np.sqrt(x * x + y * y), 1e-9)
+        up = elevation_error / across
+        d_Sset = np.stack(
+            [
+                x - azimuth_error * y - up * x * z,
+                y + azimuth_error * x - up * y * z,
+                z + up * across * across,
+            ],
+            axis=1,
+        )
+        d_Sset /= np.sqrt(dot(d_Sset, d_Sset))[:, None]
         self.beam = np.asarray(beams.packet_order, np.int64)
-        self.d_Sset = np.ascontiguousarray(beams.d_Sset[self.beam])
+        self.d_Sset = np.ascontiguousarray(d_Sset[self.beam])
         self.orders = np.stack(
             [np.arange(len(self.beam)), np.argsort(self.beam)]
         )

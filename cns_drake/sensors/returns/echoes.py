@@ -13,6 +13,7 @@ from cns_drake.sensors.returns.light import Light, join, select
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
     HOPELESS_SNR,
+    THRESHOLD_SNR,
     LinkBudget,
     detection_probability,
     echo_energy,
@@ -20,6 +21,7 @@ from cns_drake.sensors.returns.link_budget import (
     target_snr,
 )
 from cns_drake.sensors.returns.random_numbers import normal, uniform
+from cns_drake.sensors.returns.unit_sheets import Response
 from cns_drake.sensors.returns.weather import Scattering
 
 # The index of the weather, in place of a geometry's.
@@ -46,7 +48,7 @@ class Receiver:
         extinction: the weather's [1/m].
         resolution: echoes nearer to each other are one [m].
         min_range, max_range: limits of reported ranges [m].
-        retro_from: see `UnitSheet`.
+        retro_from, response: see `UnitSheet`.
         choice: the echoes that it reports.
         scattering: by the weather; None in clear air.
     """
@@ -57,6 +59,7 @@ class Receiver:
     min_range: float
     max_range: float
     retro_from: float
+    response: Response
     choice: Echoes
     scattering: Scattering | None
 
@@ -101,7 +104,12 @@ class _Pulses(NamedTuple):
 
 
 def report_echoes(
-    light: Light, receiver: Receiver, key: np.uint64, num_beams: int
+    light: Light,
+    receiver: Receiver,
+    key: np.uint64,
+    num_beams: int,
+    range_error: np.ndarray,
+    gain: np.ndarray,
 ) -> Reported:
     """Returns the reported points of the light.
 
@@ -114,6 +122,8 @@ def report_echoes(
         receiver: the unit's.
         key: the frame's; see `frame_key`.
         num_beams: number of beams of the turn.
+        range_error: (num_beams,) of each beam's laser [m].
+        gain: (num_beams,) of each beam's laser.
     """
     count = np.bincount(light.beam, minlength=num_beams)
     is_alone = count[light.beam] == 1
@@ -124,19 +134,19 @@ def report_echoes(
     if scattering is not None and scattering.counts[-1] > 0.0:
         drops = _drops(pulses, receiver, scattering, key, num_beams)
         pulses = join([pulses, drops])
-    pulses = _detect(pulses, receiver, key)
+    pulses = _detect(pulses, receiver, key, range_error)
     if scattering is not None and scattering.fog_energies[-1] > 0.0:
         # A unit reports the broad echo of fog only without any other.
         nearest = np.full(num_beams, np.inf)
         np.minimum.at(nearest, light.beam, light.distance)
         nearest[pulses.beam] = -np.inf
         fog = _fog(nearest, receiver, scattering, key)
-        pulses = join([pulses, _detect(fog, receiver, key)])
+        pulses = join([pulses, _detect(fog, receiver, key, range_error)])
     chosen = select(pulses, _choose(pulses, receiver.choice, num_beams))
     return Reported(
         chosen.beam,
         chosen.distance.astype(np.float32),
-        _intensity(receiver.retro_from, chosen.energy).astype(np.float32),
+        _intensity(chosen, receiver, key, gain).astype(np.float32),
         chosen.geometry,
     )
 
@@ -275,7 +285,12 @@ def _fog(
     )
 
 
-def _detect(pulses: _Pulses, receiver: Receiver, key: np.uint64) -> _Pulses:
+def _detect(
+    pulses: _Pulses,
+    receiver: Receiver,
+    key: np.uint64,
+    range_error: np.ndarray,
+) -> _Pulses:
     """Returns the echoes that are detected, with errors of their ranges."""
     # Where a surface lies decides; an error of its range does not.
     is_seen = pulses.is_sure | (pulses.snr >= HOPELESS_SNR)
@@ -283,15 +298,14 @@ def _detect(pulses: _Pulses, receiver: Receiver, key: np.uint64) -> _Pulses:
     is_seen &= pulses.distance <= receiver.max_range
     is_unsure = is_seen & ~pulses.is_sure & (pulses.snr <= CERTAIN_SNR)
     unsure = np.flatnonzero(is_unsure)
-    draw = _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * np.minimum(
-        pulses.number, _MOST_ECHOES
-    )
+    draw = _first_draw(pulses)
     is_seen[unsure] = uniform(
         key, pulses.beam[unsure], draw[unsure]
     ) < detection_probability(pulses.snr[unsure])
     seen, draw = select(pulses, is_seen), draw[is_seen]
     error = range_deviation(receiver.budget, seen.snr)
     error *= normal(key, seen.beam, draw + 1)
+    error += range_error[seen.beam]
     return seen._replace(
         distance=np.clip(
             seen.distance + error, receiver.min_range, receiver.max_range
@@ -373,13 +387,35 @@ def _number_echoes(
     return number
 
 
-def _intensity(retro_from: float, energy: np.ndarray) -> np.ndarray:
+def _first_draw(pulses: _Pulses) -> np.ndarray:
+    """Returns the number of the first draw of each echo."""
+    number = np.minimum(pulses.number, _MOST_ECHOES)
+    return _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * number
+
+
+def _intensity(
+    pulses: _Pulses, receiver: Receiver, key: np.uint64, gain: np.ndarray
+) -> np.ndarray:
     """Returns the calibrated reflectivity in the scale of the unit.
 
-    It is a whole number: linear up to a reflectivity of 1, logarithmic above.
+    It is a whole number: by the unit's response up to a reflectivity of 1,
+    logarithmic above.
     """
-    rest = _FULL_INTENSITY - retro_from
+    unit, retro_from = receiver.response, receiver.retro_from
+    rest, draw = _FULL_INTENSITY - retro_from, _first_draw(pulses)
+    energy = pulses.energy
     intensity, is_above = retro_from * energy, energy > 1.0
+    if unit.exponent != 1.0:
+        power = unit.exponent * log(np.maximum(energy, 1e-12))
+        intensity = retro_from * unit.scale * exp(power)
+    if unit.fades:
+        intensity *= np.maximum(1.0 - THRESHOLD_SNR / pulses.snr, 0.0)
     part = log(energy[is_above]) / math.log(_FULL_RETRO)
-    intensity[is_above] = np.minimum(retro_from + rest * part, _FULL_INTENSITY)
-    return np.rint(intensity)
+    intensity[is_above] = retro_from + rest * part
+    intensity *= gain[pulses.beam]
+    intensity *= 1.0 + unit.speckle * normal(key, pulses.beam, draw + 2)
+    is_zero = intensity < unit.floor
+    if unit.zeros:
+        is_zero |= uniform(key, pulses.beam, draw + 3) < unit.zeros
+    intensity[is_zero] = 0.0
+    return np.rint(np.clip(intensity, 0.0, _FULL_INTENSITY))

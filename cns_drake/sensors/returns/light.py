@@ -123,4 +123,77 @@ def reflected(
         return energy
     if materials.kind[geometry] == RETRO:
         return energy if cosine > _RETRO_COSINE else 0.0
-    return energy * cosine
+    return energy * (
+        cosine + materials.rough[geometry] * (1.0 - cosine * cosine)
+    )
+
+
+# Edges of the cells of equal albedo [m]: patches, and grains.
+_PATCH, _GRAIN = 0.35, 0.06
+
+
+@compiled
+def texture(
+    light: Light,
+    row: np.ndarray,
+    p_WSset: np.ndarray,
+    d_Wset: np.ndarray,
+    materials: Materials,
+    group_of: np.ndarray,
+    normal_matrices: np.ndarray,
+    p_WLset: np.ndarray,
+) -> Light:
+    """Returns the light by the albedo and the depth of single places.
+
+    Both belong to the surface: they are a hash of the place in the surface's
+    own frame, so that all scans of all drives meet the same. What is darker is
+    deeper. No wall or floor lies along the axes of the cells.
+
+    Args:
+        light: N parts.
+        row: (B,) row of each beam in:
+        d_Wset: (B, 3) directions.
+        p_WSset: (K, 3) positions of S, taken in turn.
+        materials: materials of all geometries.
+        group_of, normal_matrices, p_WLset: see
+            `RayCastingScene.surface_frames`.
+    """
+    energy, distance = light.energy.copy(), light.distance.copy()
+    # As names of their own, fields are fast.
+    beam, geometry = light.beam, light.geometry
+    contrast, relief = materials.contrast, materials.relief
+    for k in range(len(energy)):
+        part = contrast[geometry[k]]
+        if part == 0.0:
+            continue
+        ray, group = row[beam[k]], group_of[geometry[k]]
+        place = ray % len(p_WSset) if len(p_WSset) > 1 else 0
+        x = y = z = 0.0
+        for i in range(3):
+            away = p_WSset[place, i] - p_WLset[group, i]
+            away += distance[k] * d_Wset[ray, i]
+            x += normal_matrices[group, i, 0] * away
+            y += normal_matrices[group, i, 1] * away
+            z += normal_matrices[group, i, 2] * away
+        a = 0.7071 * x + 0.5417 * y + 0.4545 * z
+        b = -0.6124 * x + 0.7899 * y + 0.0113 * z
+        c = -0.3529 * x - 0.2863 * y + 0.8908 * z
+        grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
+        patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
+        energy[k] *= 1.0 + part * (patch + grain)
+        distance[k] -= relief[geometry[k]] * grain
+    return Light(light.beam, distance, energy, light.geometry)
+
+
+@compiled
+def _albedo(a: float, b: float, c: float) -> float:
+    """Returns a number from -1 to 1, the same within each unit cell."""
+    z = (
+        np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)
+        ^ np.uint64(np.int64(np.floor(b))) * np.uint64(0xC2B2AE3D27D4EB4F)
+        ^ np.uint64(np.int64(np.floor(c))) * np.uint64(0x165667B19E3779F9)
+    )
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    return (
+        np.float64((z ^ (z >> np.uint64(27))) >> np.uint64(11)) * 2.0**-52 - 1
+    )

@@ -62,22 +62,27 @@ class LinkBudget(NamedTuple):
         own_extinction: alpha_0 [1/m].
         range_noise: standard deviation of a range at an SNR of 1 [m].
         range_floor: least standard deviation, at any SNR [m].
+        range_bias: the part of it that is a laser's own [m].
     """
 
     scale: float
     own_extinction: float
     range_noise: float
     range_floor: float
+    range_bias: float = 0.0
 
 
 def fit_link_budget(
-    rows: tuple[SheetRow, ...], range_noise: float, range_floor: float
+    rows: tuple[SheetRow, ...],
+    range_noise: float,
+    range_floor: float,
+    range_bias: float = 0.0,
 ) -> LinkBudget:
     """Returns the budget that fits one or two rows of a sheet exactly.
 
     Args:
         rows: one row, or two of different ranges.
-        range_noise, range_floor: see `LinkBudget`.
+        range_noise, range_floor, range_bias: see `LinkBudget`.
     """
     # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
     logs = [math.log(row.snr * row.range**2 / row.reflectivity) for row in rows]
@@ -86,7 +91,8 @@ def fit_link_budget(
         way = 2.0 * (rows[1].range - rows[0].range)
         extinction = (logs[0] - logs[1]) / way
     scale = math.exp(logs[0] + 2.0 * extinction * rows[0].range)
-    return LinkBudget(scale, extinction, range_noise, range_floor)
+    noise = range_noise, range_floor, range_bias
+    return LinkBudget(scale, extinction, *noise)
 
 
 @compiled
@@ -121,12 +127,14 @@ def detection_probability(snr: ArrayLike) -> np.ndarray:
 
 
 def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
-    """Returns the standard deviation of ranges [m].
+    """Returns the standard deviation of a laser's ranges [m].
 
-    It falls with the root of the SNR (Wagner et al., 2006), down to a limit by
-    the unit's clock and the shape of its pulses.
+    Over all lasers it falls with the root of the SNR (Wagner et al., 2006),
+    down to a limit by the unit's clock and the shape of its pulses. Without the
+    part that is a laser's own, the rest is each shot's.
     """
-    return np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
+    whole = np.maximum(budget.range_noise / np.sqrt(snr), budget.range_floor)
+    return np.sqrt(whole**2 - budget.range_bias**2)
 
 
 @compiled

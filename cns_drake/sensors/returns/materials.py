@@ -48,6 +48,26 @@ _BY_CLASS = {
     "traffic-sign": (0.20, 0.50),
     "other-object": (0.10, 0.70),
 }
+# Classes of smooth surfaces, which reflect after Lambert, and those of leaves.
+_SMOOTH = {c for c in _BY_CLASS if c.endswith("car") or "vehicle" in c} | {
+    *("bus", "truck", "motorcycle", "traffic-sign", "vegetation"),
+}
+# Rough surfaces follow Oren and Nayar (1994), with slopes of 30 deg: 0.77 times
+# the cosine and 0.34 times the square of the sine, here over the first one.
+_OREN_NAYAR = 0.44
+# How far albedo differs from its mean within a surface, as a part of it, in
+# grains and in patches; and how far beams end in front of it and behind it [m]:
+# in gravel, in grass, among leaves, on sills, pipes and joints.
+_TEXTURE = {
+    "road": (0.25, 0.01),
+    "parking": (0.25, 0.01),
+    "sidewalk": (0.2, 0.015),
+    "building": (0.25, 0.04),
+    "terrain": (0.4, 0.25),
+    "vegetation": (0.4, 0.2),
+    "trunk": (0.3, 0.04),
+}
+_OTHER_TEXTURE, _SMOOTH_TEXTURE = (0.2, 0.02), (0.05, 0.0)
 # Diffuse light from dust on a pane, and from water.
 _GLASS_DUST = 0.02
 _WATER = 0.02
@@ -75,11 +95,18 @@ class Materials(NamedTuple):
         reflectivity: (G,) float32, of a retro-reflector in units of a
             Lambertian target of reflectivity 1 that faces the beam.
         leaf_area_density: (G,) float32 [1/m].
+        rough: (G,) float32, how much the square of the sine of incidence adds
+            to the cosine.
+        contrast: (G,) float32, how far albedo differs within a surface.
+        relief: (G,) float32, how far beams end off the surface [m].
     """
 
     kind: np.ndarray
     reflectivity: np.ndarray
     leaf_area_density: np.ndarray
+    rough: np.ndarray
+    contrast: np.ndarray
+    relief: np.ndarray
 
 
 def find_materials(
@@ -92,6 +119,7 @@ def find_materials(
 
     The perception property ("lidar", "reflectivity") wins over the column
     `reflectivity` of a table of structures, and that over class and colour.
+    Surfaces of a given reflectivity are even and reflect after Lambert.
 
     Args:
         geometries: geometries of the scene.
@@ -110,11 +138,35 @@ def find_materials(
             )
         ]
     kinds, rhos, densities = zip(*table, strict=True) if table else ((),) * 3
+    surfaces = [
+        _surface(geometry, structures, kind)
+        for geometry, kind in zip(geometries, kinds, strict=True)
+    ]
+    surface = np.array(surfaces, np.float32).reshape(-1, 3).T
     return Materials(
         np.array(kinds, np.uint8),
         np.array(rhos, np.float32),
         np.array(densities, np.float32),
+        *np.ascontiguousarray(surface),
     )
+
+
+def _surface(
+    geometry: PerceptionGeometry, structures: StructureTable, kind: int
+) -> tuple[float, float, float]:
+    """Returns `rough`, `contrast` and `relief`; see `Materials`."""
+    entry = structures[geometry.structure]
+    given = geometry.reflectivity, entry.reflectivity
+    if kind not in (LAMBERT, LEAVES) or given != (None, None):
+        return 0.0, 0.0, 0.0
+    smooth = entry.semantic_class in _SMOOTH
+    other = _SMOOTH_TEXTURE if smooth else _OTHER_TEXTURE
+    texture = _TEXTURE.get(entry.semantic_class, other)
+    contrast, relief = texture
+    # A volume of leaves has depth in any case.
+    if kind == LEAVES:
+        relief = 0.0
+    return 0.0 if smooth else _OREN_NAYAR, contrast, relief
 
 
 def _material(

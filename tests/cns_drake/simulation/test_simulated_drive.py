@@ -5,6 +5,7 @@ import pickle
 from helpers.tiny_drive import FRAMES, tiny_scenario
 import numpy as np
 import pytest
+import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -81,10 +82,15 @@ def test_calibrated_returns_in_fog_too(tmp_path):
                 "preset": "vlp-16",
                 "columns": 64,
                 "returns": "calibrated",
+                "unit_seed": 4,
             }
         },
     )
-    recorded = open_drive(simulate(scenario, tmp_path / "out").folder)
+    folder = simulate(scenario, tmp_path / "out").folder
+    described = yaml.safe_load((folder / "calibration.yaml").read_text())
+    assert described["lidar"]["unit_seed"] == 4
+    assert described["lidar"]["elevations_deg"] == list(range(15, -16, -2))
+    recorded = open_drive(folder)
     simulated = DriveSimulation(scenario)()
     check_same(simulated, recorded, [2, 0, 3])
     clear = scenario.with_returns("ideal")

