@@ -108,9 +108,6 @@ def file_name(text: str) -> str:
     Names from a recording (its own, its map's, its stage's) pass through here
     before they become parts of paths. Usual names stay as they are. Other names
     keep their harmless characters, and different names stay different.
-
-    Args:
-        text: any.
     """
     name = "".join(
         c if c.isalnum() or c in "_-+ " or (c == "." and k) else _escaped(c)

@@ -96,10 +96,6 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     input, for files that cannot be used, for lack of memory and of libraries
     of the system; with 1 for jobs that failed; with 130 when interrupted,
     also by SIGTERM, so that open files are closed.
-
-    Args:
-        app: the commands.
-        program: the name under which errors are reported.
     """
     message: str | None = None
     look_seldom()

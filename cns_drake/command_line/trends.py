@@ -96,10 +96,6 @@ def family_controls(
     """Returns member -> its drive through the city of the query drive.
 
     Members that differ only by their city share one.
-
-    Args:
-        members: a family's drives.
-        query_drive: drive of the queries.
     """
     city = {
         name: getattr(query_drive, name)

@@ -47,12 +47,7 @@ class RoadProfile:
     """
 
     def __init__(self, roughness: RoughnessClass, seed: int):
-        """Makes the profile.
-
-        Args:
-            roughness: the class.
-            seed: seed of the layers.
-        """
+        """Makes the profile."""
         self._level = ROUGHNESS[roughness] * _N0**2 * math.log(2) / _OVER_LAYERS
         self._seed = seed
 

@@ -137,12 +137,7 @@ class Suspension:
     """
 
     def __init__(self, masses: CarMasses, rates: SuspensionRates):
-        """Sets the equations of motion up.
-
-        Args:
-            masses: the car's.
-            rates: those of its springs.
-        """
+        """Sets the equations of motion up."""
         self.masses = masses
         x, y = masses.p_BWset.T
         count = len(x)

@@ -53,12 +53,7 @@ class MessageOrder:
     """The stamps of the last messages on each topic."""
 
     def __init__(self, folder: Path, topics: Iterable[Topic]):
-        """Begins without messages.
-
-        Args:
-            folder: the recording's folder; errors name it.
-            topics: the recording's topics.
-        """
+        """Begins without messages."""
         self._folder = folder
         self._latched = {topic.name for topic in topics if topic.latched}
         self._last_ns: dict[str, int] = {}

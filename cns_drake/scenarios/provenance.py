@@ -102,10 +102,6 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     """Returns the fingerprint of a scenario's recording.
 
     The folder of its files does not count, nor do settings of the drive's page.
-
-    Args:
-        scenario: the scenario that is recorded.
-        inputs: its `digest_inputs`.
     """
     places: dict[str, object] = {
         field: Path(place).name

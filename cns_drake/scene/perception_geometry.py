@@ -105,10 +105,6 @@ def structure_name(geometry_name: str) -> str:
 def check_shape(name: str, shape: Shape) -> None:
     """Checks the size of a shape; a mesh has its size in its file.
 
-    Args:
-        name: name of the geometry.
-        shape: its shape.
-
     Raises:
         InputError: it is too large; the message names the geometry.
     """
@@ -178,11 +174,7 @@ class GeometryReader:
     """Reads the geometry of a role, and later only its changes."""
 
     def __init__(self, role: Role):
-        """Reads nothing yet.
-
-        Args:
-            role: role of the geometry to read.
-        """
+        """Reads nothing yet."""
         self._role = role
         self._known: dict[GeometryId, tuple[_Record, PerceptionGeometry]] = {}
 

@@ -129,10 +129,6 @@ def load_stage_and_traffic(
 
     The trajectory is another one if the vehicle follows others.
 
-    Args:
-        scenario: names the stage.
-        trajectory: motion of its vehicle.
-
     Raises:
         InputError: the scenario cannot be run.
     """

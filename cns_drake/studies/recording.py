@@ -223,10 +223,6 @@ def is_recorded(scenario: Scenario, folder: Path) -> bool:
 
     It must be of the present world, roads and program.
 
-    Args:
-        scenario: the scenario of the recording.
-        folder: the folder of recordings.
-
     Raises:
         InputError: the scenario's files cannot be read.
     """

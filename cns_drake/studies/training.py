@@ -499,13 +499,6 @@ def make_weights(
     `<output>.training` keeps the scans and the state: an interrupted training
     goes on there.
 
-    Args:
-        plan: what to train on.
-        output: the file of weights.
-        command: what made them, for the file.
-        cluster: where cities are simulated.
-        track: reports progress.
-
     Returns:
         The picture of the curve, `<output>` with the ending `.png`.
 

@@ -98,11 +98,7 @@ class DrawnCity:
             shutil.rmtree(part, ignore_errors=True)
 
     def drives(self, folder: Path) -> list[Scenario]:
-        """Returns the drives through the city.
-
-        Args:
-            folder: its map folder.
-        """
+        """Returns the drives through the city."""
         rng = self._rng(1)
         source = MapFolder(shipped_maps()[self.map_name])
         base = load_scenario(source.recordable_drives()[0])
@@ -161,11 +157,6 @@ def scan_city(
 ) -> dict[str, np.ndarray]:
     """Simulates the drives of a city; nothing is recorded.
 
-    Args:
-        reporter: receives progress.
-        drawn: the city.
-        folder: where its map folder stands meanwhile.
-
     Returns:
         `images` (N, RINGS, SECTORS, CHANNELS) uint8, `xy` (N, 2) places of the
         sensors [m], and `drives` (N,) number of the drive.
@@ -198,10 +189,6 @@ def scan_city(
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     """Returns stages of a city: some buildings absent, lower, trees young.
-
-    Args:
-        city: the whole city.
-        rng: decides.
 
     Returns:
         The content of `stages.yaml`, in which the last one is the whole city.

@@ -89,12 +89,7 @@ def _round(
 def vehicle_limbs(
     kind: VehicleKind, rng: np.random.Generator
 ) -> tuple[Limb, ...]:
-    """Returns a vehicle's only limb; its frame is on the ground below its box.
-
-    Args:
-        kind: kind of the vehicle.
-        rng: draws the colours.
-    """
+    """Returns a vehicle's only limb; its frame is on the ground below its box."""
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     if kind.name in ("bicycle", "motorcycle"):
         shapes = _two_wheeler(kind.name, paint, rng)
@@ -176,9 +171,6 @@ def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
 
     The body's frame is on the ground, x in the walker's heading. An arm swings
     with the leg of the other side.
-
-    Args:
-        rng: draws size and colours.
     """
     h = float(rng.uniform(0.92, 1.06))
     coat, trousers = (

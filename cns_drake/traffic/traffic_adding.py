@@ -42,10 +42,6 @@ from cns_drake.traffic.traffic_plan import TrafficPlan
 def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
     """Returns name, instance id and class of all bodies in a plan.
 
-    Args:
-        plan: the traffic.
-        first: the lowest id.
-
     Raises:
         InputError: there are not enough ids.
     """

@@ -56,11 +56,7 @@ class Bay:
     """
 
     def __init__(self, car: Structure):
-        """A bay as large as the car.
-
-        Args:
-            car: in the bay.
-        """
+        """A bay as large as the car."""
         hull = shapely.MultiPoint(car.p_WPs[:, :2])
         corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
         sides = np.diff(corners, axis=0)[:2]

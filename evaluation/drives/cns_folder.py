@@ -56,9 +56,6 @@ class CnsFolderDrive(FileDrive):
     def __init__(self, path: Path):
         """Opens a drive.
 
-        Args:
-            path: its folder.
-
         Raises:
             InputError: if there is none, or its poses cannot be used.
         """

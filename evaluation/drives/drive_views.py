@@ -12,11 +12,7 @@ class DriveView(Drive):
     """Has the length, times, poses and scenario of another drive."""
 
     def __init__(self, drive: Drive):
-        """Begins with the other drive.
-
-        Args:
-            drive: the drive.
-        """
+        """Begins with the other drive."""
         self.name = drive.name
         self._drive = drive
 

@@ -68,11 +68,6 @@ class FreeSpace:
 def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
     """Returns the labels of a baseline.
 
-    Args:
-        name: one of `BASELINES`.
-        pair: both sessions.
-        track: reports progress.
-
     Raises:
         InputError: the sessions lack what it needs, or its package is not
             installed.

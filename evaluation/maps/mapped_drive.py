@@ -47,9 +47,6 @@ class MappedDrive(DriveView):
     def finish(self, track: Track = silent) -> tuple[VoxelMap, np.ndarray]:
         """Reads the scans that have not been read yet.
 
-        Args:
-            track: reports progress.
-
         Returns:
             The map of all scans on the grid of the TCR, as `map_drive`
             makes it; a finer cloud of them for pictures (K, 3) in W [m].

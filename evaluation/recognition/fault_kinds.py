@@ -90,10 +90,6 @@ def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
 def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
     """Returns the reason for each query's wrong best place.
 
-    Args:
-        result: result of a method on a pair.
-        evidence: evidence of the pair.
-
     Returns:
         Q of: "" if it is right; `no_place` if the query has no match;
         `no_candidate` if the method has no place, or rejects all; `too_far`

@@ -174,14 +174,6 @@ def judge_retrieval(
 ) -> PlaceRecognition:
     """Returns the numbers of a method's retrieval.
 
-    Args:
-        method: that made the scores.
-        database: name of the drive of the places.
-        query: name of the drive of the queries.
-        retrieval: scores and truth.
-        protocol: protocol of the comparison.
-        mode: which queries count.
-
     Raises:
         InputError: if no query has a match.
     """

@@ -132,10 +132,6 @@ class Report:
 def write_report(report: Report, folder: Path) -> Path:
     """Writes all files but the figures; returns the path of `report.html`.
 
-    Args:
-        report: what to write.
-        folder: an existing one.
-
     Raises:
         InputError: a file cannot be written.
     """

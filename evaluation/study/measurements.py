@@ -57,14 +57,6 @@ def recognise_places(
     """Returns the result of a method on two drives of one world.
 
     It is None if a drive is compared with itself and closes no loop.
-
-    Args:
-        reporter: takes the progress.
-        map_name: the name of the city.
-        stages: the stage of the database, and of the query.
-        described: the method's descriptions of both.
-        choice: the method.
-        protocol: the protocol of the descriptions.
     """
     # The method comes first, because it registers the type of its
     # descriptions.

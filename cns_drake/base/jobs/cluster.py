@@ -80,9 +80,6 @@ class Cluster:
     def connect(self, listener: Listener) -> AbstractContextManager[Workers]:
         """Returns workers, which live as long as the context.
 
-        Args:
-            listener: takes the messages of their jobs.
-
         Raises:
             InputError: if the scheduler does not answer.
         """

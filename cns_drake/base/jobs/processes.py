@@ -210,12 +210,7 @@ def _describe(status: int) -> str:
 
 
 def _work(connection: Connection, job: bytes) -> None:
-    """Runs a job; its whole process.
-
-    Args:
-        connection: leads to the parent.
-        job: a pickled `Step`.
-    """
+    """Runs a job; its whole process."""
     interrupt_on_termination(once=True)
     # In its own session, which Ctrl-C does not reach: the interrupted parent
     # ends its jobs in good order.

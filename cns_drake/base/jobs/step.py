@@ -78,9 +78,6 @@ class Step(abc.ABC):
     def run(self, reporter: Reporter) -> None:
         """Does the work; leaves no file under a final name half written.
 
-        Args:
-            reporter: takes its progress.
-
         Raises:
             InputError: it cannot be done.
         """

@@ -140,11 +140,6 @@ def make_city(world: Path) -> City:
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     """Makes a city from a road network.
 
-    Args:
-        network: the roads.
-        plan: plan of the districts.
-        source: the plan's file name, for messages.
-
     Raises:
         InputError: if the plan names something unknown or impossible.
     """
@@ -168,11 +163,6 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     """Makes a city along streets.
 
     Things that need most room, or have the least choice of place, come first.
-
-    Args:
-        streets: the streets of the city.
-        plan: plan of the districts.
-        source: the plan's file name, for messages.
 
     Raises:
         InputError: if the plan names something unknown or impossible.

@@ -114,10 +114,6 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
 def starter_plan(areas: StreetAreas, seed: int) -> dict:
     """Returns a plan in which every block has a character of its own.
 
-    Args:
-        areas: areas of the streets.
-        seed: seed of the draws.
-
     Returns:
         What `CityPlan` validates.
     """

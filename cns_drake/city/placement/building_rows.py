@@ -60,11 +60,6 @@ class _House:
 def place_buildings(draft: Draft, district: District, source: str) -> None:
     """Places a district's single buildings, then its rows.
 
-    Args:
-        draft: the city so far.
-        district: with its ground.
-        source: the plan's file name, for messages.
-
     Raises:
         InputError: if a single building has no room, or an archetype cannot be
             built in the size of the plan.

@@ -237,11 +237,7 @@ def _without_outers(
 
 
 def _no_buildings(faults: ImportFaults) -> str:
-    """Returns why a file gives no buildings.
-
-    Args:
-        faults: those that the file has.
-    """
+    """Returns why a file gives no buildings."""
     unfit = [
         f"{kind}: {number}, such as {example}"
         for kind, number, example in faults.rows()

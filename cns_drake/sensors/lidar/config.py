@@ -195,14 +195,7 @@ def describe_unit(config: LidarSection) -> dict[str, Any]:
 def make_returns(
     config: LidarSection, weather: WeatherConfig, name: str, seed: int
 ) -> CalibratedReturns | None:
-    """Returns the model of a LiDAR's calibrated returns; None for ideal ones.
-
-    Args:
-        config: the LiDAR.
-        weather: weather of the drive.
-        name: the LiDAR's name.
-        seed: seed of the scenario.
-    """
+    """Returns the model of a LiDAR's calibrated returns; None for ideal ones."""
     if config.returns == "ideal":
         return None
     # Slow to import, and not needed to describe a scenario.
@@ -221,13 +214,7 @@ def make_returns(
 def make_measurement(
     config: LidarSection, name: str, seed: int
 ) -> MeasurementModel:
-    """Returns the model of a LiDAR's measurement of true ranges.
-
-    Args:
-        config: the LiDAR.
-        name: the LiDAR's name.
-        seed: seed of the scenario.
-    """
+    """Returns the model of a LiDAR's measurement of true ranges."""
     return MeasurementModel(
         resolution=config.resolution,
         range_noise=config.range_noise,
