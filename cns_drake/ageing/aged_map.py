@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-import csv
 from dataclasses import astuple, dataclass, fields, replace
-import io
 import os
 from pathlib import Path
 import re
@@ -19,10 +17,12 @@ import yaml
 from cns_drake.ageing.history import City, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
+from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
+from cns_drake.base.files import draft_folder, user_errors
 from cns_drake.base.map_folder import (
     LANES_NAME,
+    MESH_FOLDER,
     ROADS_NAME,
     STRUCTURES_NAME,
     MapFolder,
@@ -39,7 +39,6 @@ from cns_drake.city.growth.stage_structures import (
 )
 from cns_drake.imports.map_files import (
     YEAR_COLUMN,
-    map_draft,
     stage_size,
     triangles_in,
 )
@@ -139,7 +138,8 @@ def age_map(
     city = City(world, rates, seed, shapely.union_all([*map(_swept, ways)]))
     # Today comes first.
     stages = {f"{k + 1:02d}": y for k, y in enumerate([0, *_others(wanted)])}
-    with map_draft(output) as draft:
+    with draft_folder(output) as draft:
+        (draft / MESH_FOLDER).mkdir()
         _copy_inputs(folder, drives, draft)
         writing = _Writing(world, draft, seed)
         shutil.copyfile(world.path, draft / stage_name("01"))
@@ -157,7 +157,8 @@ def age_map(
                 writing.stage(stage, year, city.standing)
         events += city.events
         writing.table(city.new)
-        (draft / HISTORY_NAME).write_text(_history(events), "utf-8")
+        names = [field.name for field in fields(Event)]
+        write_csv(draft / HISTORY_NAME, names, map(astuple, events))
         (draft / RATES_NAME).write_text(city.tally.to_csv(), "utf-8")
         _write_drives(folder, drives, draft, stages, seed)
         write_table(draft, sizes=writing.sizes)
@@ -289,10 +290,7 @@ class _Writing:
         Those of a shorter history have the same instance ids in a longer one.
         """
         world = self._world
-        out = io.StringIO()
-        table = csv.DictWriter(out, world.columns, "", lineterminator="\n")
-        table.writeheader()
-        table.writerows(world.rows.values())
+        rows: list[Mapping[str, object]] = [*world.rows.values()]
         ids = [int(row["instance"]) for row in world.rows.values()]
         others = {n: o for n, o in self._past.items() if n not in new}
         first = max(ids, default=0) + 1
@@ -302,26 +300,23 @@ class _Writing:
                 f"instance ids can count ({MAX_STRUCTURES})"
             )
         for k, one in enumerate((*new.values(), *others.values())):
-            row = {
-                "instance": first + k,
-                "name": one.name,
-                "class": one.semantic_class,
-                "label": CLASS_IDS[one.semantic_class],
-                **{a: f"{v:.3f}" for a, v in zip("xyz", one.xyz, strict=True)},
-                "yaw": f"{one.yaw:.5f}",
-                "tags": " ".join(one.tags),
-            }
-            table.writerow({k: v for k, v in row.items() if k in world.columns})
-        path = self._draft / STRUCTURES_NAME
-        path.write_text(out.getvalue(), "utf-8")
-
-
-def _history(events: Iterable[Event]) -> str:
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(field.name for field in fields(Event))
-    table.writerows(map(astuple, events))
-    return out.getvalue()
+            rows.append(
+                {
+                    "instance": first + k,
+                    "name": one.name,
+                    "class": one.semantic_class,
+                    "label": CLASS_IDS[one.semantic_class],
+                    **{
+                        a: f"{v:.3f}"
+                        for a, v in zip("xyz", one.xyz, strict=True)
+                    },
+                    "yaw": f"{one.yaw:.5f}",
+                    "tags": " ".join(one.tags),
+                }
+            )
+        columns = world.columns
+        cells = ([row.get(name, "") for name in columns] for row in rows)
+        write_csv(self._draft / STRUCTURES_NAME, columns, cells)
 
 
 def _copy_inputs(

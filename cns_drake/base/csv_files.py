@@ -1,17 +1,39 @@
-"""Reading CSV files."""
+"""Reading and writing CSV files."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import csv
+import io
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import completing, read_bytes
 
 # Column of files of earlier versions -> what it is called now.
 _FORMER_COLUMNS = {
     "radius_told": "gate",
     "recall_at_100_precision": "recall_at_full_precision",
 }
+
+
+def csv_text(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
+    """Returns a header and rows as CSV."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def write_csv(
+    path: Path, header: Iterable[object], rows: Iterable[Iterable[object]]
+) -> None:
+    """Writes a CSV file.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with completing(path) as part:
+        part.write_text(csv_text(header, rows), encoding="utf-8")
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:

@@ -6,6 +6,7 @@ import fcntl
 import hashlib
 import os
 from pathlib import Path
+import shutil
 import stat
 
 from cns_drake.base.errors import InputError
@@ -67,6 +68,35 @@ def completing(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
+    """Yields a draft of a folder, of the same name; it takes its place at last.
+
+    The draft lies in a folder of its own, since files may name their folder. On
+    an exception it is removed.
+
+    Args:
+        folder: not there, or empty.
+        replaces: whether it may be there; the draft then takes its place.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    part = part_path(folder)
+    draft = part / folder.resolve().name
+    try:
+        with user_errors(folder):
+            # A run that was killed may have left one behind.
+            shutil.rmtree(part, ignore_errors=True)
+            draft.mkdir(parents=True)
+            yield draft
+            if replaces and os.path.lexists(folder):
+                os.replace(folder, part / "replaced")
+            os.replace(draft, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def check_regular(path: Path) -> None:

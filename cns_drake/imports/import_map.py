@@ -11,8 +11,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.map_folder import LANES_NAME
+from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
 from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
@@ -28,7 +29,6 @@ from cns_drake.imports.ground import Ground, bottom_of, ground_of
 from cns_drake.imports.map_files import (
     city_facts,
     draw_overview,
-    map_draft,
     write_drives,
     write_facts,
     write_report,
@@ -108,7 +108,8 @@ def _import_city(
     drives = _lifted(drives, ground, city.faults)
     bare, dressing = staged.kept, None
     added: list[Imported] = []
-    with map_draft(output) as draft:
+    with draft_folder(output) as draft:
+        (draft / MESH_FOLDER).mkdir()
         draw_overview(draft / "from_above.png", bare, space, drives)
         if options.dressed:
             progress("dressing buildings and streets")
@@ -187,7 +188,8 @@ def _import_roads(
         from cns_drake.imports.opendrive.town import build_town, write_town
 
     town = build_town(source, options.seed, progress, options.dressed)
-    with map_draft(output) as draft:
+    with draft_folder(output) as draft:
+        (draft / MESH_FOLDER).mkdir()
         report, sizes = write_town(draft, source, town, progress)
         write_report(draft, report)
         finish(draft, sizes)

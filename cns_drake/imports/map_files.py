@@ -1,11 +1,8 @@
 """The files of an imported city."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 import re
-import shutil
 from typing import Any
 
 from matplotlib.artist import Artist
@@ -17,7 +14,6 @@ from matplotlib.patches import Patch
 import numpy as np
 import yaml
 
-from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import stage_sdf, structure_table
 from cns_drake.city.geometry.structures import Structure
@@ -44,25 +40,6 @@ _INCHES = 9.0
 _ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
 _ROUTE_WIDTHS = (5.0, 2.0)  # [pt]
 _ROOM_COLOUR, _ROOM_ALPHA = "#ffd92f", 0.6
-
-
-@contextmanager
-def map_draft(output: Path) -> Iterator[Path]:
-    """Yields a draft folder of the same name; it takes its place at success.
-
-    Raises:
-        InputError: if it cannot be written.
-    """
-    part = part_path(output)
-    draft = part / output.resolve().name
-    try:
-        with user_errors(output):
-            shutil.rmtree(part, ignore_errors=True)
-            (draft / MESH_FOLDER).mkdir(parents=True)
-            yield draft
-            os.replace(draft, output)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def write_world(

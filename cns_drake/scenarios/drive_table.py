@@ -6,16 +6,14 @@ measured anew when they have changed.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-import csv
 from dataclasses import astuple, dataclass, fields
-import io
 from pathlib import Path
 from typing import get_type_hints
 import zlib
 
-from cns_drake.base.csv_files import read_records
+from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import complete_part, user_errors, write_part
+from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios.scenario import Scenario
@@ -114,13 +112,8 @@ def write_table(
     rows = drive_rows(folder, progress, sizes)
     if not rows:
         return
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(field.name for field in fields(DriveRow))
-    table.writerows(astuple(row) for row in rows)
-    path = MapFolder(folder).drive_table
-    write_part(path, out.getvalue())
-    complete_part(path)
+    names = [field.name for field in fields(DriveRow)]
+    write_csv(MapFolder(folder).drive_table, names, map(astuple, rows))
 
 
 def _checksum(paths: Iterable[Path], more: bytes) -> str:

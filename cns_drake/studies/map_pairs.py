@@ -7,16 +7,15 @@ through the last. The file of an imported city is given by its digest.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-import csv
 from dataclasses import dataclass
 import hashlib
 from pathlib import Path
 
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.rates import read_rates
-from cns_drake.base.csv_files import read_records
+from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, make_folder, read_bytes
+from cns_drake.base.files import make_folder, read_bytes
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.progress import Track, silent
 from cns_drake.imports.import_map import import_city
@@ -169,10 +168,8 @@ def measure_pairs(
             found = score(pair, truth, run_baseline(method, pair, track), {})
             rows.append(_row(name, method, found, truth))
     path = output / "map_pairs.csv"
-    with completing(path) as part, open(part, "w", newline="") as stream:
-        writer = csv.DictWriter(stream, _COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    cells = ([row[name] for name in _COLUMNS] for row in rows)
+    write_csv(path, _COLUMNS, cells)
     return path
 
 

@@ -26,9 +26,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 import itertools
-import os
 from pathlib import Path
-import shutil
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -36,7 +34,7 @@ from pydrake.math import RigidTransform
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import part_path, user_errors
+from cns_drake.base.files import draft_folder, user_errors
 from cns_drake.base.process import num_cores
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.yaml_files import read_yaml
@@ -194,14 +192,11 @@ def write_truth(
     with user_errors(output):
         if output.exists() and (not output.is_dir() or any(output.iterdir())):
             raise InputError(f"{output}: exists already; give a new folder")
-        output.parent.mkdir(parents=True, exist_ok=True)
-        part = part_path(output)
-        shutil.rmtree(part, ignore_errors=True)
-    try:
+    with draft_folder(output) as draft:
         sessions, frames = [], []
         for side, survey in zip(SIDES, (a, b), strict=True):
             session, taken = write_session(
-                survey.drive, part / side, spacing, track
+                survey.drive, draft / side, spacing, track
             )
             sessions.append(session)
             frames.append(taken)
@@ -213,20 +208,14 @@ def write_truth(
         for session, labels in zip(pair, truth, strict=True):
             write_labels(session.folder / "truth.npy", labels)
         names = [survey.drive.instances or {} for survey in (a, b)]
-        table = write_structures(part / "structures.csv", pair, truth, names)
+        table = write_structures(draft / "structures.csv", pair, truth, names)
         write_page(
-            part / "index.html",
+            draft / "index.html",
             pair,
             truth,
             table,
             (a.drive.name, b.drive.name),
         )
-        with user_errors(output):
-            if output.exists():
-                output.rmdir()
-            os.replace(part, output)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     return {
         side: Counter(labels.tolist())
         for side, labels in zip(SIDES, truth, strict=True)

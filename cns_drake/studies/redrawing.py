@@ -8,12 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
-import shutil
 
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, part_path, user_errors
+from cns_drake.base.files import (
+    draft_folder,
+    make_folder,
+    user_errors,
+)
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -104,17 +107,9 @@ class RedrawCity(Step):
 
     def run(self, reporter: Reporter) -> None:
         folder, made_of = self.folder, self.sources()
-        part = part_path(folder)
-        # The folder inside has its final name already, since its files contain
-        # it.
-        draft = part / folder.name
-        try:
-            with user_errors(folder):
-                # Left behind by a run that was killed.
-                shutil.rmtree(part, ignore_errors=True)
-                draft.mkdir(parents=True)
-                for name, content in self.inputs().items():
-                    (draft / name).write_bytes(content)
+        with draft_folder(folder, replaces=True) as draft:
+            for name, content in self.inputs().items():
+                (draft / name).write_bytes(content)
             try:
                 self.finish_inputs(draft)
                 generate_city(draft)
@@ -128,12 +123,6 @@ class RedrawCity(Step):
                 reporter.note(
                     f"{folder}: replaced, since its inputs have changed"
                 )
-            with user_errors(folder):
-                if os.path.lexists(folder):
-                    os.replace(folder, part / "replaced")
-                os.replace(draft, folder)
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
 
     def inputs(self) -> dict[str, bytes]:
         """Returns name -> content of the inputs of the city."""

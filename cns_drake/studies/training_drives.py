@@ -15,7 +15,7 @@ import numpy as np
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import part_path, user_errors
+from cns_drake.base.files import draft_folder
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.city.generation.city_structures import City, make_city
@@ -78,24 +78,13 @@ class DrawnCity:
         """
         source = shipped_maps()[self.map_name]
         inputs = redrawn_inputs(source, _STAGES[-1], self.city_seed)
-        part = part_path(folder)
-        draft = part / folder.name
-        try:
-            with user_errors(folder):
-                shutil.rmtree(part, ignore_errors=True)
-                shutil.rmtree(folder, ignore_errors=True)
-                draft.mkdir(parents=True)
-                for name, content in inputs.items():
-                    (draft / name).write_bytes(content)
+        with draft_folder(folder, replaces=True) as draft:
+            for name, content in inputs.items():
+                (draft / name).write_bytes(content)
             stages = draw_stages(make_city(draft), self._rng(0))
-            with user_errors(folder):
-                text = yaml.safe_dump({"stages": stages}, sort_keys=False)
-                (draft / STAGES_NAME).write_text(text, encoding="utf-8")
+            text = yaml.safe_dump({"stages": stages}, sort_keys=False)
+            (draft / STAGES_NAME).write_text(text, encoding="utf-8")
             generate_city(draft)
-            with user_errors(folder):
-                draft.rename(folder)
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
 
     def drives(self, folder: Path) -> list[Scenario]:
         """Returns the drives through the city."""

@@ -89,7 +89,7 @@ def _round(
 def vehicle_limbs(
     kind: VehicleKind, rng: np.random.Generator
 ) -> tuple[Limb, ...]:
-    """Returns a vehicle's only limb; its frame is on the ground below its box."""
+    """Returns a vehicle's only limb, in a frame on the ground below its box."""
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     if kind.name in ("bicycle", "motorcycle"):
         shapes = _two_wheeler(kind.name, paint, rng)

@@ -40,6 +40,7 @@ from evaluation.drives.text_tables import (
     parse_seconds,
     pose_matrices,
     read_numbers,
+    read_poses,
 )
 
 _SCANS = "velodyne"
@@ -80,7 +81,7 @@ class KittiDrive(FileDrive):
             raise InputError(f"{times_path}: {error}") from error
         check_increasing(times_path, stamps_ns, "row")
         poses_path = _poses_path(path)
-        X_C0C = _read_poses(poses_path)
+        X_C0C = read_poses(poses_path)
         rows = len(stamps_ns), len(X_C0C)
         notes: list[str] = []
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
@@ -234,19 +235,10 @@ def _poses_path(path: Path) -> Path:
 
 def _read_first_pose(path: Path) -> np.ndarray:
     """Returns X_WS (4, 4) at the first scan."""
-    rows = _read_poses(path)
+    rows = read_poses(path)
     if len(rows) != 1:
         raise InputError(f"{path}: {len(rows)} rows instead of one")
     return rows[0]
-
-
-def _read_poses(path: Path) -> np.ndarray:
-    values = read_numbers(path, float)
-    if values.shape[1] != 12:
-        raise InputError(
-            f"{path}: rows of {values.shape[1]} numbers instead of 12"
-        )
-    return pose_matrices(path, values)
 
 
 def _read_calibration(path: Path) -> np.ndarray:

@@ -326,6 +326,20 @@ def read_quaternions(
     return _in_order(path, stamps_ns, poses.make_pose(R, values[:, :3]))
 
 
+def read_poses(path: Path) -> np.ndarray:
+    """Reads rows of the upper 3 x 4 of a pose, row by row, as (N, 4, 4).
+
+    Raises:
+        InputError: like `read_numbers`, or a matrix is no rotation.
+    """
+    values = read_numbers(path, float)
+    if values.shape[1] != 12:
+        raise InputError(
+            f"{path}: rows of {values.shape[1]} numbers instead of 12"
+        )
+    return pose_matrices(path, values)
+
+
 def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
     """Returns poses from rows of twelve numbers: the upper 3 x 4, row by row.
 

@@ -6,7 +6,6 @@ along it, across (to the left) and up.
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-import csv
 from dataclasses import dataclass
 import math
 import multiprocessing
@@ -19,9 +18,9 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import points as clouds
 from cns_drake.base import poses
+from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing
 from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import is_cloud, read_cloud
@@ -468,17 +467,16 @@ class Localisation:
 
 def write_rows(rows: np.ndarray, path: Path) -> None:
     """Writes results by query as CSV; an unknown number is empty."""
-    with (
-        completing(path) as part,
-        open(part, "w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(rows.dtype.fields or ())
-        for row in rows.tolist():
-            writer.writerow(
-                "" if isinstance(v, float) and not math.isfinite(v) else v
-                for v in row
-            )
+    cells = (
+        [
+            ""
+            if isinstance(value, float) and not math.isfinite(value)
+            else value
+            for value in row
+        ]
+        for row in rows.tolist()
+    )
+    write_csv(path, rows.dtype.names or (), cells)
 
 
 def query_frames(

@@ -30,6 +30,7 @@ from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_blocks, read_cloud
 from evaluation.drives.sampling import sample_frames
+from evaluation.drives.text_tables import read_poses
 
 # Side of the cells that keep a point each [m].
 THINNED = 0.1
@@ -222,7 +223,7 @@ def read_session(folder: Path) -> Session:
     file = folder / "poses.txt"
     X_WS = np.zeros((0, 4, 4))
     if file.is_file():
-        X_WS = _read_poses(file)
+        X_WS = read_poses(file)
         scans = len(list((folder / "Scans").glob("*.pcd")))
         if scans != len(X_WS):
             raise InputError(f"{file}: {len(X_WS)} poses for {scans} scans")
@@ -346,19 +347,6 @@ def _rows(X: np.ndarray) -> Iterable[str]:
     quat_xyzw = Rotation.from_matrix(X[:, :3, :3]).as_quat(canonical=True)
     numbers = np.hstack([X[:, :3, 3], quat_xyzw]).tolist()
     return [" ".join(map(repr, row)) for row in numbers]
-
-
-def _read_poses(path: Path) -> np.ndarray:
-    """Returns (K, 4, 4) poses of a file with twelve numbers in a row."""
-    try:
-        rows = np.loadtxt(path, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: {error}") from error
-    if rows.ndim != 2 or rows.shape[1] != 12 or not np.isfinite(rows).all():
-        raise InputError(f"{path}: not twelve numbers in each row")
-    X = np.tile(np.eye(4), (len(rows), 1, 1))
-    X[:, :3] = rows.reshape(-1, 3, 4)
-    return X
 
 
 class Pair(NamedTuple):

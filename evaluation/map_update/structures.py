@@ -1,14 +1,12 @@
 """How much of each structure changed, and a verdict for the whole."""
 
 from collections.abc import Mapping, Sequence
-import csv
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.csv_files import read_records
-from cns_drake.base.files import completing
+from cns_drake.base.csv_files import read_records, write_csv
 from evaluation.map_update.sessions import SIDES, Pair
 
 
@@ -107,16 +105,9 @@ def write_structures(
                     kinds[verdict],
                 )
             )
-    with (
-        completing(path) as part,
-        open(part, "w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(
-            field.name.replace("semantic_class", "class")
-            for field in fields(StructureChange)
-        )
-        writer.writerows(map(astuple, rows))
+    names = [field.name for field in fields(StructureChange)]
+    header = [name.replace("semantic_class", "class") for name in names]
+    write_csv(path, header, map(astuple, rows))
     return rows
 
 

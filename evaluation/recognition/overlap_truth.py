@@ -10,7 +10,6 @@ images pixel by pixel.
 """
 
 from collections.abc import Callable
-import csv
 import math
 from pathlib import Path
 from typing import Protocol
@@ -18,10 +17,9 @@ from typing import Protocol
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.csv_files import read_records
+from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing
 from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -188,16 +186,12 @@ def write_overlaps(
     Raises:
         InputError: if the file cannot be written.
     """
-    with (
-        completing(path) as part,
-        open(part, "w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(_COLUMNS)
-        for frame, row in zip(query_frames, overlaps, strict=True):
-            for place, value in zip(database_frames, row, strict=True):
-                text = "" if math.isnan(value) else f"{value:.6f}"
-                writer.writerow([frame, place, text])
+    rows = (
+        (frame, place, "" if math.isnan(value) else f"{value:.6f}")
+        for frame, row in zip(query_frames, overlaps, strict=True)
+        for place, value in zip(database_frames, row, strict=True)
+    )
+    write_csv(path, _COLUMNS, rows)
 
 
 def read_overlaps(

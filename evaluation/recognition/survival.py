@@ -42,7 +42,7 @@ class Kept:
     @property
     def share(self) -> float:
         """Changed over unchanged; NaN if `unchanged` is 0 or NaN."""
-        return float(_share(self.changed, self.unchanged))
+        return float(kept_share(self.changed, self.unchanged))
 
 
 @dataclass(frozen=True)
@@ -150,15 +150,16 @@ def paired_intervals(
     before = resampled_metrics(unchanged, weights)
     after = resampled_metrics(changed, weights)
     auc, recall = (
-        percentile_interval(_share(one, other))
+        percentile_interval(kept_share(one, other))
         for one, other in zip(after, before, strict=True)
     )
     return auc, recall
 
 
-def _share(
+def kept_share(
     changed: np.ndarray | float, unchanged: np.ndarray | float
 ) -> np.ndarray:
+    """Returns changed over unchanged; NaN where the latter is 0 or NaN."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)

@@ -26,7 +26,7 @@ from evaluation.recognition.resampling import (
     resampled_weights,
 )
 from evaluation.recognition.rung_outcome import FAULTS, RungOutcome
-from evaluation.recognition.survival import Kept
+from evaluation.recognition.survival import Kept, kept_share
 from evaluation.report.drawing import plain, save
 from evaluation.report.tables import (
     Columns,
@@ -186,10 +186,7 @@ def _row(
     share = Interval(math.nan, math.nan)
     if len(unchanged[0].outcomes) == num_queries:
         before = _sampled_auc(unchanged, weights)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = percentile_interval(
-                np.where(before > 0.0, samples / before, math.nan)
-            )
+        share = percentile_interval(kept_share(samples, before))
     none, changed = (
         float(np.mean([pr_curve(one.outcomes).auc for one in outcomes]))
         for outcomes in (unchanged, draws)
@@ -393,10 +390,7 @@ def crossed_rows(
         interval = Interval(math.nan, math.nan)
         if len({len(part[0].outcomes) for part in draws}) == 1:
             none, *kept = (_sampled_auc(part, weights) for part in draws)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                first, second, both = (
-                    np.where(none > 0.0, part / none, math.nan) for part in kept
-                )
+            first, second, both = (kept_share(part, none) for part in kept)
             interval = percentile_interval(first * second - both)
         excess = one.kept.share * other.kept.share - pair.kept.share
         found.append(CrossedRow(pair, (one, other), excess, interval))

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-import csv
 from dataclasses import dataclass, replace
 import html
-import io
 from itertools import groupby
 import math
 from operator import attrgetter
@@ -15,6 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from cns_drake.base.csv_files import csv_text
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 
 _Item = TypeVar("_Item")
@@ -150,14 +149,15 @@ class Table:
                 )
             else:
                 expanded.append([name, *column])
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        for row in zip(*expanded, strict=True):
-            writer.writerow(
+        header, *rows = zip(*expanded, strict=True)
+        cells = (
+            [
                 int(v) if isinstance(v, bool) else "" if _is_missing(v) else v
                 for v in row
-            )
-        return stream.getvalue()
+            ]
+            for row in rows
+        )
+        return csv_text(header, cells)
 
     def to_markdown(self) -> str:
         """Returns the table with four decimals, as the paper prints them.

@@ -13,13 +13,9 @@ import numpy as np
 
 from evaluation.recognition.pose_errors import pose_success
 from evaluation.recognition.pr_curve import pr_curve
-from evaluation.recognition.resampling import (
-    Interval,
-    percentile_interval,
-    resampled_metrics,
-    resampled_weights,
-)
+from evaluation.recognition.resampling import Interval
 from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.recognition.survival import kept_share, paired_intervals
 from evaluation.report.drawing import method_style, save
 from evaluation.report.tables import Columns, Table, in_table_order, title
 
@@ -64,7 +60,8 @@ class YearRow:
         gate: whether the gate was used.
         value: AUC, or the share of right poses or ends.
         today: the value without years between.
-        interval: 95 % interval of `kept` by bootstrap over queries.
+        interval: 95 % interval of `kept` by bootstrap over blocks of
+            the route.
         r1: R@1.
         visible_change: part of the queries' scans that the best place does not
             show, today's taken off.
@@ -85,7 +82,7 @@ class YearRow:
     @property
     def kept(self) -> float:
         """The share of today's value that is left; NaN for none."""
-        return self.value / self.today if self.today > 0.0 else math.nan
+        return float(kept_share(self.value, self.today))
 
     @property
     def key(self) -> tuple[str, str, str, bool, str]:
@@ -133,16 +130,7 @@ def _rows(
     pair: AgedPair, now: RungOutcome, then: RungOutcome
 ) -> Iterable[YearRow]:
     unknown = Interval(math.nan, math.nan)
-    interval = unknown
-    if len(now.outcomes) == len(then.outcomes):
-        weights = resampled_weights(len(now.outcomes))
-        after, before = (
-            resampled_metrics(one.outcomes, weights)[0] for one in (now, then)
-        )
-        with np.errstate(invalid="ignore", divide="ignore"):
-            interval = percentile_interval(
-                np.where(before > 0.0, after / before, math.nan)
-            )
+    interval, _ = paired_intervals(then.outcomes, now.outcomes)
     r1 = now.outcomes.recall_at(1)
     hidden = _hidden(now) - _hidden(then)
     number = len(now.outcomes)

@@ -1,13 +1,12 @@
 """Writes a city's stages, meshes and table of structures."""
 
 from collections.abc import Callable, Iterable, Sequence
-import csv
-import io
 import os
 from pathlib import Path
 import tempfile
 from xml.sax.saxutils import quoteattr
 
+from cns_drake.base.csv_files import csv_text
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import (
     MESH_FOLDER,
@@ -128,24 +127,20 @@ MAX_STRUCTURES = 2**16 - 1
 
 def structure_table(structures: Iterable[Structure]) -> str:
     """Returns the CSV that maps instance ids to names and classes."""
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(
-        ["instance", "name", "class", "label", "x", "y", "z", "yaw", "tags"]
+    names = "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags"
+    rows = (
+        [
+            instance,
+            one.name,
+            one.semantic_class,
+            CLASS_IDS[one.semantic_class],
+            *(f"{value:.3f}" for value in one.xyz),
+            f"{one.yaw:.5f}",
+            " ".join(one.tags),
+        ]
+        for instance, one in enumerate(structures, start=1)
     )
-    for instance, structure in enumerate(structures, start=1):
-        table.writerow(
-            [
-                instance,
-                structure.name,
-                structure.semantic_class,
-                CLASS_IDS[structure.semantic_class],
-                *(f"{value:.3f}" for value in structure.xyz),
-                f"{structure.yaw:.5f}",
-                " ".join(structure.tags),
-            ]
-        )
-    return out.getvalue()
+    return csv_text(names, rows)
 
 
 def render_city(

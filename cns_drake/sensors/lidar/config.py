@@ -195,7 +195,7 @@ def describe_unit(config: LidarSection) -> dict[str, Any]:
 def make_returns(
     config: LidarSection, weather: WeatherConfig, name: str, seed: int
 ) -> CalibratedReturns | None:
-    """Returns the model of a LiDAR's calibrated returns; None for ideal ones."""
+    """Returns the model of calibrated returns; None for ideal ones."""
     if config.returns == "ideal":
         return None
     # Slow to import, and not needed to describe a scenario.
