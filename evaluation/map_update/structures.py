@@ -105,8 +105,10 @@ def write_structures(
                     kinds[verdict],
                 )
             )
-    names = [field.name for field in fields(StructureChange)]
-    header = [name.replace("semantic_class", "class") for name in names]
+    header = [
+        field.name.replace("semantic_class", "class")
+        for field in fields(StructureChange)
+    ]
     write_csv(path, header, map(astuple, rows))
     return rows
 
