@@ -17,6 +17,7 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
+from cns_drake.base.xml_elements import read_elements
 from cns_drake.city.geometry.mesh import read_mesh
 from cns_drake.city.geometry.structures import (
     BoxShape,
@@ -224,12 +225,7 @@ def _is_open(one: world_structures.Structure) -> bool:
 def _read_visuals(
     path: Path,
 ) -> tuple[dict[str, list[str]], dict[str, list[ElementTree.Element]]]:
-    with user_errors(path):
-        text = path.read_text(encoding="utf-8")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise InputError(f"{path}: {error}") from None
+    root = read_elements(path)
     visuals = root.findall("world/model/link/visual")
     if len(root.findall("world/model")) != 1 or not all(
         "/" in one.get("name", "") for one in visuals

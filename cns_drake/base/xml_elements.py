@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 from pathlib import Path
+from typing import cast
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 from cns_drake.base.errors import InputError
@@ -18,44 +20,30 @@ _LONGEST_VALUE = 1000
 _LARGEST = 1e8
 
 
-class Element:
-    """An element and its children with known tags.
+class Element(ElementTree.Element):
+    """An element of a file.
 
     Attributes:
-        tag: its name.
         line: on which it begins.
-        attributes: as texts.
-        children: in their order.
-        content: the beginning of its text.
     """
 
-    __slots__ = ("attributes", "children", "content", "line", "tag")
-
-    def __init__(self, tag: str, line: int, attributes: dict[str, str]):
-        self.tag, self.line, self.attributes = tag, line, attributes
-        self.children: list[Element] = []
-        self.content = ""
+    line = 0
 
     def all(self, *path: str) -> Iterator[Element]:
         """Yields the elements at the end of a path of tags."""
-        for child in self.children:
-            if child.tag == path[0]:
-                if len(path) == 1:
-                    yield child
-                else:
-                    yield from child.all(*path[1:])
+        return cast(Iterator[Element], self.iterfind("/".join(path)))
 
     def first(self, *path: str) -> Element | None:
         """Returns the first element at the end of a path of tags."""
         return next(self.all(*path), None)
 
-    def text(self, name: str, default: str | None = None) -> str:
+    def value(self, name: str, default: str | None = None) -> str:
         """Returns an attribute.
 
         Raises:
             ValueError: if it is too long, or missing without a default.
         """
-        value = self.attributes.get(name, default)
+        value = self.attrib.get(name, default)
         if value is None or len(value) > _LONGEST_VALUE:
             fault = f"no {name}"
             if value is not None:
@@ -70,9 +58,9 @@ class Element:
             ValueError: if it is not a number, is too large for a road, or is
                 missing and has no default.
         """
-        if default is not None and name not in self.attributes:
+        if default is not None and name not in self.attrib:
             return default
-        text = self.text(name)
+        text = self.value(name)
         try:
             value = float(text)
         except ValueError:
@@ -83,49 +71,57 @@ class Element:
         return value
 
 
-def read_elements(path: Path, root: str) -> Element:
+def read_elements(
+    path: Path, root: str | None = None, encoding: str | None = None
+) -> Element:
     """Reads a file.
+
+    Prefixes of names need not be declared.
 
     Args:
         path: the file.
-        root: tag of its outermost element.
+        root: tag of its outermost element; any if None.
+        encoding: that of the file; what it says itself if None.
 
     Raises:
         InputError: if it cannot be read, is no XML, has another root, holds
             a document type, is nested too deep or has too many elements.
     """
-    parser = expat.ParserCreate()
-    top = Element("", 0, {})
-    open_ = [top]
-    count = 0
+    parser = expat.ParserCreate(encoding)
+    depth = count = 0
 
     def refuse(fault: str) -> None:
         raise InputError(f"{path}: line {parser.CurrentLineNumber}: {fault}")
 
-    def start(tag: str, attributes: dict[str, str]) -> None:
+    def make(tag: str, attributes: dict[str, str]) -> Element:
         nonlocal count
-        if len(open_) > _DEEPEST:
-            refuse(f"nested more than {_DEEPEST} deep")
-        if len(open_) == 1 and tag != root:
-            refuse(f"{tag[:40]} is no {root}")
         count += 1
         if count > _MOST_ELEMENTS:
             refuse(f"more than {_MOST_ELEMENTS} elements")
-        element = Element(tag, parser.CurrentLineNumber, attributes)
-        open_[-1].children.append(element)
-        open_.append(element)
+        element = Element(tag, attributes)
+        element.line = parser.CurrentLineNumber
+        return element
 
-    def end(_: str) -> None:
-        open_.pop()
+    builder = ElementTree.TreeBuilder(make)
 
-    def add(text: str) -> None:
-        element = open_[-1]
-        if len(element.content) < _LONGEST_VALUE:
-            element.content += text[:_LONGEST_VALUE]
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        if depth == 0 and root not in (None, tag):
+            refuse(f"{tag[:40]} is no {root}")
+        depth += 1
+        if depth > _DEEPEST:
+            refuse(f"nested more than {_DEEPEST} deep")
+        builder.start(tag, attributes)
 
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    parser.buffer_text = True
     parser.StartElementHandler = start
     parser.EndElementHandler = end
-    parser.CharacterDataHandler = add
+    parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = lambda *_: refuse("holds a document type")
     try:
         parser.Parse(read_bytes(path, _MOST_BYTES), True)
@@ -137,4 +133,4 @@ def read_elements(path: Path, root: str) -> Element:
     except (LookupError, ValueError) as error:
         # A text encoding that Python does not know.
         raise InputError(f"{path}: cannot be parsed: {error}") from error
-    return top.children[0]
+    return cast(Element, builder.close())

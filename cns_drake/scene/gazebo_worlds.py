@@ -12,10 +12,9 @@ import math
 import os
 from pathlib import Path
 from xml.etree import ElementTree
-from xml.parsers import expat
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.xml_elements import read_elements
 from cns_drake.scene.model_check import check_model
 
 # Environment variables with folders of models, of old and new Gazebo and
@@ -109,17 +108,7 @@ def read_xml(path: Path) -> ElementTree.Element:
         InputError: it cannot be read, or is not the XML of a model.
     """
     check_model(path)
-    builder = ElementTree.TreeBuilder()
-    # ElementTree's own parser would require declared prefixes.
-    parser = expat.ParserCreate("utf-8")
-    parser.StartElementHandler = builder.start
-    parser.EndElementHandler = builder.end
-    parser.CharacterDataHandler = builder.data
-    try:
-        parser.Parse(read_bytes(path), True)
-    except expat.ExpatError as error:
-        raise InputError(f"{path}: cannot be parsed: {error}") from error
-    return builder.close()
+    return read_elements(path, encoding="utf-8")
 
 
 # Elements that mark a world for Gazebo.

@@ -4,22 +4,18 @@ For text that is not a number or a valid size, libsdformat uses a part of it or
 1, or Drake ends the program. Long names end the process.
 """
 
-from dataclasses import dataclass, field
 import math
 from pathlib import Path
 import re
-from typing import NoReturn
-from xml.parsers import expat
+from typing import NoReturn, cast
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.scene.mesh_files import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 
 _MODELS = (".sdf", ".urdf")
 _LONGEST_NAME = 1000
-# The limit of libsdformat's parser.
-_DEEPEST = 100
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # Shape -> elements of its size, and the numbers in each.
 _SIZES = {
@@ -39,25 +35,6 @@ _OTHER_NUMBERS = {
         for colour in ("ambient", "diffuse", "specular", "emissive")
     ),
 }
-
-
-@dataclass(slots=True)
-class _Element:
-    """An element that is being read.
-
-    Attributes:
-        name: its tag.
-        line: its first line.
-        values: attributes and children without children of their own.
-        text: its text.
-        children: tag -> number of children.
-    """
-
-    name: str
-    line: int
-    values: dict[str, str]
-    text: str = ""
-    children: dict[str, int] = field(default_factory=dict)
 
 
 def check_model(path: Path) -> None:
@@ -84,99 +61,67 @@ class _ModelCheck:
     def __init__(self, path: Path):
         self.included: list[Path] = []
         self._path = path
-        self._open: list[_Element] = []
-        self._names: list[str] = []
-        parser = expat.ParserCreate("utf-8")
-        parser.buffer_text = True
-        parser.StartElementHandler = self._start
-        parser.CharacterDataHandler = self._add_text
-        parser.EndElementHandler = self._end
-        parser.StartDoctypeDeclHandler = self._refuse_doctype
-        self._parser = parser
-        try:
-            parser.Parse(read_bytes(path), True)
-        except expat.ExpatError as error:
-            raise InputError(
-                f"{path}: cannot be parsed: line {error.lineno}:"
-                f" {expat.ErrorString(error.code)}"
-            ) from error
+        self._walk(read_elements(path, encoding="utf-8"), [])
 
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        line = self._parser.CurrentLineNumber
-        if len(self._open) >= _DEEPEST:
-            self._refuse(f"nested more than {_DEEPEST} deep")
-        if self._open:
-            children = self._open[-1].children
-            children[name] = children.get(name, 0) + 1
-        self._open.append(_Element(name, line, attributes))
-        self._names.append(name)
-        for key, value in attributes.items():
+    def _walk(self, element: Element, parents: list[str]) -> None:
+        for key, value in element.items():
             if len(value) > _LONGEST_NAME:
-                self._refuse(f"{key} of {len(value)} letters")
-
-    def _add_text(self, text: str) -> None:
-        self._open[-1].text += text
-
-    def _end(self, name: str) -> None:
-        element = self._open[-1]
-        parents = self._names
-        parents.pop()
+                self._refuse(element, f"{key} of {len(value)} letters")
+        for child in element:
+            self._walk(cast(Element, child), [*parents, element.tag])
         if "plugin" not in parents:
             self._check(element, parents[-1] if parents else "", parents)
-        self._open.pop()
-        if self._open and not element.children:
-            self._open[-1].values[name] = element.text
 
-    def _check(
-        self, element: _Element, parent: str, parents: list[str]
-    ) -> None:
-        if parent == "geometry" and element.name in _SIZES:
+    def _check(self, element: Element, parent: str, parents: list[str]) -> None:
+        text = element.text or ""
+        if parent == "geometry" and element.tag in _SIZES:
             self._check_sizes(element)
-        elif element.name == "geometry":
+        elif element.tag == "geometry":
             shapes = [*_SIZES, *_OTHER_SHAPES]
-            found = [
-                one
-                for one, number in element.children.items()
-                for _ in range(number)
-                if one in shapes
-            ]
+            found = [one.tag for one in element if one.tag in shapes]
             if len(found) > 1:
-                self._refuse(f"two shapes, {found[0]} and {found[1]}")
-        elif element.name == "pose":
-            for number in self._numbers(element.text)[:3]:
+                fault = f"two shapes, {found[0]} and {found[1]}"
+                self._refuse(element, fault)
+        elif element.tag == "pose":
+            for number in self._numbers(element, text)[:3]:
                 if abs(number) > LARGEST_SIZE:
-                    self._refuse(f"{number:g} is beyond {LARGEST_SIZE:g} m")
-        elif element.name == "origin":
+                    fault = f"{number:g} is beyond {LARGEST_SIZE:g} m"
+                    self._refuse(element, fault)
+        elif element.tag == "origin":
             for key in ("xyz", "rpy"):
-                self._numbers(element.values.get(key, ""))
-        elif (parent, element.name) in _OTHER_NUMBERS:
-            self._numbers(element.text)
-        elif element.name == "uri":
-            self._check_uri(element.text.strip(), parents)
+                self._numbers(element, element.get(key, ""))
+        elif (parent, element.tag) in _OTHER_NUMBERS:
+            self._numbers(element, text)
+        elif element.tag == "uri":
+            self._check_uri(text.strip(), parents)
 
-    def _check_sizes(self, shape: _Element) -> None:
-        for name, count in _SIZES[shape.name].items():
-            if name not in shape.values:
-                self._refuse(f"no {name}")
-            if (times := shape.children.get(name, 0)) > 1:
-                self._refuse(f"{name} is there {times} times")
-            text = shape.values[name]
-            numbers = self._numbers(text, name)
+    def _check_sizes(self, shape: Element) -> None:
+        for name, count in _SIZES[shape.tag].items():
+            # SDF has children, URDF has attributes.
+            texts = [one.text or "" for one in shape.findall(name)]
+            if not texts and name in shape.attrib:
+                texts = [shape.attrib[name]]
+            if not texts:
+                self._refuse(shape, f"no {name}")
+            if len(texts) > 1:
+                self._refuse(shape, f"{name} is there {len(texts)} times")
+            numbers = self._numbers(shape, texts[0], f"{name}: ")
             if len(numbers) != count:
-                self._refuse(f"{name}: {len(numbers)} numbers, not {count}")
+                fault = f"{name}: {len(numbers)} numbers, not {count}"
+                self._refuse(shape, fault)
             if not all(number > 0.0 for number in numbers):
-                self._refuse(
-                    f"{name}: {' '.join(text.split())} is not a valid size"
-                )
+                size = " ".join(texts[0].split())
+                self._refuse(shape, f"{name}: {size} is not a valid size")
 
-    def _numbers(self, text: str, name: str = "") -> list[float]:
+    def _numbers(
+        self, element: Element, text: str, where: str = ""
+    ) -> list[float]:
         """Returns the numbers in a text, all of which are finite."""
         numbers = []
         for word in text.split():
             number = float(word) if _NUMBER.fullmatch(word) else math.nan
             if not math.isfinite(number):
-                where = f"{name}: " if name else ""
-                self._refuse(f"{where}{word} is no number")
+                self._refuse(element, f"{where}{word} is no number")
             numbers.append(number)
         return numbers
 
@@ -193,11 +138,7 @@ class _ModelCheck:
             except ValueError as error:
                 raise InputError(f"{place}: {error}") from error
 
-    def _refuse_doctype(self, *_: object) -> None:
-        raise InputError(f"{self._path}: holds a document type")
-
-    def _refuse(self, fault: str) -> NoReturn:
-        element = self._open[-1]
+    def _refuse(self, element: Element, fault: str) -> NoReturn:
         raise InputError(
-            f"{self._path}: line {element.line}: {element.name}: {fault}"
+            f"{self._path}: line {element.line}: {element.tag}: {fault}"
         )

@@ -141,13 +141,13 @@ def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
     types: dict[str, str] = {}
     for number, step in enumerate(steps):
         for one in step.all(tag):
-            name = one.text("id")
+            name = one.value("id")
             rows = found.setdefault(name, [])
             if rows and rows[-1][0] == number:
                 raise ValueError(
                     f"line {one.line}: {tag} {name[:40]!r} is there twice"
                 )
-            types.setdefault(name, one.text("type", ""))
+            types.setdefault(name, one.value("type", ""))
             rows.append(
                 (
                     number,

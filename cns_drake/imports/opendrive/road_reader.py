@@ -73,7 +73,7 @@ def read_marks(
     for one in lane.all("roadMark"):
         stated = one.number("width", 0.0)
         width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
-        if one.text("weight", "standard") == "bold" and not stated:
+        if one.value("weight", "standard") == "bold" and not stated:
             width *= 2.0
         lines: tuple[MarkLine, ...] = ()
         try:
@@ -83,8 +83,8 @@ def read_marks(
         marks.append(
             RoadMark(
                 start + one.number("sOffset", 0.0),
-                one.text("type", "none"),
-                one.text("color", "standard"),
+                one.value("type", "none"),
+                one.value("color", "standard"),
                 width,
                 lines,
             )
@@ -130,10 +130,10 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
         top: the outermost element.
         faults: the counts.
     """
-    roads = {one.attributes.get("id", ""): one for one in top.all("road")}
-    junctions = {one.attributes.get("id", "") for one in top.all("junction")}
+    roads = {one.attrib.get("id", ""): one for one in top.all("road")}
+    junctions = {one.attrib.get("id", "") for one in top.all("junction")}
     for name, road in roads.items():
-        own = road.attributes.get("junction", "-1")
+        own = road.attrib.get("junction", "-1")
         if own not in ("-1", "") and own not in junctions:
             faults.add("road of a junction that is not in the file", name)
         for end in _ENDS:
@@ -144,10 +144,10 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
         for _ in _dangling_lanes(road, roads):
             faults.add("link to a lane that is not in the file", name)
     for junction in top.all("junction"):
-        name = junction.attributes.get("id", "")
+        name = junction.attrib.get("id", "")
         for connection in junction.all("connection"):
             for key in ("incomingRoad", "connectingRoad", "linkedRoad"):
-                linked = connection.attributes.get(key)
+                linked = connection.attrib.get(key)
                 if linked is not None and linked not in roads:
                     faults.add(
                         "connection of a junction with a road that is not in"
@@ -161,8 +161,8 @@ def _linked(road: Element, end: str) -> tuple[str, str | None]:
     link = road.first("link", end)
     if link is None:
         return "road", None
-    kind = link.attributes.get("elementType", "road")
-    return kind, link.attributes.get("elementId")
+    kind = link.attrib.get("elementType", "road")
+    return kind, link.attrib.get("elementId")
 
 
 def _dangling_lanes(
@@ -183,13 +183,13 @@ def _dangling_lanes(
                 others = _linked_sections(roads[linked])
                 beside = others[:1] + others[-1:]
             there = {
-                lane.attributes.get("id")
+                lane.attrib.get("id")
                 for other in beside
                 for lane in _linked_lanes(other)
             }
             for lane in _linked_lanes(section):
                 for link in lane.all("link", end):
-                    if link.attributes.get("id") not in there:
+                    if link.attrib.get("id") not in there:
                         yield link
 
 
@@ -220,7 +220,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
         except ValueError as error:
             raise InputError(f"{path}: {error}") from error
     for element in top.all("road"):
-        name = _plain(element.attributes.get("id", ""), names)
+        name = _plain(element.attrib.get("id", ""), names)
         names.add(name)
         try:
             road = _road(element, name, faults)
@@ -251,7 +251,9 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
     reference = top.first("header", "geoReference")
     return RoadMap(
         tuple(_moved(road, origin) for road in roads),
-        " ".join(reference.content.split()) if reference else "",
+        " ".join((reference.text or "").split())
+        if reference is not None
+        else "",
         (float(origin[0]), float(origin[1]), 0.0),
     )
 
@@ -264,7 +266,7 @@ def _check_ids(elements: Iterable[Element]) -> None:
     """
     lines: dict[str, int] = {}
     for one in elements:
-        own = one.text("id", "")
+        own = one.value("id", "")
         if own in lines:
             raise ValueError(
                 f"{one.tag} {_stem(own)}: line {one.line}: duplicate id, that"
@@ -314,9 +316,9 @@ def _road(
     if not sections:
         faults.add("road without lanes, left out", name)
         return None
-    if element.first("lateralProfile", "shape"):
+    if element.first("lateralProfile", "shape") is not None:
         faults.add("lateral shape of a road, not read", name)
-    junction = element.text("junction", "-1")
+    junction = element.value("junction", "-1")
     banking = _cubics(element.all("lateralProfile", "superelevation"), "s")
     along = np.linspace(0.0, length, math.ceil(length) + 1)
     if banking and np.abs(banking.at(along, along)).max() > _MOST_BANKED:
@@ -332,7 +334,7 @@ def _road(
         superelevation=banking,
         lane_offset=_cubics(offsets, "s"),
         sections=tuple(sections),
-        keeps_left=element.text("rule", "RHT").upper() == "LHT",
+        keeps_left=element.value("rule", "RHT").upper() == "LHT",
         limits=tuple(_limits(element)),
         things=tuple(read_things(element, name, faults)),
         spans=tuple(
@@ -379,7 +381,7 @@ def _shape(geometry: Element, length: float) -> Shape:
         ValueError: if it has no curve, or one that is too sharp.
     """
     shape: Shape | None = None
-    for one in geometry.children:
+    for one in geometry.all("*"):
         if one.tag == "line":
             shape = Arc(0.0)
         elif one.tag == "arc":
@@ -395,7 +397,7 @@ def _shape(geometry: Element, length: float) -> Shape:
             shape = Cubic((0, 1, 0, 0), v, length, length, stretched=False)
         elif one.tag == "paramPoly3":
             u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
-            by_arc = one.text("pRange", "normalized") == "arcLength"
+            by_arc = one.value("pRange", "normalized") == "arcLength"
             last = length if by_arc else 1.0
             shape = Cubic(u, v, last, length, by_parameter=by_arc)
     if shape is None:
@@ -463,10 +465,10 @@ def _lane(
     heights = element.first("height")
     lane = Lane(
         number=int(number),
-        kind=element.text("type", "none"),
+        kind=element.value("type", "none"),
         width=_cubics(element.all("width"), "sOffset", start),
         border=_cubics(element.all("border"), "sOffset", start),
-        height=heights.number("inner", 0.0) if heights else 0.0,
+        height=0.0 if heights is None else heights.number("inner", 0.0),
         marks=tuple(read_marks(element, start, name, faults)),
     )
     for one in (*element.all("width"), *element.all("border")):
@@ -485,9 +487,9 @@ def _limits(road: Element) -> Iterator[tuple[float, float]]:
         if speed is None:
             continue
         try:
-            limit = float(speed.text("max", ""))
+            limit = float(speed.value("max", ""))
         except ValueError:
             continue
-        limit *= _UNITS.get(speed.text("unit", "m/s"), 1.0)
+        limit *= _UNITS.get(speed.value("unit", "m/s"), 1.0)
         if math.isfinite(limit) and limit > 0.0:
             yield one.number("s", 0.0), limit

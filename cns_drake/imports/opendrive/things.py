@@ -62,14 +62,14 @@ def read_things(
         yield Thing(
             name=f"signal_{name}_{k}",
             is_signal=True,
-            kind=one.text("type", "").lower(),
+            kind=one.value("type", "").lower(),
             s=one.number("s"),
             t=one.number("t"),
             z=one.number("zOffset", 0.0),
             heading=one.number("hOffset", 0.0),
             size=(0.0, one.number("width", 0.0), one.number("height", 0.0)),
-            is_dynamic=one.text("dynamic", "no") == "yes",
-            faces_back=one.text("orientation", "none") == "-",
+            is_dynamic=one.value("dynamic", "no") == "yes",
+            faces_back=one.value("orientation", "none") == "-",
         )
     for k, one in enumerate(road.all("objects", "object")):
         thing = _object(one, f"object_{name}_{k}")
@@ -100,7 +100,7 @@ def _object(one: Element, name: str) -> Thing:
     return Thing(
         name=name,
         is_signal=False,
-        kind=one.text("type", one.text("name", "none")).lower(),
+        kind=one.value("type", one.value("name", "none")).lower(),
         s=one.number("s"),
         t=one.number("t"),
         z=one.number("zOffset", 0.0),
