@@ -50,7 +50,7 @@ from cns_drake.transient.world_structures import (
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
 # A car that follows others takes at most this multiple of its own time, and
 # this time besides [s].
-_SLOWEST, _WAITS = 4.0, 300.0
+_SLOWEST, _WAITS = 6.0, 600.0
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
 

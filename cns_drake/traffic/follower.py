@@ -31,8 +31,9 @@ _REACHES, _ALIGNED = 3.0, 0.7
 # Cost of a metre on no lane, as that of a lane's square distance [m^2], and of
 # a change of lane, and to no lane or back.
 _NO_LANE, _SIDEWAYS, _AWAY = 4.0, 8.0, 20.0
-# The car is in both lanes for this distance before a change [m].
-_CHANGES = 12.0
+# The car is in both lanes for this distance before and behind a change [m], and
+# asks for a way from its lane, in which it is for this distance before [m].
+_CHANGES, _ASKS = 12.0, 25.0
 # Parameters of the Intelligent Driver Model, and the part of the drive's
 # greatest acceleration that it uses.
 _ACCELERATION, _DECELERATION, _HEADWAY, _PART = 1.5, 1.8, 1.3, 0.95
@@ -47,12 +48,16 @@ class _Run(NamedTuple):
         piece: its number, -1 on no lane.
         first, last: where the front bumper enters and leaves it [m].
         s: place on the piece where it enters [m].
+        beside: the lane from which the car changes to this one, or -1.
+        parts: where the car has left that lane [m].
     """
 
     piece: int
     first: float
     last: float
     s: float
+    beside: int = -1
+    parts: float = 0.0
 
 
 def find_runs(graph: LaneGraph, points: np.ndarray, step: float) -> list[_Run]:
@@ -114,11 +119,27 @@ def find_runs(graph: LaneGraph, points: np.ndarray, step: float) -> list[_Run]:
         if before_it >= 0 and piece in graph.pieces[before_it].after:
             # The boundary is between two of the points.
             firsts[k], s[k] = firsts[k] - s[k], 0.0
-    lasts = [*firsts[1:].tolist(), step * len(points)]
-    return [
-        _Run(*run)
-        for run in zip(pieces, firsts.tolist(), lasts, s.tolist(), strict=True)
-    ]
+    firsts = np.append(firsts, step * len(points))
+    runs: list[_Run] = []
+    for k, piece in enumerate(pieces):
+        run = _Run(piece, *firsts[k : k + 2].tolist(), float(s[k]))
+        last = runs[-1] if runs else run
+        lane = graph.pieces[last.piece]
+        if min(last.piece, piece) >= 0 and piece in (lane.left, lane.right):
+            earlier = min(run.first - run.last + _ASKS, run.s)
+            earlier = max(0.0, min(earlier, run.first - last.first - step))
+            first = run.first - earlier
+            runs[-1] = last._replace(last=first)
+            run = _Run(
+                piece,
+                first,
+                run.last,
+                run.s - earlier,
+                last.piece,
+                run.first + _CHANGES,
+            )
+        runs.append(run)
+    return runs
 
 
 class Follower:
@@ -225,22 +246,22 @@ class Follower:
         """
         front = self.u[-1] + self._box.front
         gap, speed = np.inf, 0.0
-        if car["left_lane"] >= 0:
-            after = self._runs[self._run + 1]
-            gap, speed = find_ahead(
-                occupants, after.piece, after.s - after.first + front, who
-            )
+        other = int(car["left_lane"])
+        if other >= 0:
+            length = streets.pieces["length"]
+            scale = length[other] / length[car["path"][CURRENT]]
+            gap, speed = find_ahead(occupants, other, car["s"] * scale, who)
         for run in self._runs[self._run :]:
             if run.piece < 0 or run.first - front > SIGHT:
                 break
             is_next = run.first > front and run is not self._held
             if is_next and streets.pieces[run.piece]["is_way"]:
                 return gap, speed, run.first - front
-            other = find_ahead(
+            gap_2, speed_2 = find_ahead(
                 occupants, run.piece, run.s + front - run.first, who
             )
-            if other[0] < gap:
-                gap, speed = other
+            if gap_2 < gap:
+                gap, speed = gap_2, speed_2
         return gap, speed, np.inf
 
     def _place(self, streets: Streets, car: np.void) -> None:
@@ -254,7 +275,9 @@ class Follower:
         path[:] = -1
         is_way = piece >= 0 and bool(streets.pieces[piece]["is_way"])
         after = runs[self._run + 1] if self._run < len(runs) - 1 else None
-        car["left_lane"] = -1
+        car["left_lane"] = run.beside if front < run.parts else -1
+        if car["held"] < 0:
+            self._held = None
         if car["granted"] and self._held is None:
             self._held = after
         if self._held is not None and front >= self._held.last:

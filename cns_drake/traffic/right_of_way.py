@@ -29,7 +29,7 @@ _STOPS, _STANDS, _AT_LINE = 3.0, 0.5, 4.0
 _GREEN, _RED = 27.0, 4.0
 # After this time they change for a driver [s], while no other direction has any
 # within this distance [m].
-_ALONE, _SEEN_FROM = 8.0, 30.0
+_ALONE, _SEEN_FROM = 4.0, 30.0
 # Traffic ahead of the ego car, if it comes within this time, goes first and
 # does not wait for signals [s].
 _EGO_IS_NEAR = 80.0
@@ -59,7 +59,7 @@ _PATIENCE = 3.0
 WALK_GROUP = 3.0
 _WALKING, _DAWDLING = 1.0, 3.0
 # Time for vehicles after a group has left a crossing [s].
-_REST = 20.0
+_REST = 30.0
 
 CROSSING = np.dtype(
     [
@@ -133,12 +133,33 @@ def grant_ways(
             continue
         if first[lane] < 0 or cars[i].s > cars[first[lane]].s:
             first[lane] = i
+        other = cars[i].left_lane
+        if cars[i].guided and other >= 0:
+            # It is the last one, and counts in both of its lanes.
+            s = cars[i].s * (pieces[other].length / pieces[lane].length)
+            if first[other] < 0 or s > cars[first[other]].s:
+                first[other] = i
+    for i in range(num_cars):
+        lane = cars[i].path[CURRENT]
+        if lane < 0 or not cars[i].granted or cars[i].v > _STANDS:
+            continue
+        if pieces[lane].is_way or first[lane] < 0:
+            continue
+        ahead = cars[first[lane]]
+        scale = pieces[lane].length / pieces[ahead.path[CURRENT]].length
+        if ahead.s * scale > cars[i].s:
+            # Behind one without a permit, a driver cannot use it.
+            cars[i].granted, cars[i].held = False, -1
     since = np.full(num_cars + len(crossings), np.inf)
     for lane in range(len(pieces)):
         if first[lane] < 0:
             continue
         car = cars[first[lane]]
-        if car.held >= 0 or car.left_lane >= 0:
+        if car.held >= 0 or car.path[CURRENT] != lane:
+            continue
+        if car.left_lane >= 0 and (
+            not car.guided or first[car.left_lane] != first[lane]
+        ):
             continue
         if car.guided and car.path[CURRENT + 1] < 0:
             continue

@@ -233,8 +233,11 @@ def plan_traffic(
         task.streets.until[1:] = np.inf
     best: TrafficPlan | None = None
     for attempt in range(_TRIES):
+        if best is not None and drive is not None and best.positions is None:
+            best = None
         best = _try(task, np.random.default_rng([seed, attempt]), best)
-        if best.left_out == 0:
+        has_arrived = drive is None or best.positions is not None
+        if has_arrived and best.left_out == 0:
             break
     assert best is not None
     return best
@@ -252,7 +255,8 @@ def _try(
             return best
         if trial.is_over(first + _PART):
             return trial.plan()
-    return trial.plan()
+    # A car that follows others has not arrived.
+    return best if best is not None and task.drive is not None else trial.plan()
 
 
 class Trial:

@@ -43,8 +43,9 @@ _TURN_RATE, _GOING = 2.5, 0.2
 _AT_NODE = 1.0
 # Greatest acceleration, in any direction [m/s^2].
 _STRONGEST = 2.5
-# A walker turns back after being blocked for this time [s].
-_PATIENCE = 4.0
+# A walker turns back after being blocked for this time [s], and so does one
+# who waits within this distance [m].
+_PATIENCE, _BESIDE = 4.0, 1.5
 # Walkers that cross, for each one that goes straight on, if both are possible.
 _CROSSES = 0.25
 # Length of sidewalk for one walker [m].
@@ -179,6 +180,10 @@ class Crowd:
         walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + dt, 0.0)
         paths = self._paths.paths[walkers["path"]]
         back = walkers["stuck"] > _PATIENCE
+        # So does one who waits where the other wants to leave a crossing.
+        apart = walkers["xy"][back, None] - walkers["xy"][is_waiting]
+        square = apart[..., 0] ** 2 + apart[..., 1] ** 2
+        back[is_waiting] |= (square < _BESIDE**2).any(axis=0)
         walkers["stuck"][back] = 0.0
         walkers["path"][back] ^= 1
         at = paths["num_points"] - 2 - walkers["at"]

@@ -12,7 +12,7 @@ from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import DriverConfig, TrafficConfig
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.loaded_drive import plan_scenario_traffic
-from cns_drake.traffic.follower import make_follower
+from cns_drake.traffic.follower import find_runs, make_follower
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.right_of_way import make_permits
 from cns_drake.traffic.streets import EgoBox, make_streets
@@ -172,3 +172,32 @@ def test_a_drive_among_others():
 def test_without_it_the_drive_stays_as_it_is():
     *_, plan = followed(False)
     assert plan.positions is None
+
+
+def test_changes_to_the_lane_of_its_way_in_time():
+    """The car leaves its lane at the stop line alone, for a way beside it."""
+    aside = 3.5 * np.array([-AHEAD[1], AHEAD[0], 0.0])
+    graph = LaneGraph(
+        (
+            Piece(line(0, 100), 14.0, False, (2,), junction=0, left=1),
+            Piece(line(0, 100) + aside, 14.0, False, (3,), junction=0, right=0),
+            Piece(line(100, 130), 14.0, True, (4,), junction=0),
+            Piece(line(100, 130) + aside, 14.0, True, (5,), junction=0),
+            Piece(line(130, 200), 14.0, False, (2,), junction=0),
+            Piece(line(130, 200) + aside, 14.0, False, (3,), junction=0),
+        ),
+        phases=(1,),
+    )
+    share = np.clip((100.0 - np.arange(0.0, 180.0)) / 4.0 + 0.5, 0.0, 1.0)
+    points = line(0, 179)[::2] + share[:, None] * aside
+    runs = find_runs(graph, points[:, :2], 1.0)
+    assert [run.piece for run in runs] == [1, 0, 2, 4]
+    lane = runs[1]
+    assert lane.last == pytest.approx(100.0, abs=1e-6)
+    assert lane.last - lane.first == pytest.approx(25.0)
+    assert lane.first - lane.s == pytest.approx(0.0, abs=1e-6)
+    assert runs[0].last == lane.first
+    # It is still beside where it leaves the other lane.
+    assert lane.beside == 1
+    assert lane.parts == pytest.approx(110.0, abs=3.0)
+    assert {run.beside for run in runs if run is not lane} == {-1}

@@ -205,11 +205,38 @@ def test_red_holds_vehicles_while_others_have_green():
     found = drive((0, 1), ((0, 80.0, 9.0), (3, 80.0, 9.0)))
     entered = (found.s > 0.0).argmax(axis=0) * DT
     assert entered[0] < 5.0
-    # The second waits alone for eight seconds, and the signal changes.
-    assert 8.0 < entered[1] < 15.0
+    # The second waits alone for four seconds, and the signal changes.
+    assert 4.5 < entered[1] < 8.0
     queue = tuple((0, 98.0 - 7.0 * k, 0.0) for k in range(14))
     found = drive((0, 1), ((3, 98.0, 0.0), *queue))
     entered = (found.s > 0.0).argmax(axis=0) * DT
     assert 31.0 < entered[0] < 34.0
     later = entered[entered > 27.0]
     assert (later > 31.0).all()
+
+
+@pytest.mark.parametrize(("v", "loses"), [(0.0, True), (5.0, False)])
+def test_who_stands_behind_another_loses_the_permit(v, loses):
+    graph, streets = junction()
+    cars = vehicles((0, 80.0, v), (0, 99.0, 0.0))
+    cars["granted"][0], cars["held"][0] = True, 1
+    cars["since"][1] = 0.0
+    permits, occupants = make_permits(graph), make_occupants(6, 2)
+    find_occupants(occupants, streets, cars, 1)
+    grant_ways(streets, cars, occupants, permits, 1, DT, 1)
+    assert cars["granted"].tolist() == [not loses, False]
+    assert cars["held"].tolist() == [-1 if loses else 1, -1]
+
+
+@pytest.mark.parametrize("other", [90.0, 99.0])
+@pytest.mark.parametrize("lane", [0, 3])
+def test_a_car_in_two_lanes_asks_as_the_first_in_both(other, lane):
+    """The ego car stands 2 m before the line, in lanes of 100 m."""
+    graph, streets = junction((0, 0))
+    cars = vehicles((lane, other, 0.0), (0, 98.0, 0.0))
+    cars["guided"][1], cars["left_lane"][1] = True, 3
+    permits, occupants = make_permits(graph), make_occupants(6, 2)
+    find_occupants(occupants, streets, cars, 1)
+    grant_ways(streets, cars, occupants, permits, 1, DT, 1)
+    is_ahead = other > 98.0
+    assert cars["granted"].tolist() == [is_ahead, not is_ahead]
