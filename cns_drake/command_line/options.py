@@ -22,8 +22,9 @@ Frames = Annotated[
 ]
 LIDAR_OPTION = typer.Option(
     metavar="PRESET",
-    help="Replace the LiDAR: cns, os0-128, os1-32, os1-64, os1-128, vlp-16,"
-    " hdl-64e, hesai-pandar-xt32, hokuyo-ust-20lx, mid-70, avia or mid-360.",
+    help="Replace the LiDAR: cns, os0-128, os1-32, os1-64, os1-128, os1-64-33,"
+    " os1-128-42, vlp-16, hdl-64e, hdl-32e, alpha-prime, hesai-pandar64,"
+    " hesai-pandar-xt32, hokuyo-ust-20lx, mid-70, avia or mid-360.",
 )
 LidarPreset = Annotated[str | None, LIDAR_OPTION]
 Recording = Annotated[

@@ -54,13 +54,25 @@ def _uniform_deg(
     return tuple(float(elevation) for elevation in elevations)
 
 
-def _hdl_64e_elevations() -> tuple[float, ...]:
-    # An upper block of 32 lasers from +2 deg in steps of 1/3 deg, a lower
-    # block of 32 down to -24.8 deg in steps of about 1/2 deg.
-    upper = np.linspace(2.0, -8.33, 32)
-    lower = np.linspace(-8.83, -24.8, 32)
-    elevations = np.deg2rad(np.concatenate([upper, lower]))
+def _radians(*parts_deg: np.ndarray | tuple[float, ...]) -> tuple[float, ...]:
+    elevations = np.deg2rad(np.concatenate(parts_deg))
     return tuple(float(elevation) for elevation in elevations)
+
+
+# Two blocks of 32 lasers, in steps of 1/3 deg and of 1/2 deg.
+_HDL_64E = _radians(np.linspace(2.0, -8.33, 32), np.linspace(-8.83, -24.33, 32))
+_PANDAR_64 = _radians(
+    (15.0, 11.0, 8.0, 5.0, 3.0),
+    np.linspace(2.0, -6.0, 49),
+    np.linspace(-7.0, -14.0, 8),
+    (-19.0, -25.0),
+)
+_ALPHA_PRIME = _radians(
+    4.61 + 10.39 * np.linspace(1.0, 1.0 / 14.0, 14) ** 1.7,
+    np.linspace(4.61, -6.5, 102),
+    (-6.65, -6.85, -7.15, -7.65, -8.352, -9.244),
+    (-10.346, -11.742, -13.565, -16.042, -19.582, -25.0),
+)
 
 
 LIDAR_PRESETS: dict[str, LidarPreset] = {
@@ -100,6 +112,20 @@ LIDAR_PRESETS: dict[str, LidarPreset] = {
         120.0,
         "Ouster OS1 data sheet rev. C, 128 channels",
     ),
+    "os1-64-33": _spinning(
+        _uniform_deg(16.6, -16.6, 64),
+        1024,
+        0.8,
+        120.0,
+        "Ouster OS1-64 data sheet, first generation: 64 channels over 33.2 deg",
+    ),
+    "os1-128-42": _spinning(
+        _uniform_deg(21.2, -21.2, 128),
+        1024,
+        0.5,
+        200.0,
+        "Ouster OS1 data sheet rev. 7: 128 channels over 42.4 deg, 200 m",
+    ),
     "vlp-16": _spinning(
         _uniform_deg(15.0, -15.0, 16),
         900,
@@ -108,11 +134,37 @@ LIDAR_PRESETS: dict[str, LidarPreset] = {
         "Velodyne VLP-16 data sheet: 2 deg steps, 0.4 deg columns at 20 Hz",
     ),
     "hdl-64e": _spinning(
-        _hdl_64e_elevations(),
+        _HDL_64E,
         1040,
         0.9,
         120.0,
-        "Velodyne HDL-64E S2/S3 manual: 0.346 deg columns at 20 Hz",
+        "Velodyne HDL-64E S2/S3 manual: 2 to -8.33 deg in steps of 1/3 deg, "
+        "-8.83 to -24.33 deg in steps of 1/2 deg, 0.346 deg columns at 20 Hz",
+    ),
+    "hdl-32e": _spinning(
+        _uniform_deg(10.67, -30.67, 32),
+        1085,
+        1.0,
+        100.0,
+        "Velodyne HDL-32E manual: 32 lasers from +10.67 to -30.67 deg, a "
+        "firing each 46.08 us, 1 to 100 m",
+    ),
+    "alpha-prime": _spinning(
+        _ALPHA_PRIME,
+        938,
+        0.5,
+        245.0,
+        "Velodyne Alpha Prime data sheet: 128 channels from +15 to -25 deg, "
+        "0.11 deg at least, 245 m, a firing each 53.3 us; the middle and lower "
+        "channels as drivers have them, the upper 14 ever farther apart",
+    ),
+    "hesai-pandar64": _spinning(
+        _PANDAR_64,
+        900,
+        0.3,
+        200.0,
+        "Hesai Pandar64 user manual: 64 channels from +15 to -25 deg, 1/6 deg "
+        "from +2 to -6 deg, 0.4 deg columns at 20 Hz, 0.3 to 200 m",
     ),
     "hesai-pandar-xt32": _spinning(
         _uniform_deg(15.0, -16.0, 32),

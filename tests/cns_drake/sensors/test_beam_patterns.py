@@ -65,6 +65,24 @@ def test_presets_make_usable_patterns(preset):
     assert len(source) > 20
 
 
+@pytest.mark.parametrize(
+    ("preset", "top", "bottom", "finest"),
+    [
+        ("os1-64-33", 16.6, -16.6, 33.2 / 63),
+        ("os1-128-42", 21.2, -21.2, 42.4 / 127),
+        ("hdl-64e", 2.0, -24.33, 1 / 3),
+        ("hdl-32e", 10.67, -30.67, 4 / 3),
+        ("alpha-prime", 15.0, -25.0, 0.11),
+        ("hesai-pandar64", 15.0, -25.0, 1 / 6),
+    ],
+)
+def test_elevations_of_data_sheets(preset, top, bottom, finest):
+    elevations = np.degrees(LIDAR_PRESETS[preset].pattern.elevations_rad)
+    assert (elevations.max(), elevations.min()) == pytest.approx((top, bottom))
+    steps = -np.diff(elevations)
+    assert steps.min() == pytest.approx(finest, abs=2e-3)
+
+
 def test_no_preset_of_that_name():
     with pytest.raises(
         KeyError, match="no LiDAR preset 'os1-65'; there are: cns"
