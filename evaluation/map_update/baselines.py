@@ -101,20 +101,20 @@ def by_free_space(
     settings = settings or FreeSpace()
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
-    cells = np.floor(mine.points / settings.cell).astype(np.int64)
+    labels = np.full(len(mine.points), kept, np.uint8)
+    far = np.isinf(nearest(mine.points, theirs.points, settings.near))
+    points = mine.points[far]
+    cells = np.floor(points / settings.cell).astype(np.int64)
     _, first, cell_of = np.unique(
         cells, axis=0, return_index=True, return_inverse=True
     )
-    past, shown, hidden = _count_views(
-        mine.points[first], theirs, settings, track
-    )
+    past, shown, hidden = _count_views(points[first], theirs, settings, track)
     is_shown = (shown > 0) & (shown >= settings.shown * hidden)
-    labels = np.where(is_shown, kept, unobserved)
+    found = np.where(is_shown, kept, unobserved)
     is_past = (past > 0) & (past > settings.past * (past + shown))
-    labels = np.where(is_past, changed, labels)[cell_of.ravel()]
-    near = np.isfinite(nearest(mine.points, theirs.points, settings.near))
-    labels[near] = kept
-    return labels.astype(np.uint8)
+    found = np.where(is_past, changed, found)
+    labels[far] = found[cell_of.ravel()]
+    return labels
 
 
 def _count_views(
