@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
+from typing import Any
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
@@ -27,7 +28,7 @@ from evaluation.report.tables import Table, in_table_order, title
 
 # All causes together, at the ladder's strengths, would leave nothing to
 # measure: from level to level they grow by little.
-LEVEL_STRENGTHS = {
+LEVEL_STRENGTHS: Mapping[str, Mapping[int, Any]] = {
     "parked_cars": {1: 0.25, 2: 0.33, 3: 0.42, 4: 0.5},
     "leaves": {1: 0.75, 2: 0.67, 3: 0.58, 4: 0.5},
     "snow": {1: 0.05, 2: 0.06, 3: 0.07, 4: 0.08},

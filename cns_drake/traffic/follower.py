@@ -122,7 +122,8 @@ def find_runs(graph: LaneGraph, points: np.ndarray, step: float) -> list[_Run]:
     firsts = np.append(firsts, step * len(points))
     runs: list[_Run] = []
     for k, piece in enumerate(pieces):
-        run = _Run(piece, *firsts[k : k + 2].tolist(), float(s[k]))
+        enters, leaves = firsts[k : k + 2].tolist()
+        run = _Run(piece, enters, leaves, float(s[k]))
         last = runs[-1] if runs else run
         lane = graph.pieces[last.piece]
         if min(last.piece, piece) >= 0 and piece in (lane.left, lane.right):

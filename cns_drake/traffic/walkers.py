@@ -180,7 +180,7 @@ class Crowd:
         walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + dt, 0.0)
         paths = self._paths.paths[walkers["path"]]
         back = walkers["stuck"] > _PATIENCE
-        # So does one who waits where the other wants to leave a crossing.
+        # Likewise one who waits where the other wants to leave a crossing.
         apart = walkers["xy"][back, None] - walkers["xy"][is_waiting]
         square = apart[..., 0] ** 2 + apart[..., 1] ** 2
         back[is_waiting] |= (square < _BESIDE**2).any(axis=0)
