@@ -88,6 +88,8 @@ def run_drive(
         scenario = scenario.with_transient(**transient)
     if driver is not None:
         scenario = scenario.with_driver(driver)
+        if driver == "real" and scenario.waypoints is not None:
+            terminal.note("--driver real: waypoints have no lanes to change to")
     if ride is not None:
         change: dict = {"ride": {"roughness": ride}}
         scenario = scenario.with_fields(change, "--ride")

@@ -133,8 +133,11 @@ class DriverConfig(Section):
 
 
 # Pairs of drives of Boreas and of MulRan KAIST differ by 0.5 m in a lane, and
-# are in different lanes on 10 to 17 % of the way.
-REAL_DRIVER = DriverConfig(wander=0.35, lane_changes=6.0, follows=True)
+# are in different lanes on 10 to 17 % of the way. The correlation of their
+# offsets is 1/e at 45 to 55 m; changes of lane shorten it.
+REAL_DRIVER = DriverConfig(
+    wander=0.35, wander_length=65.0, lane_changes=9.0, follows=True
+)
 
 
 class TrafficConfig(Section):

@@ -21,7 +21,6 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.city_structures import make_city
-from cns_drake.scenarios.scenario import REAL_DRIVER
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.studies.redrawing import RedrawCity, redrawn_inputs, to_yaml
 from cns_drake.studies.reproduction import reproduce_maps
@@ -33,6 +32,8 @@ _COST = 15.0
 _PLACES = frozenset({"position", "at", "block", "start", "end"})
 _LISTS_OF_PLACES = frozenset({"via", "area", "line", "within", "points"})
 _COLUMNS = ("map", "version", "seed", "turn_deg")
+# The driver, frozen with the seeds.
+_DRIVER = {"wander": 0.35, "lane_changes": 6.0, "follows": True}
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ class DrawFreshCity(RedrawCity):
     def inputs(self) -> dict[str, bytes]:
         """Returns the inputs of the city, but for its stages.
 
-        Each drive has the real drivers' values.
+        Each drive has a driver like a real one.
         """
         source = MapFolder(self.map_folder)
         texts = redrawn_inputs(self.map_folder, self.stage, self.seed)
@@ -178,9 +179,8 @@ class DrawFreshCity(RedrawCity):
             plan = turned(plan, self.turn_deg)
             plan["bounds"] = _turned_bounds(plan["bounds"], self.turn_deg)
             texts[source.plan.name] = to_yaml("the map's plan, turned", plan)
-        driver = REAL_DRIVER.model_dump(mode="json", exclude_defaults=True)
         for path in source.drives():
-            values = read_yaml(path) | {"map": ".", "driver": driver}
+            values = read_yaml(path) | {"map": ".", "driver": _DRIVER}
             texts[path.name] = to_yaml("the map's drive, by another", values)
         return texts
 

@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
+from cns_drake.command_line.drive_script import run_drive
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario_files import (
@@ -416,3 +417,23 @@ def test_the_fault_that_causes_others_comes_first(small_map, change, fault):
     }
     with pytest.raises(InputError, match=f"^test: {fault}.*and . more"):
         make_scenario(values, "test")
+
+
+def test_a_driver_without_lanes_comes_with_a_note(
+    small_map, tmp_path, monkeypatch, capsys
+):
+    values = scenario_values(small_map)
+    (tmp_path / "drive.yaml").write_text(yaml.safe_dump(values))
+    del values["route"]
+    values["waypoints"] = "way.csv"
+    (tmp_path / "tour.yaml").write_text(yaml.safe_dump(values))
+    (tmp_path / "way.csv").write_text("x,y\n0,0\n90,0\n")
+
+    def refuse(scenario, output, **options):
+        raise InputError(f"wander {scenario.driver.wander}")
+
+    monkeypatch.setattr("cns_drake.simulation.simulation.simulate", refuse)
+    for name, notes in (("drive", 0), ("tour", 1)):
+        with pytest.raises(InputError, match=r"wander 0\.35"):
+            run_drive(tmp_path / f"{name}.yaml", tmp_path, driver="real")
+        assert capsys.readouterr().err.count("no lanes") == notes
