@@ -406,14 +406,19 @@ def _intensity(
     energy = pulses.energy
     intensity, is_above = retro_from * energy, energy > 1.0
     if unit.exponent != 1.0:
-        power = unit.exponent * log(np.maximum(energy, 1e-12))
-        intensity = retro_from * unit.scale * exp(power)
+        root = np.sqrt(np.minimum(energy, 1.0))
+        step = (root * (len(unit.table) - 1) + 0.5).astype(np.int64)
+        intensity = retro_from * unit.table[step]
     if unit.fades:
         intensity *= np.maximum(1.0 - THRESHOLD_SNR / pulses.snr, 0.0)
     part = log(energy[is_above]) / math.log(_FULL_RETRO)
     intensity[is_above] = retro_from + rest * part
     intensity *= gain[pulses.beam]
-    intensity *= 1.0 + unit.speckle * normal(key, pulses.beam, draw + 2)
+    if unit.speckle:
+        speckle = normal(key, pulses.beam, draw + 2)
+        speckle *= unit.speckle
+        speckle += 1.0
+        intensity *= speckle
     is_zero = intensity < unit.floor
     if unit.zeros:
         is_zero |= uniform(key, pulses.beam, draw + 3) < unit.zeros

@@ -5,8 +5,12 @@ field.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
 
+import numpy as np
+
+from cns_drake.base.elementary import exp, log
 from cns_drake.sensors.returns.link_budget import (
     LinkBudget,
     SheetRow,
@@ -41,6 +45,16 @@ class Response:
     zeros: float = 0.0
     gain: float = 0.05
     speckle: float = 0.1
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """Intensities of diffuse targets, at even steps of the energy's root.
+
+        Logarithms of all points would take half a frame.
+        """
+        root = np.linspace(0.0, 1.0, 4097)
+        power = 2.0 * self.exponent * log(np.maximum(root, 1e-6))
+        return self.scale * exp(power)
 
 
 @dataclass(frozen=True)
