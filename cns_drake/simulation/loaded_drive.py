@@ -137,7 +137,12 @@ def load_stage_and_traffic(
         return world, None, trajectory
     traffic = plan_scenario_traffic(scenario, trajectory, world)
     if traffic.positions is not None:
-        trajectory = plan_drive(scenario, traffic.positions)
+        # Springs depend on speeds; the path does not, and is slow to plan.
+        trajectory = (
+            trajectory.with_positions(traffic.positions)
+            if scenario.ride.profile() is None
+            else plan_drive(scenario, traffic.positions)
+        )
     return with_traffic(world, traffic), traffic, trajectory
 
 
