@@ -229,12 +229,14 @@ class Crowd:
         after = int(walkers["next_path"][i])
         crossings = self._permits.crossings
         c = paths["crossing"][after]
-        if c >= 0 and self._users[c] == 0:
-            crossings["waits"][c] = min(crossings["waits"][c], t)
-            waited[c] = True
-            return False
-        if c >= 0 and t >= crossings["opened"][c] + WALK_GROUP:
-            return False
+        # One who turns back on a crossing has its permit.
+        if c >= 0 and c != paths["crossing"][walkers["path"][i]]:
+            if self._users[c] == 0:
+                crossings["waits"][c] = min(crossings["waits"][c], t)
+                waited[c] = True
+                return False
+            if t >= crossings["opened"][c] + WALK_GROUP:
+                return False
         for path, change in ((walkers["path"][i], -1), (after, 1)):
             c = paths["crossing"][path]
             if c >= 0:

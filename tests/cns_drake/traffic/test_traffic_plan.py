@@ -319,8 +319,8 @@ def test_walkers_pass_what_stands_on_sidewalks():
         met += len(tree.query(found, "intersects")[0])
         near += len(tree.query(found, "dwithin", 0.5)[0])
     assert near > 100
-    # Where ways meet, a walker may touch something for a moment.
-    assert met < 1e-3 * 80 * 60
+    # Where ways meet, a walker may touch something, and one may wait there.
+    assert met < 3e-3 * 80 * 60
     moved = np.ptp(traffic.walkers.values[..., :2], axis=0).max(axis=1)
     assert (moved > 5.0).mean() > 0.9
 
