@@ -465,7 +465,7 @@ app.command(
     )
 )(trajectory)
 
-app.command(epilog=example("cns-eval map-update changed --baseline distance"))(
+app.command(epilog=example("cns-eval map-update maps --baseline distance"))(
     map_update
 )
 app.command(
