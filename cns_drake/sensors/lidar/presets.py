@@ -155,7 +155,7 @@ LIDAR_PRESETS: dict[str, LidarPreset] = {
         0.5,
         245.0,
         "Velodyne Alpha Prime data sheet: 128 channels from +15 to -25 deg, "
-        "0.11 deg at least, 245 m, a firing each 53.3 us; angles in between are "
+        "0.11 deg at least, 245 m, a firing each 53.3 us; angles in between "
         "approximate: even in the middle, ever farther apart above and below",
     ),
     "hesai-pandar64": _spinning(
