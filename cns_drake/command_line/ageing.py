@@ -23,6 +23,12 @@ FirstYear = Annotated[
     ),
 ]
 
+RateFactor = Annotated[
+    float,
+    typer.Option(
+        min=0.0, metavar="FACTOR", help="Factor for all yearly rates."
+    ),
+]
 RatesFile = Annotated[
     Path | None,
     typer.Option(
@@ -68,12 +74,7 @@ def age(
     seed: Annotated[
         int, typer.Option(min=0, help="Seed of everything that happens.")
     ] = 0,
-    rate: Annotated[
-        float,
-        typer.Option(
-            min=0.0, metavar="FACTOR", help="Factor for all yearly rates."
-        ),
-    ] = 1.0,
+    rate: RateFactor = 1.0,
     rates: RatesFile = None,
     pictures: Annotated[
         bool,
@@ -152,12 +153,7 @@ def years(
             help="Fewer years, queries and places, and only old databases.",
         ),
     ] = False,
-    rate: Annotated[
-        float,
-        typer.Option(
-            min=0.0, metavar="FACTOR", help="Factor for all yearly rates."
-        ),
-    ] = 1.0,
+    rate: RateFactor = 1.0,
     rates: RatesFile = None,
     localise: Annotated[
         bool,
