@@ -162,6 +162,13 @@ def years(
             help="Also localise the queries in the maps of the databases.",
         ),
     ] = False,
+    map_update: Annotated[
+        bool,
+        typer.Option(
+            "--map-update",
+            help="Also score what finds the changes of the maps.",
+        ),
+    ] = False,
     method: MethodFiles = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
@@ -191,6 +198,7 @@ def years(
         study.QUICK_PROTOCOL if quick else study.YEARS_PROTOCOL,
         (FORWARD,) if quick else (FORWARD, BACKWARD),
         localises=localise,
+        updates=map_update,
         on_note=note,
     )
     typer.echo(path)

@@ -8,6 +8,7 @@ import typer
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
+from cns_drake.command_line.map_truthing import run_task
 from cns_drake.command_line.options import (
     Jobs,
     Maps,
@@ -88,7 +89,7 @@ def ladder(
             QUICK_EXTENT,
             QUICK_PROTOCOL,
             climb_ladder,
-            localise_rungs,
+            rung_pairs,
         )
         from cns_drake.studies.ladder_rungs import (
             CAUSES,
@@ -112,8 +113,8 @@ def ladder(
             "--levels: the levels are frozen; leave out --quick, --cause, "
             "--seeds, --pairs and --viewpoint"
         )
-    if task is Task.LOCALISE and (levels or pairs):
-        raise InputError("--task localise: leave out --levels and --pairs")
+    if task is not Task.PLACE and (levels or pairs):
+        raise InputError(f"--task {task.value}: leave out --levels and --pairs")
     cluster = choose_cluster(jobs, scheduler)
     causes = tuple(cause or CAUSES)
     for name in causes:
@@ -135,11 +136,10 @@ def ladder(
     )
     if levels:
         extent, protocol = LEVELS_EXTENT, LEVELS_PROTOCOL
-    if task is Task.LOCALISE:
+    if task is not Task.PLACE:
+        rungs = rung_pairs(maps, extent, note)
         spacing = protocol.query_spacing
-        own = method or ()
-        path = localise_rungs(maps, output, cluster, extent, spacing, own, note)
-        typer.echo(path)
+        typer.echo(run_task(task, rungs, output, cluster, spacing, method))
         return
     path, text = climb_ladder(
         maps,

@@ -1,14 +1,23 @@
-"""The commands `cns-drake map-truth` and `map-pairs`."""
+"""The commands `cns-drake map-truth` and `map-pairs`; tasks of others."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cns_drake.base import terminal
+from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.command_line.options import Task
 from evaluation.command_line.map_updating import BaselineName
 from evaluation.command_line.options import SessionSpacing
+
+if TYPE_CHECKING:
+    from cns_drake.base.jobs.cluster import Cluster
+    from evaluation.report.compared import ComparedPair
 
 _Drive = Annotated[str, typer.Argument(metavar="RECORDING|NAME|SCENARIO.yaml")]
 
@@ -74,11 +83,11 @@ def map_pairs(
     map_pairs.csv. What is there already stays.
     """
     with uninterrupted():
-        from cns_drake.studies.map_pairs import measure_pairs
+        from cns_drake.studies.map_pairs import score_pairs
 
     chosen = baseline or (BaselineName.FREE_SPACE, BaselineName.DISTANCE)
     print(
-        measure_pairs(
+        score_pairs(
             pairs or (),
             [one.value for one in chosen],
             output,
@@ -88,3 +97,40 @@ def map_pairs(
             terminal.track,
         )
     )
+
+
+def run_task(
+    task: Task,
+    pairs: Sequence[ComparedPair],
+    output: Path,
+    cluster: Cluster,
+    spacing: float,
+    own_methods: Sequence[Path] | None,
+) -> Path:
+    """Runs a task other than `PLACE` on pairs of drives; returns its table.
+
+    Args:
+        task: which one.
+        pairs: the pairs.
+        output: the folder for everything.
+        cluster: where the work is done.
+        spacing: between two queries that are localised [m].
+        own_methods: Python files with estimators.
+
+    Raises:
+        InputError: the task takes no such methods, the folder cannot be made,
+            or a step failed.
+    """
+    if task is Task.LOCALISE:
+        from evaluation.study.localisation import SHIPPED, localise_pairs
+
+        methods = (*SHIPPED, *map(str, own_methods or ()))
+        return localise_pairs(pairs, output, cluster, methods, spacing)
+    if own_methods:
+        raise InputError(
+            "--task map: leave out --method (docs/map_update.md says how to "
+            "score labels of one's own)"
+        )
+    from cns_drake.studies.map_pairs import update_pairs
+
+    return update_pairs(pairs, output, cluster, terminal.note)

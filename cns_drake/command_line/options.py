@@ -68,14 +68,15 @@ class Task(str, Enum):
 
     PLACE = "place"
     LOCALISE = "localise"
+    MAP = "map"
 
 
 TaskName = Annotated[
     Task,
     typer.Option(
         "--task",
-        help="Recognise places, or localise scans in the map of the older "
-        "drive.",
+        help="Recognise places, localise scans in the map of the older "
+        "drive, or find what of that map must be updated.",
     ),
 ]
 MethodFiles = Annotated[

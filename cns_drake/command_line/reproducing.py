@@ -7,6 +7,7 @@ import typer
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
+from cns_drake.command_line.map_truthing import run_task
 from cns_drake.command_line.options import (
     Jobs,
     Maps,
@@ -53,8 +54,8 @@ def reproduce(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.reproduction import (
-            localise_maps,
             reproduce_maps,
+            stage_pairs,
         )
 
     cluster = choose_cluster(jobs, scheduler)
@@ -62,11 +63,14 @@ def reproduce(
         raise InputError(
             "--quick and --pages exclude each other; give one of them"
         )
-    if task is Task.LOCALISE:
+    if task is not Task.PLACE:
         if parameter or pages:
-            raise InputError("--task localise: leave out --set and --pages")
+            raise InputError(
+                f"--task {task.value}: leave out --set and --pages"
+            )
+        drives = stage_pairs(maps, output)
         spacing = protocol.query_spacing
-        typer.echo(localise_maps(maps, output, cluster, spacing, method or ()))
+        typer.echo(run_task(task, drives, output, cluster, spacing, method))
         return
     report = reproduce_maps(
         maps,

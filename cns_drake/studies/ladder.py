@@ -42,6 +42,7 @@ from evaluation.recognition.protocol import (
     DEFAULT_PROTOCOL,
     RetrievalProtocol,
 )
+from evaluation.report.compared import ComparedPair
 from evaluation.report.ladder import (
     LadderRow,
     LadderRung,
@@ -56,11 +57,6 @@ from evaluation.report.ladder import (
     strongest_causes,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.localisation import (
-    SHIPPED,
-    LocalisedPair,
-    localise_pairs,
-)
 from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
 from evaluation.study.rungs import DescribedSource, measure_rung
 from evaluation.study.surveys import DescribeDrive
@@ -158,35 +154,23 @@ def climb_ladder(
     return _write(measured, rows, pairs, output, protocol, extent)
 
 
-def localise_rungs(
+def rung_pairs(
     maps: Sequence[str] | None,
-    output: Path,
-    cluster: Cluster,
     extent: Extent,
-    spacing: float,
-    own_methods: Sequence[Path] = (),
     on_note: Callable[[str], None] = lambda text: None,
-) -> Path:
-    """Localises the queries of all rungs of maps in the maps of the databases.
+) -> list[ComparedPair]:
+    """Returns the drives of all rungs of maps, for tasks with a map.
 
     A rung that changes only how a query is described, or adds places, is left
     out.
 
     Args:
         maps: by name or folder; all shipped ones if empty.
-        output: see `localise_pairs`.
-        cluster: where the work is done.
         extent: the part of the ladder.
-        spacing: between two queries [m].
-        own_methods: Python files with estimators, run besides the shipped.
         on_note: receives notes on things that a map lacks.
 
-    Returns:
-        The path of the table.
-
     Raises:
-        InputError: a map is unknown, the folder cannot be made, or a step
-            failed.
+        InputError: a map is unknown.
     """
     pairs = []
     for drive in query_drives(maps or shipped_maps()):
@@ -194,7 +178,7 @@ def localise_rungs(
         for text in notes:
             on_note(f"{drive.source}: {text}")
         pairs += [
-            LocalisedPair(
+            ComparedPair(
                 map_folder(drive).name,
                 str(drive.stage),
                 str(drive.stage),
@@ -210,8 +194,7 @@ def localise_rungs(
             for rung in rungs
             if not (rung.drives.query_changes or rung.drives.num_distractors)
         ]
-    methods = (*SHIPPED, *map(str, own_methods))
-    return localise_pairs(pairs, output, cluster, methods, spacing)
+    return pairs
 
 
 def _measure(

@@ -6,26 +6,45 @@ were drawn at random. A is a drive through the first stage, B another one
 through the last. The file of an imported city is given by its digest.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import hashlib
+from importlib.util import find_spec
 from pathlib import Path
+import tempfile
 
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.rates import read_rates
 from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, read_bytes
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.progress import Track, silent
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
-from cns_drake.studies.map_truth import simulate_survey, write_truth
-from evaluation.map_update.baselines import run_baseline
+from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.map_truth import (
+    open_survey,
+    simulate_survey,
+    write_truth,
+)
+from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import Label, read_labels, read_pair
+from evaluation.report.compared import (
+    ComparedPair,
+    MapRow,
+    draw_maps,
+    write_compared,
+)
+from evaluation.report.tables import Columns, keyed
+from evaluation.study.localisation import measure_pairs
+from evaluation.study.parts import StudyFiles
+from evaluation.study.surveys import RecordedDrive
 
 # Share of an imported city's buildings that its first stage lacks.
 _GROW = 0.3
@@ -38,7 +57,16 @@ _SCORES = (
         for kind in ("precision", "recall")
     ),
 )
-_COLUMNS = ("pair", "method", *_SCORES, "gone", "new")
+# Column -> what labels call gone or new, without vehicles and people.
+_CALLED = {
+    "called_points": "points",
+    "called_structures": "structures",
+    "right_structures": "right_structures",
+}
+# The true labels, as those of a method.
+TRUTH = "truth"
+# Way between two scans of a pair that is one of many [m].
+STUDY_SPACING = 5.0
 
 
 @dataclass(frozen=True)
@@ -124,7 +152,7 @@ def make_pair(
     return maps
 
 
-def measure_pairs(
+def score_pairs(
     names: Sequence[str],
     methods: Sequence[str],
     output: Path,
@@ -148,7 +176,7 @@ def measure_pairs(
         InputError: a name is unknown, or a pair cannot be made.
     """
     pairs = frozen_pairs()
-    rows = []
+    rows: list[dict[str, object]] = []
     for name in names or pairs:
         if name not in pairs:
             raise InputError(
@@ -157,36 +185,137 @@ def measure_pairs(
         maps = make_pair(
             pairs[name], output / name, files, spacing, on_note, track
         )
-        pair = read_pair(maps)
-        truth = Labels(
-            *(
-                read_labels(one.folder / "truth.npy", one, truth=True)
-                for one in pair
-            )
-        )
-        for method in methods:
-            found = score(pair, truth, run_baseline(method, pair, track), {})
-            rows.append(_row(name, method, found, truth))
+        rows += [
+            {"pair": name, "method": method, **scores}
+            for method, scores in score_methods(maps, methods, track).items()
+        ]
     path = output / "map_pairs.csv"
-    cells = ([row[name] for name in _COLUMNS] for row in rows)
-    write_csv(path, _COLUMNS, cells)
+    write_csv(path, list(rows[0]), (row.values() for row in rows))
     return path
 
 
-def _row(
-    name: str, method: str, scores: Mapping, truth: Labels
-) -> dict[str, object]:
-    values = {
-        key: "" if scores[key] is None else f"{scores[key]:.4f}"
-        for key in _SCORES
-    }
-    return {
-        "pair": name,
-        "method": method,
-        **values,
-        "gone": int((truth.A == Label.GONE).sum()),
-        "new": int((truth.B == Label.NEW).sum()),
-    }
+def score_methods(
+    maps: Path, methods: Sequence[str], track: Track = silent
+) -> dict[str, dict[str, float | None]]:
+    """Returns method -> name -> value of the scores of baselines.
+
+    Args:
+        maps: a folder with two labelled maps.
+        methods: baselines, or `TRUTH`.
+        track: reports progress.
+
+    Raises:
+        InputError: the folder cannot be read, or a baseline cannot run.
+    """
+    pair = read_pair(maps)
+    truth = Labels(
+        *(
+            read_labels(one.folder / "truth.npy", one, truth=True)
+            for one in pair
+        )
+    )
+    found = {}
+    for method in methods:
+        labels = truth if method == TRUTH else run_baseline(method, pair, track)
+        scores = score(pair, truth, labels, {})
+        found[method] = {
+            **{name: scores[name] for name in _SCORES},
+            **{key: scores["called"][name] for key, name in _CALLED.items()},
+            "gone": int((truth.A == Label.GONE).sum()),
+            "new": int((truth.B == Label.NEW).sum()),
+        }
+    return found
+
+
+def study_methods(on_note: Callable[[str], None]) -> tuple[str, ...]:
+    """Returns the truth and all baselines that can run.
+
+    Args:
+        on_note: is told of one that cannot.
+    """
+    names = [TRUTH, *BASELINES]
+    if find_spec("py4dgeo") is None:
+        on_note("m3c2 is left out: it needs the extra map-update")
+        names.remove("m3c2")
+    return tuple(names)
+
+
+def measure_maps(
+    reporter: Reporter,
+    database: DriveSimulation | RecordedDrive,
+    query: DriveSimulation | RecordedDrive,
+    methods: tuple[str, ...],
+    spacing: float,
+) -> dict[str, dict[str, float | None]]:
+    """Maps two drives, and scores methods by exact labels.
+
+    Args:
+        reporter: takes the progress.
+        database: the older drive, simulated or recorded.
+        query: the newer one.
+        methods: see `score_methods`.
+        spacing: way between two scans [m].
+
+    Returns:
+        Method -> name -> value.
+    """
+    a, b = (
+        simulate_survey(source.scenario)
+        if isinstance(source, DriveSimulation)
+        else open_survey(source.path)
+        for source in (database, query)
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        maps = Path(folder) / "maps"
+        write_truth(a, b, maps, spacing, reporter.track)
+        return score_methods(maps, methods, reporter.track)
+
+
+def update_pairs(
+    pairs: Sequence[ComparedPair],
+    output: Path,
+    cluster: Cluster,
+    on_note: Callable[[str], None],
+) -> Path:
+    """Scores all baselines on the maps of pairs of drives.
+
+    Writes `map_update.csv`, a row for each pair and method, and a figure.
+    Finished pairs are not repeated.
+
+    Args:
+        pairs: the pairs.
+        output: the folder for everything.
+        cluster: where the work is done.
+        on_note: is told of a baseline that cannot run.
+
+    Returns:
+        The path of the table.
+
+    Raises:
+        InputError: the folder cannot be made, or a step failed.
+    """
+    found = measure_pairs(
+        pairs,
+        output,
+        cluster,
+        measure_maps,
+        (study_methods(on_note), STUDY_SPACING),
+        StudyFiles.map_scores,
+    )
+    rows = [
+        MapRow(pair, method, scores)
+        for pair, of_pair in zip(pairs, found, strict=True)
+        for method, scores in of_pair.items()
+    ]
+    scores: Columns[MapRow] = keyed(
+        {name: name for name in rows[0].scores},
+        lambda row, name: row.scores[name],
+    )
+    table = output / "map_update.csv"
+    strength: Columns[MapRow] = {"strength": lambda row: row.pair.strength}
+    write_compared(table, rows, {**scores, **strength})
+    draw_maps(rows, output / "map_update")
+    return table
 
 
 def _import(

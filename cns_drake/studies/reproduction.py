@@ -22,14 +22,10 @@ from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.report.compared import ComparedPair
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
-from evaluation.study.localisation import (
-    SHIPPED,
-    LocalisedPair,
-    localise_pairs,
-)
 from evaluation.study.plan import plan_study
 from evaluation.study.surveys import DriveSource, RecordedDrive, Survey
 
@@ -135,14 +131,8 @@ def reproduce_maps(
     )
 
 
-def localise_maps(
-    maps: Sequence[str] | None,
-    output: Path,
-    cluster: Cluster,
-    spacing: float,
-    own_methods: Sequence[Path] = (),
-) -> Path:
-    """Localises the last drive of maps in the maps of the earlier drives.
+def stage_pairs(maps: Sequence[str] | None, output: Path) -> list[ComparedPair]:
+    """Returns the last drive of maps with each of the earlier ones.
 
     Drives that are recorded in the folder are read, others are simulated and
     not recorded. Levels count back from the last stage; at the cause `routes`,
@@ -150,17 +140,10 @@ def localise_maps(
 
     Args:
         maps: by name or folder; all shipped ones if empty.
-        output: see `localise_pairs`.
-        cluster: where the work is done.
-        spacing: between two queries [m].
-        own_methods: Python files with estimators, run besides the shipped.
-
-    Returns:
-        The path of the table.
+        output: the folder of recordings.
 
     Raises:
-        InputError: a map is unknown, the folder cannot be made, or a step
-            failed.
+        InputError: a map is unknown.
     """
 
     def source(drive: Scenario) -> DriveSource:
@@ -178,7 +161,7 @@ def localise_maps(
             ("stages", older),
         ):
             pairs += [
-                LocalisedPair(
+                ComparedPair(
                     folder.name,
                     drive.name,
                     query.name,
@@ -189,8 +172,7 @@ def localise_maps(
                 )
                 for level, drive in enumerate(reversed(known), start=1)
             ]
-    methods = (*SHIPPED, *map(str, own_methods))
-    return localise_pairs(pairs, output, cluster, methods, spacing)
+    return pairs
 
 
 def _surveyed(recording: Job, study: Sequence[Job]) -> Job:

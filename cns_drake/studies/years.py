@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 import shutil
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,12 @@ from cns_drake.studies.ladder_rungs import (
     RungDrives,
     plain_drives,
 )
+from cns_drake.studies.map_pairs import (
+    STUDY_SPACING,
+    TRUTH,
+    measure_maps,
+    study_methods,
+)
 from evaluation.change.tcr import temporal_change
 from evaluation.drives.sampling import sample_frames
 from evaluation.localisation.localise import is_right
@@ -42,6 +49,8 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report.years import (
     BACKWARD,
     FORWARD,
+    MAP_TASK,
+    UNCHANGED_TASK,
     AgedPair,
     draw_years,
     lifetime_table,
@@ -133,6 +142,7 @@ def measure_years(
     directions: Sequence[str] = (FORWARD, BACKWARD),
     *,
     localises: bool = False,
+    updates: bool = False,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> tuple[Path, str]:
     """Measures what years cost; writes tables, chart and findings.
@@ -153,6 +163,7 @@ def measure_years(
         directions: whether the database is of today, the query, or both in
             turn.
         localises: also localise the queries in the maps of the databases.
+        updates: also score baselines that find the changes of the maps.
         on_note: receives the progress.
 
     Returns:
@@ -190,27 +201,29 @@ def measure_years(
     files = StudyFiles(output)
     jobs: dict[str, Job] = {}
     found: list[tuple[Scenario, int, int, str, Part, Part, Part]] = []
-    ends: list[Part | None] = []
-
-    def localise(name: str, drives: RungDrives) -> None:
-        if not localises:
-            ends.append(None)
-            return
-        part = files.localised(name)
-        step = MakePart(
-            part,
+    # One of each task, in the order of `found`.
+    further: dict[str, list[Part]] = {}
+    tasks: dict[str, tuple] = {}
+    if localises:
+        tasks["localise"] = (
+            files.localised,
             measure_localisation,
-            (
-                DriveSimulation(drives.database),
-                DriveSimulation(drives.query),
-                SHIPPED,
-                ("",) * len(SHIPPED),
-                FAR_STARTS,
-                protocol.query_spacing,
-            ),
+            (SHIPPED, ("",) * len(SHIPPED), FAR_STARTS, protocol.query_spacing),
         )
-        jobs[f"localise {name}"] = Job(f"localise {name}", step, cost=_MAP_COST)
-        ends.append(part)
+    if updates:
+        tasks[MAP_TASK] = (
+            files.map_scores,
+            measure_maps,
+            (study_methods(on_note), STUDY_SPACING),
+        )
+
+    def add_tasks(name: str, drives: RungDrives) -> None:
+        both = DriveSimulation(drives.database), DriveSimulation(drives.query)
+        for task, (file, function, arguments) in tasks.items():
+            step = MakePart(file(name), function, (*both, *arguments))
+            job = f"{task} {name}"
+            jobs[job] = Job(job, step, cost=_MAP_COST)
+            further.setdefault(task, []).append(step.part)
 
     for drive in drives:
         plan = RungPlan(drive, NEAR, methods, protocol, files)
@@ -218,7 +231,7 @@ def measure_years(
         today = _map_job(drive, files, jobs)
         part = plan.add_rung(Rung(NONE, 0, 0, "", plain))
         found.append((drive, 0, 0, FORWARD, part, today, today))
-        localise(drive.name, plain)
+        add_tasks(drive.name, plain)
         for seed in seeds:
             folder = cities[drive.name, seed].folder
             for k, year in enumerate(wanted):
@@ -246,7 +259,7 @@ def measure_years(
                     found.append(
                         (drive, year, seed, direction, part, today, mapped)
                     )
-                    localise(
+                    add_tasks(
                         f"{drive.name}_{ending} {direction}", pairs[direction]
                     )
         jobs |= plan.jobs
@@ -261,15 +274,36 @@ def measure_years(
             if year
             else 0.0,
             part.read(),
-            dict(zip(SHIPPED, map(is_right, of_pair.read()), strict=True))
-            if of_pair is not None
-            else {},
+            {
+                key: value
+                for task, parts in further.items()
+                for key, value in _values(task, parts[k].read()).items()
+            },
         )
-        for (drive, year, seed, direction, part, before, after), of_pair in zip(
-            found, ends, strict=True
+        for k, (drive, year, seed, direction, part, before, after) in enumerate(
+            found
         )
     ]
     return _write(pairs_found, output)
+
+
+def _values(task: str, found: Any) -> dict[tuple[str, str], tuple[float, int]]:
+    """Returns `AgedPair.further` of what a part of a task holds."""
+    if task != MAP_TASK:
+        return {
+            (task, method): (float(is_right(rows).mean()), len(rows))
+            for method, rows in zip(SHIPPED, found, strict=True)
+        }
+    truth = found.pop(TRUTH)
+    number = truth["gone"] + truth["new"]
+    unchanged = 1.0 - truth["called_points"]
+    return {
+        (UNCHANGED_TASK, TRUTH): (unchanged, number),
+        **{
+            (task, method): (scores["miou"], number)
+            for method, scores in found.items()
+        },
+    }
 
 
 def _map_job(drive: Scenario, files: StudyFiles, jobs: dict[str, Job]) -> Part:

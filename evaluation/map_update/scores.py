@@ -108,6 +108,7 @@ def score(
     for name, distance in _TOLERANCES.items():
         result[name] = _within(pair, truth, predicted, counted, distance)
     result["by_structure"] = _by_structure(pair, truth, predicted, counted)
+    result["called"] = _called(pair, truth, predicted, still)
     result["updated_map"] = _updated_map(pair, truth, predicted, counted)
     result["by_class"] = {
         name: _of_points(
@@ -210,6 +211,35 @@ def _by_structure(
         found[f"recall_{name}"] = _ratio(right, true.sum())
         found[name] = int(true.sum())
     return found
+
+
+def _called(
+    pair: Pair, truth: Labels, predicted: Labels, counted: list[np.ndarray]
+) -> dict[str, float]:
+    """Returns what is called gone or new: shares of points and structures.
+
+    And how many structures have the true verdict, of the observed ones.
+    """
+    points, structures, right = [], [], []
+    for session, true, found, rows in zip(
+        pair, truth, predicted, counted, strict=True
+    ):
+        unobserved, _, changed = SIDES[session.side]
+        points.append(found[rows] == changed)
+        is_true, is_found = (
+            verdicts(session.instances[rows], labels[rows], session.side)[2]
+            for labels in (true, found)
+        )
+        structures.append(is_found == changed)
+        right.append((is_true == is_found)[is_true != unobserved])
+    return {
+        name: _ratio(sum(int(one.sum()) for one in parts), sum(map(len, parts)))
+        for name, parts in (
+            ("points", points),
+            ("structures", structures),
+            ("right_structures", right),
+        )
+    }
 
 
 def _updated_map(

@@ -14,8 +14,8 @@ from evaluation.localisation.localise import (
     Starts,
 )
 from evaluation.localisation.tracking import LOST
+from evaluation.report.compared import ComparedPair, draw_compared
 from evaluation.report.drawing import save
-from evaluation.report.ladder import CauseCell, draw_cells
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:
@@ -53,22 +53,13 @@ class LocalisedRow:
     """A method on a pair of drives, from starts of one kind.
 
     Attributes:
-        map_name: name of the city.
-        database, query: names of the drives.
-        cause: of the change between them.
-        level: its strength, from 1 to 4; 0 without a change.
-        strength: in words.
+        pair: the drives.
         method: name of the estimator.
         starts: the draw of starts.
         rows: (K,) of `QUERY`.
     """
 
-    map_name: str
-    database: str
-    query: str
-    cause: str
-    level: int
-    strength: str
+    pair: ComparedPair
     method: str
     starts: Starts
     rows: np.ndarray
@@ -102,18 +93,14 @@ def draw_localised(rows: Sequence[LocalisedRow], stem: Path) -> None:
         rows: rows for all maps, causes, methods and starts.
         stem: path to write, without ending.
     """
-    maps = list(dict.fromkeys(row.map_name for row in rows))
-    starts = list(dict.fromkeys(row.starts for row in rows))
-    panels = {
-        (
-            name,
-            f"{name}, start {draw.radius:g} m, {draw.turn_deg:g} deg",
-        ): [
-            CauseCell(row.method, row.cause, row.level, row.share, row.label)
-            for row in rows
-            if row.map_name == name and row.starts == draw
-        ]
-        for name in maps
-        for draw in starts
-    }
-    draw_cells(panels, "part within 0.3 m and 1 deg; numbers: cm", stem)
+    panels: dict[str, list[LocalisedRow]] = {}
+    for row in rows:
+        draw = row.starts
+        title = f"start {draw.radius:g} m, {draw.turn_deg:g} deg"
+        panels.setdefault(title, []).append(row)
+    draw_compared(
+        panels,
+        lambda _, row: (row.share, row.label),
+        "part within 0.3 m and 1 deg; numbers: cm",
+        stem,
+    )

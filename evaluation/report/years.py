@@ -23,6 +23,10 @@ from evaluation.report.tables import Columns, Table, in_table_order, title
 _TENTH, _HALF = 0.9, 0.5
 # The database is of today, or the query.
 FORWARD, BACKWARD = "old_map", "old_query"
+# Its values are no share of today's, when nothing is to be found.
+MAP_TASK = "map"
+# How much of the maps is neither gone nor new.
+UNCHANGED_TASK = "unchanged"
 
 
 @dataclass(frozen=True)
@@ -36,8 +40,9 @@ class AgedPair:
         direction: `FORWARD` or `BACKWARD`.
         tcr_sym: change of the city along the query's way; NaN if unknown.
         outcomes: one for each method, without and with the gate.
-        localised: estimator -> whether each query ends right in the map of the
-            database, (Q,) bool.
+        further: (task, method) -> value, and how many count: the share of the
+            queries that end right in the map of the database; mean IoU; or the
+            share of the points of both maps that are neither gone nor new.
     """
 
     map_name: str
@@ -46,7 +51,9 @@ class AgedPair:
     direction: str
     tcr_sym: float
     outcomes: Sequence[RungOutcome]
-    localised: Mapping[str, np.ndarray] = field(default_factory=dict)
+    further: Mapping[tuple[str, str], tuple[float, int]] = field(
+        default_factory=dict
+    )
 
 
 @dataclass(frozen=True)
@@ -55,17 +62,18 @@ class YearRow:
 
     Attributes:
         pair: the drives.
-        task: `place`, `pose` or `localise`.
+        task: `place`, `pose`, `localise`, `map` or `unchanged`.
         method: its name.
         gate: whether the gate was used.
-        value: AUC, or the share of right poses or ends.
+        value: AUC, the share of right poses or ends, mean IoU, or the share of
+            points.
         today: the value without years between.
         interval: 95 % interval of `kept` by bootstrap over blocks of
             the route.
         r1: R@1.
         visible_change: part of the queries' scans that the best place does not
             show, today's taken off.
-        queries: number of queries.
+        queries: number of queries, or of points that are gone or new.
     """
 
     pair: AgedPair
@@ -107,22 +115,24 @@ def year_rows(pairs: Sequence[AgedPair]) -> list[YearRow]:
             pair, one, none[pair.map_name, one.method, one.is_gated]
         )
     ]
-    today = {pair.map_name: pair.localised for pair in pairs if pair.year == 0}
+    today = {pair.map_name: pair.further for pair in pairs if pair.year == 0}
     return found + [
         YearRow(
             pair,
-            "localise",
+            task,
             method,
             False,
-            float(is_right.mean()),
-            float(today[pair.map_name][method].mean()),
+            value,
+            math.nan
+            if task == MAP_TASK
+            else today[pair.map_name][task, method][0],
             Interval(math.nan, math.nan),
             math.nan,
             math.nan,
-            len(is_right),
+            number,
         )
         for pair in pairs
-        for method, is_right in pair.localised.items()
+        for (task, method), (value, number) in pair.further.items()
     ]
 
 
@@ -235,7 +245,7 @@ def _grouped(rows: Sequence[YearRow]) -> dict[tuple, list[YearRow]]:
     """Returns the rows of each lifetime; those of today belong to all."""
     groups: dict[tuple, list[YearRow]] = {}
     for row in rows:
-        if row.pair.year > 0:
+        if row.pair.year > 0 and row.task != MAP_TASK:
             groups.setdefault(row.key, []).append(row)
     for key, some in groups.items():
         some += [

@@ -1,13 +1,13 @@
 """Localisation of many pairs of drives, such as the rungs of a ladder."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cns_drake.base import points as clouds
-from cns_drake.base.files import completing, make_folder
+from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
@@ -27,9 +27,10 @@ from evaluation.localisation.localise import (
     query_frames,
     way_axes,
 )
+from evaluation.report.compared import ComparedPair, write_compared
 from evaluation.report.localisation import LocalisedRow, draw_localised
-from evaluation.report.tables import Columns, Table, keyed
-from evaluation.study.parts import MakePart, StudyFiles
+from evaluation.report.tables import Columns, keyed
+from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import DriveSource
 
 # Near starts measure accuracy, far ones the basin [m, deg].
@@ -40,33 +41,8 @@ SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
 _COST = 60.0
 
 
-@dataclass(frozen=True)
-class LocalisedPair:
-    """Two drives, of which one is localised in the map of the other.
-
-    Attributes:
-        map_name: name of the city.
-        database: name of the drive of the map.
-        query: name of the other drive.
-        cause: of the change between them.
-        level: its strength.
-        strength: in words.
-        sources: of both drives.
-        seed: number of the random draw.
-    """
-
-    map_name: str
-    database: str
-    query: str
-    cause: str
-    level: int
-    strength: str
-    sources: tuple[DriveSource, DriveSource]
-    seed: int = 1
-
-
 def localise_pairs(
-    pairs: Sequence[LocalisedPair],
+    pairs: Sequence[ComparedPair],
     output: Path,
     cluster: Cluster,
     methods: Sequence[str] = SHIPPED,
@@ -91,9 +67,6 @@ def localise_pairs(
     Raises:
         InputError: the folder cannot be made, or a step failed.
     """
-    make_folder(output)
-    files = StudyFiles(output.absolute())
-    parts, jobs = [], []
     # Own methods are known by their place and their content.
     named = tuple(
         Path(name).absolute() if name.endswith(".py") else name
@@ -102,37 +75,20 @@ def localise_pairs(
     texts = tuple(
         one.read_bytes().hex() if isinstance(one, Path) else "" for one in named
     )
-    for pair in pairs:
-        name = f"{pair.database} {pair.query} {pair.cause} {pair.level}"
-        name = f"{pair.map_name} {name} {pair.seed}"
-        part = files.localised(name)
-        arguments = (*pair.sources, named, texts, STARTS, spacing)
-        step = MakePart(part, measure_localisation, arguments)
-        jobs.append(Job(f"localise {name}", step, cost=_COST))
-        parts.append(part)
-    run_jobs(jobs, cluster)
+    found = measure_pairs(
+        pairs,
+        output,
+        cluster,
+        measure_localisation,
+        (named, texts, STARTS, spacing),
+        StudyFiles.localised,
+    )
     rows = [
-        LocalisedRow(
-            pair.map_name,
-            pair.database,
-            pair.query,
-            pair.cause,
-            pair.level,
-            pair.strength,
-            Path(str(method)).stem,
-            starts,
-            found,
-        )
-        for pair, part in zip(pairs, parts, strict=True)
-        for method, starts, found in _by_method(part.read(), named)
+        LocalisedRow(pair, Path(str(method)).stem, starts, queries)
+        for pair, of_pair in zip(pairs, found, strict=True)
+        for method, starts, queries in _by_method(of_pair, named)
     ]
-    keys: Columns[LocalisedRow] = {
-        "map": lambda row: row.map_name,
-        "db": lambda row: row.database,
-        "query": lambda row: row.query,
-        "cause": lambda row: row.cause,
-        "level": lambda row: row.level,
-        "method": lambda row: row.method,
+    start: Columns[LocalisedRow] = {
         "start": lambda row: row.starts.radius,
         "start_turn_deg": lambda row: row.starts.turn_deg,
     }
@@ -145,19 +101,52 @@ def localise_pairs(
         {name: name for name in COLUMNS if name != "seconds"},
         lambda row, name: row.rows[name].tolist(),
     )
-    strength: Columns[LocalisedRow] = {"strength": lambda row: row.strength}
+    strength: Columns[LocalisedRow] = {
+        "strength": lambda row: row.pair.strength
+    }
     table = output / "localisation.csv"
-    named_columns: tuple[tuple[Path, Columns[LocalisedRow]], ...] = (
-        (table, {**keys, **summary, **strength}),
-        (output / "localisation_queries.csv", {**keys, **queries}),
+    write_compared(table, rows, {**start, **summary, **strength})
+    write_compared(
+        output / "localisation_queries.csv", rows, {**start, **queries}
     )
-    for path, columns in named_columns:
-        with completing(path) as unfinished:
-            unfinished.write_text(
-                Table.of(rows, columns).to_csv(), encoding="utf-8"
-            )
     draw_localised(rows, output / "localisation")
     return table
+
+
+def measure_pairs(
+    pairs: Sequence[ComparedPair],
+    output: Path,
+    cluster: Cluster,
+    function: Callable[..., Any],
+    arguments: tuple[object, ...],
+    file: Callable[[StudyFiles, str], Part],
+) -> list[Any]:
+    """Returns what a function finds for each pair, once it is measured.
+
+    Args:
+        pairs: the pairs.
+        output: the folder for everything; it is made.
+        cluster: where the work is done.
+        function: takes a `Reporter`, the sources of a pair, and the arguments.
+        arguments: further ones, see `MakePart`.
+        file: gives the file of the pair of a name.
+
+    Raises:
+        InputError: the folder cannot be made, or a step failed.
+    """
+    make_folder(output)
+    files = StudyFiles(output.absolute())
+    parts = [file(files, pair.name) for pair in pairs]
+    jobs = [
+        Job(
+            f"compare {pair.name}",
+            MakePart(part, function, (*pair.sources, *arguments)),
+            cost=_COST,
+        )
+        for pair, part in zip(pairs, parts, strict=True)
+    ]
+    run_jobs(jobs, cluster)
+    return [part.read() for part in parts]
 
 
 def _by_method(

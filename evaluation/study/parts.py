@@ -292,6 +292,10 @@ class StudyFiles:
         """Returns the part with the localised queries of a pair of drives."""
         return self._part("localised", name)
 
+    def map_scores(self, name: str) -> Part:
+        """Returns the part with the scores of labels of a pair's maps."""
+        return self._part("maps", name)
+
     def drawn(self, stem: str) -> Part:
         """Returns the part that names the inputs of a figure."""
         return self._part("figures", stem)

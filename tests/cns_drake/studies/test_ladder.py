@@ -21,11 +21,11 @@ from cns_drake.simulation.loaded_drive import (
     plan_scenario_traffic,
 )
 from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies import ladder
+from cns_drake.studies import ladder, map_pairs
 from cns_drake.studies.ladder import (
     climb_ladder,
     distracting_drives,
-    localise_rungs,
+    rung_pairs,
 )
 from cns_drake.studies.ladder_rungs import (
     CAUSES,
@@ -34,11 +34,13 @@ from cns_drake.studies.ladder_rungs import (
     plan_pairs,
     plan_rungs,
 )
+from cns_drake.studies.map_pairs import update_pairs
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.overlaps import find_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.study import localisation
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.localisation import SHIPPED
+from evaluation.study.localisation import SHIPPED, localise_pairs
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
 # Fields that a cause may change, apart from the drive's name.
@@ -417,14 +419,12 @@ def test_the_page_has_every_cause():
     assert [row[0].strip("`") for row in table] == list(CAUSES[1:])
 
 
+EXTENT = Extent(causes=("construction", "hidden", "size"), levels=(4,))
+
+
 def test_rungs_are_localised(town, tmp_path):
-    path = localise_rungs(
-        [str(town)],
-        tmp_path,
-        Cluster(1),
-        Extent(causes=("construction", "hidden", "size"), levels=(4,)),
-        20.0,
-    )
+    pairs = rung_pairs([str(town)], EXTENT)
+    path = localise_pairs(pairs, tmp_path, Cluster(1), spacing=20.0)
     with open(path, newline="") as stream:
         rows = list(csv.DictReader(stream))
     # Hidden sectors and more places change no map.
@@ -433,3 +433,41 @@ def test_rungs_are_localised(town, tmp_path):
     assert [row["start"] for row in rows] == ["0.5", "2.0"] * 8
     assert {row["queries"] for row in rows} == {rows[0]["queries"]}
     assert {row["strength"] for row in rows[8:]} == {"mapped in stage 01"}
+
+
+def test_maps_of_rungs_are_scored(town, tmp_path, monkeypatch):
+    pairs = rung_pairs([str(town)], EXTENT)
+    notes = []
+    monkeypatch.setattr(map_pairs, "STUDY_SPACING", 20.0)
+    monkeypatch.setattr(map_pairs, "find_spec", lambda name: None)
+    path = update_pairs(pairs, tmp_path, Cluster(1), notes.append)
+    assert notes == ["m3c2 is left out: it needs the extra map-update"]
+    with open(path, newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    found = {(row["cause"], row["method"]): row for row in rows}
+    assert list(found) == [
+        (cause, method)
+        for cause in ("none", "construction")
+        for method in ("truth", "free-space", "distance")
+    ]
+    for row in rows:
+        if row["method"] == "truth":
+            assert float(row["miou"]) == float(row["right_structures"]) == 1.0
+    before, after = (
+        found[cause, "truth"] for cause in ("none", "construction")
+    )
+    # Nothing changes between two drives through one city.
+    assert float(before["called_points"]) == 0.0 < float(after["called_points"])
+    assert before["gone"] == before["new"] == "0"
+    assert int(after["gone"]) + int(after["new"]) > 0
+    assert after["strength"] == "mapped in stage 01"
+    assert (tmp_path / "map_update.png").stat().st_size > 1000
+
+    # Finished pairs are read again.
+    def done(jobs, _):
+        assert all(job.step.is_done() for job in jobs)
+
+    monkeypatch.setattr(localisation, "run_jobs", done)
+    content = path.read_bytes()
+    update_pairs(pairs, tmp_path, Cluster(1), notes.append)
+    assert path.read_bytes() == content

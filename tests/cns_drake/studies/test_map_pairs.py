@@ -4,7 +4,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.studies.map_pairs import frozen_pairs, make_pair, measure_pairs
+from cns_drake.studies.map_pairs import frozen_pairs, make_pair, score_pairs
 
 
 def test_twelve_pairs_are_frozen():
@@ -27,4 +27,4 @@ def test_other_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="not the file of the test pair"):
         make_pair(pair, tmp_path / "a", tmp_path, 1.0, print)
     with pytest.raises(InputError, match="unknown pair 'paris'"):
-        measure_pairs(["paris"], [], tmp_path, None, 1.0, print)
+        score_pairs(["paris"], [], tmp_path, None, 1.0, print)

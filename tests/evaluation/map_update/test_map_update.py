@@ -1,5 +1,6 @@
 """Sessions, baselines and scores on small clouds with counted answers."""
 
+from dataclasses import replace
 import importlib.util
 import json
 
@@ -84,6 +85,34 @@ def test_scores_are_those_of_sets(tmp_path):
     near = found["within_05m"]
     assert near["recall_gone"] == np.mean(apart.min(axis=1) <= 0.5)
     assert near["precision_gone"] == np.mean(apart.min(axis=0) <= 0.5)
+
+
+def test_what_is_called_changed_is_counted(tmp_path):
+    pair, truth = clouds(tmp_path)
+    _, guess = clouds(tmp_path / "other", seed=8)
+    changed = (Label.GONE, Label.NEW)
+    pair = pair._replace(
+        A=replace(pair.A, instances=np.arange(400, dtype=np.uint16) // 200)
+    )
+    found = score(pair, truth, guess, {})["called"]
+    number = sum(
+        (labels == k).sum() for labels, k in zip(guess, changed, strict=True)
+    )
+    assert found["points"] == number / 800
+    # The only structure is the second half of A; more of it is kept.
+    true, called = (
+        (labels.A[200:] == Label.GONE).sum()
+        > (labels.A[200:] == Label.KEPT).sum()
+        for labels in (truth, guess)
+    )
+    assert found["structures"] == float(called)
+    assert found["right_structures"] == float(true == called)
+    # Parked cars count neither as points nor as structures.
+    cars = np.full(400, 10, np.uint16)
+    pair = pair._replace(A=replace(pair.A, classes=cars))
+    found = score(pair, truth, guess, {})["called"]
+    assert found["points"] == (guess.B == Label.NEW).mean()
+    assert found["structures"] is None
 
 
 def test_points_are_left_out(tmp_path):

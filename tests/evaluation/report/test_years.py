@@ -105,10 +105,7 @@ def test_words_and_chart(rows, tmp_path):
     assert (tmp_path / "years.png").stat().st_size > 1000
 
 
-def test_localised_queries_are_a_task_of_their_own():
-    def ends(right):
-        return {"gicp": np.arange(10) < right}
-
+def test_other_tasks_have_rows_of_their_own():
     pairs = [
         AgedPair(
             "town",
@@ -117,15 +114,18 @@ def test_localised_queries_are_a_task_of_their_own():
             FORWARD,
             0.0,
             [],
-            {"gicp": np.arange(10) < right},
+            {("localise", "gicp"): (value, 10), ("map", "distance"): (0.5, 7)},
         )
-        for year, seed, right in ((0, 0, 8), (5, 1, 6), (5, 2, 2))
+        for year, seed, value in ((0, 0, 0.8), (5, 1, 0.6), (5, 2, 0.2))
     ]
     found = year_rows(pairs)
-    assert [row.task for row in found] == ["localise"] * 3
-    assert [row.value for row in found] == [0.8, 0.6, 0.2]
-    assert [row.kept for row in found] == pytest.approx([1.0, 0.75, 0.25])
-    # In the mean half is left after five years.
+    assert [row.task for row in found] == ["localise", "map"] * 3
+    assert [row.value for row in found] == [0.8, 0.5, 0.6, 0.5, 0.2, 0.5]
+    assert [row.queries for row in found] == [10, 7] * 3
+    kept = [row.kept for row in found if row.task == "localise"]
+    assert kept == pytest.approx([1.0, 0.75, 0.25])
+    # In the mean half is left after five years; labels have no lifetime.
     table = lifetime_table(found)
     (line,) = table.rows
     assert line[table.header.index("half")] == "5.0"
+    assert all(math.isnan(row.kept) for row in found if row.task == "map")

@@ -18,10 +18,10 @@ from evaluation.localisation.localise import (
     Localiser,
     localise,
 )
+from evaluation.report.compared import ComparedPair
 from evaluation.study import localisation
 from evaluation.study.localisation import (
     STARTS,
-    LocalisedPair,
     localise_pairs,
     measure_localisation,
 )
@@ -32,8 +32,8 @@ from evaluation.study.surveys import RecordedDrive
 def pairs(towns):
     one, other = (RecordedDrive(towns / f"town_0{i}") for i in (1, 2))
     return [
-        LocalisedPair("town", "01", "01", "none", 0, "nothing", (one, one)),
-        LocalisedPair("town", "02", "01", "stages", 1, "a lane", (other, one)),
+        ComparedPair("town", "01", "01", "none", 0, "nothing", (one, one)),
+        ComparedPair("town", "02", "01", "stages", 1, "a lane", (other, one)),
     ]
 
 
