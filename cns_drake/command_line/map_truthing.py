@@ -43,13 +43,24 @@ def map_truth(
         from evaluation.map_update.sessions import Label
 
     first, second = open_survey(a), open_survey(b)
-    counts = write_truth(first, second, output, spacing, terminal.track)
+    counts, table = write_truth(first, second, output, spacing, terminal.track)
     for side, found in counts.items():
         text = ", ".join(
             f"{count} {Label(label).name.lower().replace('_', ' ')}"
             for label, count in sorted(found.items())
         )
         terminal.note(f"{side}: {text}")
+        alone = [
+            row
+            for row in table
+            if row.side == side and row.alone and not row.moves
+        ]
+        mapped = sum(row.points > 0 for row in alone)
+        right = sum(row.verdict in ("gone", "new") for row in alone)
+        terminal.note(
+            f"{side}: {len(alone)} structures are in this drive's world alone;"
+            f" {mapped} are in its map, {right} of them gone or new"
+        )
     print(output)
 
 

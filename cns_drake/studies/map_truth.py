@@ -60,7 +60,7 @@ from evaluation.map_update.sessions import (
     write_labels,
     write_session,
 )
-from evaluation.map_update.structures import write_structures
+from evaluation.map_update.structures import StructureChange, write_structures
 
 # A surface this near to a point is its own [m].
 NEAR = 0.1
@@ -167,7 +167,7 @@ def write_truth(
     output: Path,
     spacing: float = SPACING,
     track: Track = silent,
-) -> Mapping[str, Counter[int]]:
+) -> tuple[Mapping[str, Counter[int]], list[StructureChange]]:
     """Writes the maps of two drives with their labels.
 
     See `evaluation.map_update.sessions` for the files; `structures.csv` and
@@ -181,7 +181,7 @@ def write_truth(
         track: reports progress.
 
     Returns:
-        Side -> label -> number of points.
+        Side -> label -> number of points; what became of the structures.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be
@@ -216,10 +216,11 @@ def write_truth(
             table,
             (a.drive.name, b.drive.name),
         )
-    return {
+    counts = {
         side: Counter(labels.tolist())
         for side, labels in zip(SIDES, truth, strict=True)
     }
+    return counts, table
 
 
 def label_points(

@@ -50,9 +50,8 @@ _PLY_TYPES = {"f8": "double", "u2": "ushort"}
 _MOST_PARTS = 8
 # Cells are numbered by 21 bits for each axis.
 _BITS = 21
-# Moving things, as SemanticKITTI numbers them, and what can drive away.
-_MOVING = range(252, 260)
-_PARKED = (10, 11, 13, 15, 18, 20)
+# Moving things, as SemanticKITTI numbers them, what can drive away, and people.
+MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 
 
 class Label(IntEnum):
@@ -101,7 +100,7 @@ class Session:
     @property
     def moves(self) -> np.ndarray:
         """(N,) bool, points of moving and of parked vehicles and people."""
-        return np.isin(self.classes, [*_MOVING, *_PARKED, 30, 31, 32])
+        return np.isin(self.classes, MOVES)
 
     def scan(self, index: int) -> np.ndarray:
         """Returns a scan (M, 3) in the frame of the LiDAR [m].

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.csv_files import read_records, write_csv
-from evaluation.map_update.sessions import SIDES, Pair
+from evaluation.map_update.sessions import MOVES, SIDES, Pair
 
 
 @dataclass(frozen=True)
 class StructureChange:
-    """A structure in one of both maps.
+    """A structure in one of both maps, or in one world alone.
 
     Attributes:
         side: A or B.
@@ -25,6 +25,7 @@ class StructureChange:
         changed: how many of these are gone, or new.
         verdict: gone (A) or new (B) if most of the observed points are, else
             kept; unobserved or newly_seen without an observed point.
+        alone: whether the other drive's world has no structure of this name.
     """
 
     side: str
@@ -36,6 +37,12 @@ class StructureChange:
     observed: int
     changed: int
     verdict: str
+    alone: bool
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a vehicle or a person."""
+        return self.label in MOVES
 
 
 def verdicts(
@@ -76,6 +83,8 @@ def write_structures(
 ) -> list[StructureChange]:
     """Writes the table of structures of both maps, and returns its rows.
 
+    A structure that only one world has is there without a point, too.
+
     Args:
         path: of the CSV file.
         pair: both sessions.
@@ -83,33 +92,52 @@ def write_structures(
         tables: instance -> name and class, of each.
     """
     rows = []
-    for session, labels, names in zip(pair, truth, tables, strict=True):
+    known = [{str(e.get("name", "")) for e in one.values()} for one in tables]
+    for session, labels, names, others in zip(
+        pair, truth, tables, known[::-1], strict=True
+    ):
         numbers, counts, found = verdicts(
             session.instances, labels, session.side
         )
         kinds = {label: label.name.lower() for label in SIDES[session.side]}
-        for number, (points, observed, changed), verdict in zip(
-            numbers.tolist(), counts.tolist(), found.tolist(), strict=True
-        ):
+        unobserved = SIDES[session.side][0]
+        seen = dict(
+            zip(
+                numbers.tolist(),
+                zip(counts.tolist(), found.tolist(), strict=True),
+                strict=True,
+            )
+        )
+        for number in sorted({*seen, *names}):
             entry = names.get(number, {})
+            name = str(entry.get("name", ""))
+            alone = bool(name) and name not in others
+            if number not in seen and not alone:
+                continue
+            (points, observed, changed), verdict = seen.get(
+                number, ((0, 0, 0), unobserved)
+            )
             rows.append(
                 StructureChange(
                     session.side,
                     number,
-                    str(entry.get("name", "")),
+                    name,
                     str(entry.get("class", "")),
                     int(entry.get("label", 0)),
                     points,
                     observed,
                     changed,
                     kinds[verdict],
+                    alone,
                 )
             )
     header = [
         field.name.replace("semantic_class", "class")
         for field in fields(StructureChange)
     ]
-    write_csv(path, header, map(astuple, rows))
+    write_csv(
+        path, header, ((*astuple(row)[:-1], int(row.alone)) for row in rows)
+    )
     return rows
 
 

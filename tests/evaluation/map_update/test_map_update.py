@@ -14,11 +14,12 @@ from evaluation.map_update.sessions import (
     THINNED,
     Label,
     MapBuilder,
+    Pair,
     read_pair,
     read_session,
     write_labels,
 )
-from evaluation.map_update.structures import verdicts
+from evaluation.map_update.structures import verdicts, write_structures
 
 
 def write_map(folder, points):
@@ -131,6 +132,26 @@ def test_a_structure_is_what_most_of_its_observed_points_are():
     assert numbers.tolist() == [1, 2, 3, 4]
     assert counts.tolist() == [[4, 1, 1], [2, 2, 1], [1, 0, 0], [2, 2, 0]]
     assert found.tolist() == [2, 1, 0, 1]
+
+
+def test_structures_that_one_world_has_need_no_point(tmp_path):
+    pair, truth = clouds(tmp_path)
+    a, b = (replace(one, instances=np.full(400, 7, np.uint16)) for one in pair)
+    house = {"name": "house", "class": "building", "label": 50}
+    car = {"name": "car", "class": "car", "label": 10}
+    tables = {7: house}, {7: house, 8: car, 9: {**house, "name": "shed"}}
+    path = tmp_path / "structures.csv"
+    rows = write_structures(path, Pair(a, b), truth, tables)
+    found = [(r.side, r.structure, r.points, r.alone, r.moves) for r in rows]
+    assert found == [
+        ("A", "house", 400, False, False),
+        ("B", "house", 400, False, False),
+        ("B", "car", 0, True, True),
+        ("B", "shed", 0, True, False),
+    ]
+    assert rows[-1].verdict == "newly_seen"
+    last = path.read_text().splitlines()[-1]
+    assert last == "B,9,shed,building,50,0,0,0,newly_seen,1"
 
 
 def test_a_map_has_the_first_point_of_each_cell():
