@@ -18,9 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 import importlib
-import os
-from pathlib import Path
-import tempfile
+import logging
 from typing import Any
 
 import numpy as np
@@ -38,6 +36,8 @@ _APART = 0.5
 # M3C2: radii of the normal's and of the cylinder's neighbourhood, greatest
 # distance, and the smallest one that counts [m].
 _NORMAL, _CYLINDER, _FARTHEST, _LEAST = 1.0, 0.5, 3.0, 0.1
+# Points that are measured between two steps of progress.
+_CHUNK = 50_000
 
 
 @dataclass(frozen=True)
@@ -171,19 +171,23 @@ def by_m3c2(
     mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
     """Returns labels (N,) of a map by M3C2 of py4dgeo."""
-    del track
     py4dgeo = _py4dgeo()
     unobserved, kept, changed = SIDES[mine.side]
     epochs = [py4dgeo.Epoch(one.points) for one in (mine, theirs)]
-    compare = py4dgeo.M3C2(
-        epochs=tuple(epochs),
-        corepoints=mine.points,
-        normal_radii=[_NORMAL],
-        cyl_radius=_CYLINDER,
-        max_distance=_FARTHEST,
-    )
-    distances, uncertainties = compare.run()
-    least = np.maximum(np.nan_to_num(uncertainties["lodetection"]), _LEAST)
+    chunks = np.array_split(mine.points, len(mine.points) // _CHUNK + 1)
+    found = [
+        py4dgeo.M3C2(
+            epochs=tuple(epochs),
+            corepoints=chunk,
+            normal_radii=[_NORMAL],
+            cyl_radius=_CYLINDER,
+            max_distance=_FARTHEST,
+        ).run()
+        for chunk in track(chunks, f"m3c2 of {mine.side}", len(chunks))
+    ]
+    distances = np.concatenate([each[0] for each in found])
+    detectable = np.concatenate([each[1]["lodetection"] for each in found])
+    least = np.maximum(np.nan_to_num(detectable), _LEAST)
     labels = np.where(np.abs(distances) > least, changed, kept)
     labels[np.isnan(distances)] = unobserved
     return labels.astype(np.uint8)
@@ -205,16 +209,13 @@ def _check_scans(session: Session) -> None:
 
 
 def _py4dgeo() -> Any:
-    here = Path.cwd()
     try:
-        # Its import leaves a log in the current folder.
-        with tempfile.TemporaryDirectory() as folder:
-            os.chdir(folder)
-            return importlib.import_module("py4dgeo")
-    except ImportError:
+        py4dgeo = importlib.import_module("py4dgeo")
+    except ImportError as error:
         raise InputError(
-            "--baseline: m3c2 needs py4dgeo; pip install "
+            f"--baseline: m3c2 needs py4dgeo ({error}); pip install "
             "'cns-drake[map-update]'"
         ) from None
-    finally:
-        os.chdir(here)
+    # It would write to stdout, and to a file in the current folder.
+    logging.getLogger("py4dgeo").handlers.clear()
+    return py4dgeo

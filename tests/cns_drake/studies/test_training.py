@@ -77,7 +77,6 @@ def test_drives_that_never_meet_are_refused():
 
 
 def test_jax_scores_as_the_method_does(tmp_path):
-    pytest.importorskip("jax")
     values = start_parameters(5)
     images = toy_scans(1, 1, 6).images
     write_weights(tmp_path / "w.npz", values, (0.0, 1.0), {"seed": 5})
@@ -97,7 +96,6 @@ def test_jax_scores_as_the_method_does(tmp_path):
 
 
 def test_the_same_seed_and_an_interruption(tmp_path, monkeypatch):
-    pytest.importorskip("jax")
     monkeypatch.setattr(training, "_KEPT_EVERY", 2)
     monkeypatch.setattr(training, "_CLUSTERS", 1)
     monkeypatch.setattr(training, "_WARM_UP", 1)
