@@ -210,14 +210,19 @@ def room(size, beams=(200, 60), window=None):
 def test_free_space_sees_past_what_is_gone(tmp_path):
     """A's map: a wall at 10 m, a box at 5 m, a thing outside at 30 m.
 
-    B sees the wall, but not the box; what is outside, the wall hides.
+    B sees the wall, but not the box; what is outside, the wall hides. Points of
+    B beside some of the box, but not at it, do not keep it.
     """
     rng = np.random.default_rng(1)
     box = np.array([5.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
     outside = np.array([30.0, 0.0, 0.0]) + rng.uniform(-0.5, 0.5, (200, 3))
     wall = room(10.0)[::7]
     write_map(tmp_path / "A", np.concatenate([wall, box, outside]))
-    write_map(tmp_path / "B", room(10.0))
+    beside = box[:100] + np.array([0.15, 0.0, 0.0])
+    away = np.linalg.norm(beside[:, None] - box, axis=2).min(axis=1)
+    beside = beside[away > 0.125]
+    assert len(beside) > 10
+    write_map(tmp_path / "B", np.concatenate([room(10.0), beside]))
     folder = tmp_path / "B" / "Scans"
     folder.mkdir()
     rows = "\n".join(" ".join(f"{v:.6f}" for v in p) for p in room(10.0))
