@@ -27,6 +27,7 @@ from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files, describe_scenario
+from cns_drake.scene.world import structures_in
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.simulation.loaded_drive import (
@@ -181,6 +182,9 @@ class SimulatedDrive(PlannedDrive):
     """The scans of a scenario, as in its recording.
 
     A scan is simulated on each access.
+
+    Attributes:
+        structures: names of all structures in the world.
     """
 
     def __init__(self, scenario: Scenario):
@@ -197,6 +201,7 @@ class SimulatedDrive(PlannedDrive):
         num_frames = count_frames(scenario, trajectory)
         super().__init__(scenario, trajectory, num_frames)
         self._instances = index_instances(structure_list(world), self.name)
+        self.structures = structures_in(world)
         self._diagram = make_station(
             scenario, world=world, trajectory=trajectory, traffic=traffic
         )

@@ -208,7 +208,10 @@ def write_truth(
         for session, labels in zip(pair, truth, strict=True):
             write_labels(session.folder / "truth.npy", labels)
         names = [survey.drive.instances or {} for survey in (a, b)]
-        table = write_structures(draft / "structures.csv", pair, truth, names)
+        present = [survey.simulated.structures for survey in (a, b)]
+        table = write_structures(
+            draft / "structures.csv", pair, truth, names, present
+        )
         write_page(
             draft / "index.html",
             pair,

@@ -1,6 +1,6 @@
 """How much of each structure changed, and a verdict for the whole."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
@@ -80,6 +80,7 @@ def write_structures(
     pair: Pair,
     truth: Sequence[np.ndarray],
     tables: Sequence[Mapping[int, Mapping]],
+    present: Sequence[Collection[str]],
 ) -> list[StructureChange]:
     """Writes the table of structures of both maps, and returns its rows.
 
@@ -90,11 +91,11 @@ def write_structures(
         pair: both sessions.
         truth: labels of each.
         tables: instance -> name and class, of each.
+        present: names of the structures in the world of each.
     """
     rows = []
-    known = [{str(e.get("name", "")) for e in one.values()} for one in tables]
-    for session, labels, names, others in zip(
-        pair, truth, tables, known[::-1], strict=True
+    for session, labels, names, mine, theirs in zip(
+        pair, truth, tables, present, present[::-1], strict=True
     ):
         numbers, counts, found = verdicts(
             session.instances, labels, session.side
@@ -111,7 +112,7 @@ def write_structures(
         for number in sorted({*seen, *names}):
             entry = names.get(number, {})
             name = str(entry.get("name", ""))
-            alone = bool(name) and name not in others
+            alone = name in mine and name not in theirs
             if number not in seen and not alone:
                 continue
             (points, observed, changed), verdict = seen.get(

@@ -137,9 +137,12 @@ def test_structures_that_one_world_has_need_no_point(tmp_path):
     a, b = (replace(one, instances=np.full(400, 7, np.uint16)) for one in pair)
     house = {"name": "house", "class": "building", "label": 50}
     car = {"name": "car", "class": "car", "label": 10}
-    tables = {7: house}, {7: house, 8: car, 9: {**house, "name": "shed"}}
+    # A table is that of all stages.
+    table = {7: house, 8: car, 9: {**house, "name": "shed"}}
+    tables = table, table
     path = tmp_path / "structures.csv"
-    rows = write_structures(path, Pair(a, b), truth, tables)
+    present = {"house"}, {"house", "car", "shed"}
+    rows = write_structures(path, Pair(a, b), truth, tables, present)
     found = [(r.side, r.structure, r.points, r.alone, r.moves) for r in rows]
     assert found == [
         ("A", "house", 400, False, False),
