@@ -34,7 +34,7 @@ from cns_drake.studies.map_truth import (
 )
 from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.scores import Labels, score
-from evaluation.map_update.sessions import Label, read_labels, read_pair
+from evaluation.map_update.sessions import Label, read_pair, read_truth
 from evaluation.report.compared import (
     ComparedPair,
     MapRow,
@@ -208,12 +208,7 @@ def score_methods(
         InputError: the folder cannot be read, or a baseline cannot run.
     """
     pair = read_pair(maps)
-    truth = Labels(
-        *(
-            read_labels(one.folder / "truth.npy", one, truth=True)
-            for one in pair
-        )
-    )
+    truth = Labels(*read_truth(pair))
     found = {}
     for method in methods:
         labels = truth if method == TRUTH else run_baseline(method, pair, track)

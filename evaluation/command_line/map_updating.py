@@ -60,6 +60,7 @@ def map_update(
     from evaluation.map_update.sessions import (
         read_labels,
         read_pair,
+        read_truth,
         write_labels,
     )
     from evaluation.map_update.structures import class_names
@@ -71,12 +72,7 @@ def map_update(
     if output is not None:
         make_folder(output)
     pair = read_pair(folder)
-    truth = Labels(
-        *(
-            read_labels(one.folder / "truth.npy", one, truth=True)
-            for one in pair
-        )
-    )
+    truth = Labels(*read_truth(pair))
     name = "labels"
     if labels_a is not None and labels_b is not None:
         found = Labels(

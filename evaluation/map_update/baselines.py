@@ -17,7 +17,6 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 import importlib
 import logging
 from typing import Any
@@ -41,37 +40,21 @@ _NORMAL, _CYLINDER, _FARTHEST, _LEAST = 1.0, 0.5, 3.0, 0.1
 _CHUNK = 50_000
 
 
-@dataclass(frozen=True)
-class FreeSpace:
-    """Settings of `free-space`, fitted on two pairs of drives.
-
-    These are Metropolis 01 and 04, whose ways hardly meet, and Suburbia after
-    five years.
-
-    Attributes:
-        cell: side of a cell [m].
-        near: distance of a point of the other map that keeps a cell [m].
-        behind: distance of the surface behind a cell that a scan sees past [m].
-        on: distance of the surface from a cell that a scan shows [m].
-        spacing: way between two scans [m].
-        shown: number of scans that must show a kept cell, as a share of those
-            for which it is hidden.
-        enough: so many scans suffice.
-        block: side of a cube in which changes are counted [m].
-        share: part of a cube that is changed where its other points are, too.
-        at: distance of a point of the other map that keeps a point there [m].
-    """
-
-    cell: float = 0.2
-    near: float = 0.2
-    behind: float = 0.5
-    on: float = 0.2
-    spacing: float = 2.0
-    shown: float = 0.05
-    enough: int = 2
-    block: float = 1.0
-    share: float = 0.2
-    at: float = 0.12
+# Settings of `free-space`, fitted on two pairs of drives: Metropolis 01 and 04,
+# whose ways hardly meet, and Suburbia after five years.
+# Side of a cell, and distance of a point of the other map that keeps it [m].
+_CELL, _NEAR = 0.2, 0.2
+# Distance of the surface behind a cell that a scan sees past, and from a cell
+# that it shows [m].
+_BEHIND, _ON = 0.5, 0.2
+# Way between two scans [m].
+_SPACING = 2.0
+# Scans that must show a kept cell: a share of those for which it is hidden, but
+# no more than a number.
+_SHOWN, _ENOUGH = 0.05, 2
+# Side of a cube in which changes are counted [m], and the part of it from which
+# on all is changed but what has a point of the other map so near [m].
+_BLOCK, _PART, _AT = 1.0, 0.2, 0.12
 
 
 def run_baseline(name: str, pair: Pair, track: Track = silent) -> Labels:
@@ -101,25 +84,21 @@ def by_distance(
 
 
 def by_free_space(
-    mine: Session,
-    theirs: Session,
-    track: Track = silent,
-    settings: FreeSpace | None = None,
+    mine: Session, theirs: Session, track: Track = silent
 ) -> np.ndarray:
     """Returns labels (N,) of a map by what the other's scans see."""
-    settings = settings or FreeSpace()
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
     labels = np.full(len(mine.points), kept, np.uint8)
-    distances = nearest(mine.points, theirs.points, settings.near)
+    distances = nearest(mine.points, theirs.points, _NEAR)
     far = np.isinf(distances)
     points = mine.points[far]
-    cells = np.floor(points / settings.cell).astype(np.int64)
+    cells = np.floor(points / _CELL).astype(np.int64)
     _, first, cell_of = np.unique(
         cells, axis=0, return_index=True, return_inverse=True
     )
-    past, shown, hidden = _count_views(points[first], theirs, settings, track)
-    needed = np.minimum(settings.shown * hidden, settings.enough)
+    past, shown, hidden = _count_views(points[first], theirs, track)
+    needed = np.minimum(_SHOWN * hidden, _ENOUGH)
     is_shown = (shown > 0) & (shown >= needed)
     found = np.where(is_shown, kept, unobserved)
     found = np.where(past > 0, changed, found)
@@ -127,22 +106,20 @@ def by_free_space(
     # What stands there now passes near to what stood there.
     is_changed = labels == changed
     known = is_changed | (labels == kept)
-    blocks = np.floor(mine.points[known] / settings.block).astype(np.int64)
+    blocks = np.floor(mine.points[known] / _BLOCK).astype(np.int64)
     blocks -= blocks.min(axis=0, initial=0)
     sizes = blocks.max(axis=0, initial=0) + 1
     _, block_of = np.unique(
         np.ravel_multi_index(tuple(blocks.T), tuple(sizes)), return_inverse=True
     )
     part = np.bincount(block_of, is_changed[known]) / np.bincount(block_of)
-    is_beside = (part[block_of] > settings.share) & (
-        distances[known] > settings.at
-    )
+    is_beside = (part[block_of] > _PART) & (distances[known] > _AT)
     labels[np.flatnonzero(known)[is_beside]] = changed
     return labels
 
 
 def _count_views(
-    points: np.ndarray, other: Session, settings: FreeSpace, track: Track
+    points: np.ndarray, other: Session, track: Track
 ) -> np.ndarray:
     """Returns how many scans see past points (N, 3), show and hide them.
 
@@ -150,7 +127,7 @@ def _count_views(
         (3, N).
     """
     counts = np.zeros((3, len(points)), np.int32)
-    chosen = sample_frames(other.X_WS[:, :3, 3], settings.spacing).tolist()
+    chosen = sample_frames(other.X_WS[:, :3, 3], _SPACING).tolist()
     # The LiDAR looks between its lowest and its highest return, as far as its
     # farthest.
     some = chosen[:: max(len(chosen) // 20, 1)]
@@ -173,9 +150,9 @@ def _count_views(
         rows, p_S = rows[inside], p_S[inside]
         found = SeenSurfaces.of(other.scan(number)).clearances(p_S)
         return [
-            rows[found > settings.behind],
-            rows[np.abs(found) <= settings.on],
-            rows[found < -settings.on],
+            rows[found > _BEHIND],
+            rows[np.abs(found) <= _ON],
+            rows[found < -_ON],
         ]
 
     with ThreadPoolExecutor(num_cores()) as threads:

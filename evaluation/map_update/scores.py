@@ -17,7 +17,6 @@ within 0.2 m of B's map, its Chamfer distance the mean of both mean distances.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 import itertools
 import math
 from typing import NamedTuple
@@ -27,7 +26,7 @@ from scipy.spatial import KDTree
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_number
-from evaluation.map_update.sessions import SIDES, Label, Pair, Session
+from evaluation.map_update.sessions import SIDES, Label, Pair
 from evaluation.map_update.structures import verdicts
 
 _CLASSES = {
@@ -47,38 +46,6 @@ class Labels(NamedTuple):
 
     A: np.ndarray
     B: np.ndarray
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Numbers of points of each true and each predicted class.
-
-    Attributes:
-        table: (4, 4) by truth and by prediction, in the order of the names of
-            IoUs.
-    """
-
-    table: np.ndarray
-
-    def iou(self) -> dict[str, float]:
-        """Returns the IoU of each class, NaN if it is nowhere, and the mean."""
-        right = np.diag(self.table)
-        union = self.table.sum(axis=0) + self.table.sum(axis=1) - right
-        values = [_ratio(n, d) for n, d in zip(right, union, strict=True)]
-        known = [value for value in values if not math.isnan(value)]
-        mean = sum(known) / len(known) if known else math.nan
-        names = (f"iou_{name}" for name in _CLASSES)
-        return {"miou": mean, **dict(zip(names, values, strict=True))}
-
-    def changes(self) -> dict[str, float]:
-        """Returns precision and recall of gone and of new."""
-        found = {}
-        for name in _CHANGES:
-            k = list(_CLASSES).index(name)
-            right = self.table[k, k]
-            found[f"precision_{name}"] = _ratio(right, self.table[:, k].sum())
-            found[f"recall_{name}"] = _ratio(right, self.table[k].sum())
-        return found
 
 
 def score(
@@ -128,22 +95,32 @@ def score(
 def _of_points(
     truth: Labels, predicted: Labels, counted: list[np.ndarray]
 ) -> dict[str, float]:
-    counts = _count(truth, predicted, counted)
-    return {**counts.iou(), **counts.changes()}
-
-
-def _count(
-    truth: Labels, predicted: Labels, counted: list[np.ndarray]
-) -> Counts:
+    """Returns IoUs, NaN of a class that is nowhere; precisions and recalls."""
     code = np.zeros(256, np.int64)
     for k, labels in enumerate(_CLASSES.values()):
         code[list(labels)] = k
     size = len(_CLASSES)
-    table = np.zeros(size * size, np.int64)
+    cells = np.zeros(size * size, np.int64)
     for true, found, rows in zip(truth, predicted, counted, strict=True):
-        cells = size * code[true[rows]] + code[found[rows]]
-        table += np.bincount(cells, minlength=size * size)
-    return Counts(table.reshape(size, size))
+        cells += np.bincount(
+            size * code[true[rows]] + code[found[rows]], minlength=size * size
+        )
+    # By truth and by prediction.
+    table = cells.reshape(size, size)
+    right, true, found = np.diag(table), table.sum(axis=1), table.sum(axis=0)
+    known = (true + found) > 0
+    result = {"miou": math.nan}
+    for k, name in enumerate(_CLASSES):
+        union = true[k] + found[k] - right[k]
+        result[f"iou_{name}"] = _ratio(right[k], union)
+    if known.any():
+        iou = [result[f"iou_{name}"] for name in _CLASSES]
+        result["miou"] = float(np.mean(np.array(iou)[known]))
+    for name in _CHANGES:
+        k = list(_CLASSES).index(name)
+        result[f"precision_{name}"] = _ratio(right[k], found[k])
+        result[f"recall_{name}"] = _ratio(right[k], true[k])
+    return result
 
 
 def _within(
@@ -310,8 +287,3 @@ def _as_json(value: object) -> dict:
     converted = convert(value)
     assert isinstance(converted, dict)
     return converted
-
-
-def all_kept(session: Session) -> np.ndarray:
-    """Returns labels (N,) that call every point kept."""
-    return np.full(len(session.points), SIDES[session.side][1], np.uint8)

@@ -367,3 +367,14 @@ def read_pair(folder: Path) -> Pair:
                 f"{folder}: no folder {side}; cns-drake map-truth makes both"
             )
     return Pair(*(read_session(folder / side) for side in SIDES))
+
+
+def read_truth(pair: Pair) -> list[np.ndarray]:
+    """Returns the true labels of both maps, (N,) and (M,) uint8.
+
+    Raises:
+        InputError: see `read_labels`.
+    """
+    return [
+        read_labels(one.folder / "truth.npy", one, truth=True) for one in pair
+    ]

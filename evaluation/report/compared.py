@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.files import completing
@@ -45,16 +45,17 @@ class ComparedPair:
         )
 
 
-class ComparedRow(Protocol):
-    """The result of a method on a pair."""
+@dataclass(frozen=True)
+class ComparedRow:
+    """The result of a method on a pair.
 
-    @property
-    def pair(self) -> ComparedPair:
-        """The drives."""
+    Attributes:
+        pair: the drives.
+        method: its name.
+    """
 
-    @property
-    def method(self) -> str:
-        """Its name."""
+    pair: ComparedPair
+    method: str
 
 
 _Row = TypeVar("_Row", bound=ComparedRow)
@@ -124,18 +125,14 @@ def draw_compared(
 
 
 @dataclass(frozen=True)
-class MapRow:
-    """The labels of a method on the maps of a pair.
+class MapRow(ComparedRow):
+    """The labels of a method, or the true ones, on the maps of a pair.
 
     Attributes:
-        pair: the drives.
-        method: its name; `truth` for the true labels.
         scores: name -> value, see `evaluation.map_update.scores.summary`; None
             where one is undefined.
     """
 
-    pair: ComparedPair
-    method: str
     scores: Mapping[str, float | None]
 
 

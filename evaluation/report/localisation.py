@@ -14,7 +14,7 @@ from evaluation.localisation.localise import (
     Starts,
 )
 from evaluation.localisation.tracking import LOST
-from evaluation.report.compared import ComparedPair, draw_compared
+from evaluation.report.compared import ComparedRow, draw_compared
 from evaluation.report.drawing import save
 
 
@@ -49,18 +49,14 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
 
 
 @dataclass(frozen=True)
-class LocalisedRow:
-    """A method on a pair of drives, from starts of one kind.
+class LocalisedRow(ComparedRow):
+    """An estimator on a pair of drives, from starts of one kind.
 
     Attributes:
-        pair: the drives.
-        method: name of the estimator.
         starts: the draw of starts.
         rows: (K,) of `QUERY`.
     """
 
-    pair: ComparedPair
-    method: str
     starts: Starts
     rows: np.ndarray
 
