@@ -122,15 +122,12 @@ def run_task(
 
     Args:
         task: which one.
-        pairs: the pairs.
-        output: the folder for everything.
-        cluster: where the work is done.
+        pairs, output, cluster: see `localise_pairs` and `update_pairs`.
         spacing: between two queries that are localised [m].
         own_methods: Python files with estimators.
 
     Raises:
-        InputError: the task takes no such methods, the folder cannot be made,
-            or a step failed.
+        InputError: the task takes no such methods, or cannot be done.
     """
     if task is Task.LOCALISE:
         from evaluation.study.localisation import SHIPPED, localise_pairs

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 import itertools
+import math
 from pathlib import Path
 
 import numpy as np
@@ -179,12 +180,7 @@ def rung_pairs(
             on_note(f"{drive.source}: {text}")
         pairs += [
             ComparedPair(
-                map_folder(drive).name,
-                str(drive.stage),
-                str(drive.stage),
-                rung.cause,
-                rung.level,
-                rung.strength,
+                _labelled(drive, rung),
                 (
                     DriveSimulation(rung.drives.database),
                     DriveSimulation(rung.drives.query),
@@ -211,7 +207,7 @@ def _measure(
     run_jobs(jobs.values(), cluster)
     return [
         MeasuredRung(
-            _labelled(drive, rung, protocol),
+            _labelled(drive, rung, protocol.radius),
             rung.seed,
             rung.fingerprint(),
             part.read(),
@@ -327,7 +323,7 @@ class RungPlan:
 
 
 def _labelled(
-    query_scenario: Scenario, rung: Rung, protocol: RetrievalProtocol
+    query_scenario: Scenario, rung: Rung, radius: float = math.nan
 ) -> LadderRung:
     # The database has the route of the query, at any stage.
     route = str(query_scenario.stage)
@@ -338,7 +334,7 @@ def _labelled(
         rung.cause,
         rung.level,
         rung.strength,
-        rung.drives.radius(protocol.radius),
+        rung.drives.radius(radius),
     )
 
 

@@ -56,13 +56,10 @@ _SCORES = (
         for name in ("gone", "new")
         for kind in ("precision", "recall")
     ),
+    "called_points",
+    "called_structures",
+    "right_structures",
 )
-# Column -> what labels call gone or new, without vehicles and people.
-_CALLED = {
-    "called_points": "points",
-    "called_structures": "structures",
-    "right_structures": "right_structures",
-}
 # The true labels, as those of a method.
 TRUTH = "truth"
 # Way between two scans of a pair that is one of many [m].
@@ -215,7 +212,6 @@ def score_methods(
         scores = score(pair, truth, labels, {})
         found[method] = {
             **{name: scores[name] for name in _SCORES},
-            **{key: scores["called"][name] for key, name in _CALLED.items()},
             "gone": int((truth.A == Label.GONE).sum()),
             "new": int((truth.B == Label.NEW).sum()),
         }
@@ -307,7 +303,7 @@ def update_pairs(
         lambda row, name: row.scores[name],
     )
     table = output / "map_update.csv"
-    strength: Columns[MapRow] = {"strength": lambda row: row.pair.strength}
+    strength: Columns[MapRow] = {"strength": lambda row: row.rung.strength}
     write_compared(table, rows, {**scores, **strength})
     draw_maps(rows, output / "map_update")
     return table

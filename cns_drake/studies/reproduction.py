@@ -23,6 +23,7 @@ from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report.compared import ComparedPair
+from evaluation.report.ladder import LadderRung
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
@@ -162,12 +163,14 @@ def stage_pairs(maps: Sequence[str] | None, output: Path) -> list[ComparedPair]:
         ):
             pairs += [
                 ComparedPair(
-                    folder.name,
-                    drive.name,
-                    query.name,
-                    cause,
-                    level,
-                    f"map of {drive.name}",
+                    LadderRung(
+                        folder.name,
+                        drive.name,
+                        query.name,
+                        cause,
+                        level,
+                        f"map of {drive.name}",
+                    ),
                     (source(drive), source(query)),
                 )
                 for level, drive in enumerate(reversed(known), start=1)

@@ -75,7 +75,7 @@ def score(
     for name, distance in _TOLERANCES.items():
         result[name] = _within(pair, truth, predicted, counted, distance)
     result["by_structure"] = _by_structure(pair, truth, predicted, counted)
-    result["called"] = _called(pair, truth, predicted, still)
+    result.update(_called(pair, truth, predicted, still))
     result["updated_map"] = _updated_map(pair, truth, predicted, counted)
     result["by_class"] = {
         name: _of_points(
@@ -212,8 +212,8 @@ def _called(
     return {
         name: _ratio(sum(int(one.sum()) for one in parts), sum(map(len, parts)))
         for name, parts in (
-            ("points", points),
-            ("structures", structures),
+            ("called_points", points),
+            ("called_structures", structures),
             ("right_structures", right),
         )
     }

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.csv_files import read_records, write_csv
-from evaluation.map_update.sessions import MOVES, SIDES, Pair
+from evaluation.map_update.sessions import MOVES, SIDES, Label, Pair
 
 
 @dataclass(frozen=True)
@@ -100,36 +100,34 @@ def write_structures(
         numbers, counts, found = verdicts(
             session.instances, labels, session.side
         )
-        kinds = {label: label.name.lower() for label in SIDES[session.side]}
-        unobserved = SIDES[session.side][0]
-        seen = dict(
-            zip(
-                numbers.tolist(),
-                zip(counts.tolist(), found.tolist(), strict=True),
-                strict=True,
+        seen = {
+            number: (*row, verdict)
+            for number, row, verdict in zip(
+                numbers.tolist(), counts.tolist(), found.tolist(), strict=True
             )
-        )
-        for number in sorted({*seen, *names}):
+        }
+        alone = {
+            number
+            for number, entry in names.items()
+            if entry.get("name") in mine and entry["name"] not in theirs
+        }
+        for number in sorted({*seen, *alone}):
             entry = names.get(number, {})
-            name = str(entry.get("name", ""))
-            alone = name in mine and name not in theirs
-            if number not in seen and not alone:
-                continue
-            (points, observed, changed), verdict = seen.get(
-                number, ((0, 0, 0), unobserved)
+            points, observed, changed, verdict = seen.get(
+                number, (0, 0, 0, SIDES[session.side][0])
             )
             rows.append(
                 StructureChange(
                     session.side,
                     number,
-                    name,
+                    str(entry.get("name", "")),
                     str(entry.get("class", "")),
                     int(entry.get("label", 0)),
                     points,
                     observed,
                     changed,
-                    kinds[verdict],
-                    alone,
+                    Label(verdict).name.lower(),
+                    number in alone,
                 )
             )
     header = [

@@ -8,7 +8,12 @@ from typing import TypeVar
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.files import completing
-from evaluation.report.ladder import CauseCell, draw_cells
+from evaluation.report.ladder import (
+    RUNG_COLUMNS,
+    CauseCell,
+    LadderRung,
+    draw_cells,
+)
 from evaluation.report.tables import Columns, Table
 
 
@@ -17,32 +22,20 @@ class ComparedPair:
     """Two drives that are compared.
 
     Attributes:
-        map_name: name of the city.
-        database: name of the drive of the map, the older one.
-        query: name of the other drive.
-        cause: of the change between them.
-        level: its strength, from 1 to 4; 0 without a change.
-        strength: in words.
+        rung: the change between them; the drive of the map is the database.
         sources: open both drives.
         seed: number of the random draw.
     """
 
-    map_name: str
-    database: str
-    query: str
-    cause: str
-    level: int
-    strength: str
+    rung: LadderRung
     sources: tuple[Callable[[], Drive], Callable[[], Drive]]
     seed: int = 1
 
     @property
     def name(self) -> str:
         """What tells it from other pairs."""
-        return (
-            f"{self.map_name} {self.database} {self.query} {self.cause} "
-            f"{self.level} {self.seed}"
-        )
+        names = (get(self) for get in RUNG_COLUMNS.values())
+        return " ".join(map(str, (*names, self.seed)))
 
 
 @dataclass(frozen=True)
@@ -56,6 +49,11 @@ class ComparedRow:
 
     pair: ComparedPair
     method: str
+
+    @property
+    def rung(self) -> LadderRung:
+        """The change between the drives."""
+        return self.pair.rung
 
 
 _Row = TypeVar("_Row", bound=ComparedRow)
@@ -71,14 +69,7 @@ def write_compared(
         rows: in their order.
         columns: further ones.
     """
-    keys: Columns[_Row] = {
-        "map": lambda row: row.pair.map_name,
-        "db": lambda row: row.pair.database,
-        "query": lambda row: row.pair.query,
-        "cause": lambda row: row.pair.cause,
-        "level": lambda row: row.pair.level,
-        "method": lambda row: row.method,
-    }
+    keys = {**RUNG_COLUMNS, "method": lambda row: row.method}
     with completing(path) as unfinished:
         table = Table.of(rows, {**keys, **columns})
         unfinished.write_text(table.to_csv(), encoding="utf-8")
@@ -102,19 +93,19 @@ def draw_compared(
         stem: path to write, without ending.
     """
     names = dict.fromkeys(
-        row.pair.map_name for rows in panels.values() for row in rows
+        row.rung.map_name for rows in panels.values() for row in rows
     )
     draw_cells(
         {
             (name, f"{name}, {title}"): [
                 CauseCell(
                     row.method,
-                    row.pair.cause,
-                    row.pair.level,
+                    row.rung.cause,
+                    row.rung.level,
                     *share(title, row),
                 )
                 for row in rows
-                if row.pair.map_name == name
+                if row.rung.map_name == name
             ]
             for name in names
             for title, rows in panels.items()

@@ -66,7 +66,7 @@ class LadderRung:
         cause: what changes; `none` without a change.
         level: its strength, from 1 to 4; 0 without a change.
         strength: in words.
-        radius: greatest distance of a match [m].
+        radius: greatest distance of a match [m]; NaN where places do not match.
     """
 
     map_name: str
@@ -75,7 +75,7 @@ class LadderRung:
     cause: str
     level: int
     strength: str
-    radius: float
+    radius: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -218,6 +218,16 @@ class _Answers(NamedTuple):
     outcome: RungOutcome
 
 
+# Columns of what has a `LadderRung`.
+RUNG_COLUMNS: Columns[Any] = {
+    "map": attrgetter("rung.map_name"),
+    "db": attrgetter("rung.database"),
+    "query": attrgetter("rung.query"),
+    "cause": attrgetter("rung.cause"),
+    "level": attrgetter("rung.level"),
+}
+
+
 def _keys(path: str = "") -> Columns[Any]:
     """Returns the first columns.
 
@@ -225,11 +235,7 @@ def _keys(path: str = "") -> Columns[Any]:
         path: attributes that lead from an item to its method and gate.
     """
     return {
-        "map": lambda one: one.rung.map_name,
-        "db": lambda one: one.rung.database,
-        "query": lambda one: one.rung.query,
-        "cause": lambda one: one.rung.cause,
-        "level": lambda one: one.rung.level,
+        **RUNG_COLUMNS,
         "method": attrgetter(f"{path}method"),
         "gate": attrgetter(f"{path}is_gated"),
     }

@@ -102,7 +102,7 @@ def localise_pairs(
         lambda row, name: row.rows[name].tolist(),
     )
     strength: Columns[LocalisedRow] = {
-        "strength": lambda row: row.pair.strength
+        "strength": lambda row: row.rung.strength
     }
     table = output / "localisation.csv"
     write_compared(table, rows, {**start, **summary, **strength})

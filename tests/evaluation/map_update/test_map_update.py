@@ -94,25 +94,25 @@ def test_what_is_called_changed_is_counted(tmp_path):
     pair = pair._replace(
         A=replace(pair.A, instances=np.arange(400, dtype=np.uint16) // 200)
     )
-    found = score(pair, truth, guess, {})["called"]
+    found = score(pair, truth, guess, {})
     number = sum(
         (labels == k).sum() for labels, k in zip(guess, changed, strict=True)
     )
-    assert found["points"] == number / 800
+    assert found["called_points"] == number / 800
     # The only structure is the second half of A; more of it is kept.
     true, called = (
         (labels.A[200:] == Label.GONE).sum()
         > (labels.A[200:] == Label.KEPT).sum()
         for labels in (truth, guess)
     )
-    assert found["structures"] == float(called)
+    assert found["called_structures"] == float(called)
     assert found["right_structures"] == float(true == called)
     # Parked cars count neither as points nor as structures.
     cars = np.full(400, 10, np.uint16)
     pair = pair._replace(A=replace(pair.A, classes=cars))
-    found = score(pair, truth, guess, {})["called"]
-    assert found["points"] == (guess.B == Label.NEW).mean()
-    assert found["structures"] is None
+    found = score(pair, truth, guess, {})
+    assert found["called_points"] == (guess.B == Label.NEW).mean()
+    assert found["called_structures"] is None
 
 
 def test_points_are_left_out(tmp_path):

@@ -19,6 +19,7 @@ from evaluation.localisation.localise import (
     localise,
 )
 from evaluation.report.compared import ComparedPair
+from evaluation.report.ladder import LadderRung
 from evaluation.study import localisation
 from evaluation.study.localisation import (
     STARTS,
@@ -32,8 +33,12 @@ from evaluation.study.surveys import RecordedDrive
 def pairs(towns):
     one, other = (RecordedDrive(towns / f"town_0{i}") for i in (1, 2))
     return [
-        ComparedPair("town", "01", "01", "none", 0, "nothing", (one, one)),
-        ComparedPair("town", "02", "01", "stages", 1, "a lane", (other, one)),
+        ComparedPair(
+            LadderRung("town", "01", "01", "none", 0, "nothing"), (one, one)
+        ),
+        ComparedPair(
+            LadderRung("town", "02", "01", "stages", 1, "a lane"), (other, one)
+        ),
     ]
 
 
