@@ -27,11 +27,11 @@ from evaluation.methods.learned import (
     FREQUENCIES,
     HEADINGS,
     LAYERS,
+    SECTORS,
     SEEN,
     TURNS,
     WEIGHTS_VERSION,
 )
-from evaluation.methods.polar_images import SECTORS
 from evaluation.study.parts import MakePart, Part
 
 # A batch has this many cities, clusters of queries in each, and queries in each

@@ -29,7 +29,7 @@ from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.ladder_rungs import mapped_from
 from cns_drake.studies.redrawing import redrawn_inputs
 from evaluation.drives.sampling import gather, sample_frames
-from evaluation.methods.polar_images import polar_image
+from evaluation.methods.learned import polar_image
 
 # Far from the seeds of levels, ladders and clean tests.
 _FIRST_SEED = 500_000

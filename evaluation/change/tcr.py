@@ -17,14 +17,87 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from evaluation.geometry.hull import in_convex_hull
-
+# Tolerance of the boundary and of flatness, relative to the extent of the
+# cloud. Without it, rounding would put the hull's own corners outside.
+_TOLERANCE = 1e-9
+# The distances of so many points to all facets stay in the cache.
+_CHUNK = 1 << 8
 # Distance up to which a point has a counterpart in the other map [m].
 TAU = 4.5
 # Range of a trajectory within which a map counts as covered by it [m].
 COVERAGE_RADIUS = 40.0
+
+
+def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """Returns which points lie in the convex hull, boundary included.
+
+    Clouds without volume have a hull as well: a polygon in its plane, a
+    segment, a point. Coordinates are centred first, so that large offsets (UTM)
+    do not cost precision.
+
+    Args:
+        points: (N, 3) float64.
+        vertices: (M, 3) float64, the points whose hull it is.
+
+    Returns:
+        (N,) bool; all false if there are no vertices.
+    """
+    if len(vertices) == 0:
+        return np.zeros(len(points), dtype=bool)
+    centre = vertices.mean(axis=0)
+    hull = vertices - centre
+    inside = points - centre
+    extent = float(np.ptp(hull, axis=0).max())
+    tolerance = _TOLERANCE * max(1.0, extent)
+    # Rows of `axes` are the directions of largest to smallest spread.
+    axes = np.linalg.svd(hull.T @ hull)[2]
+    spread = np.ptp(hull @ axes.T, axis=0)
+    rank = int(np.count_nonzero(spread > 2.0 * tolerance))
+    while rank > 1:
+        try:
+            facets = ConvexHull(hull @ axes[:rank].T).equations
+        except QhullError:
+            # Qhull takes the cloud as flat up to rounding.
+            rank -= 1
+            continue
+        return _in_half_spaces(inside @ axes[:rank].T, facets, tolerance) & (
+            _is_flat(inside, hull, axes[rank:], tolerance)
+        )
+    along = inside @ axes[:rank].T
+    ends = hull @ axes[:rank].T
+    within = (along >= ends.min(axis=0) - tolerance) & (
+        along <= ends.max(axis=0) + tolerance
+    )
+    return within.all(axis=1) & _is_flat(inside, hull, axes[rank:], tolerance)
+
+
+def _in_half_spaces(
+    points: np.ndarray, facets: np.ndarray, tolerance: float
+) -> np.ndarray:
+    """Returns which points fulfil n . p + d <= tolerance for all facets."""
+    result = np.empty(len(points), dtype=bool)
+    for start in range(0, len(points), _CHUNK):
+        span = slice(start, start + _CHUNK)
+        distances = points[span] @ facets[:, :-1].T + facets[:, -1]
+        result[span] = (distances <= tolerance).all(axis=1)
+    return result
+
+
+def _is_flat(
+    points: np.ndarray,
+    hull: np.ndarray,
+    normals: np.ndarray,
+    tolerance: float,
+) -> np.ndarray:
+    """Returns the points in the plane or line that the hull spans."""
+    heights = hull @ normals.T
+    out = points @ normals.T
+    return (
+        (out >= heights.min(axis=0) - tolerance)
+        & (out <= heights.max(axis=0) + tolerance)
+    ).all(axis=1)
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,8 @@ from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
     from evaluation.methods.method import Method
+    from evaluation.recognition.metrics import Interval
     from evaluation.recognition.place_recognition import PlaceRecognition
-    from evaluation.recognition.resampling import Interval
 
 app = terminal.make_program(
     "cns-eval",

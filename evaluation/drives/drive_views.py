@@ -87,12 +87,16 @@ class RecentScans(DriveView):
 
         Args:
             drive: the drive.
-            kept: number of the last scans that stay in memory.
+            kept: number of the last scans that stay in memory; older ones are
+                read again.
         """
         super().__init__(drive)
-        self.world_frame = drive.world_frame
         self._kept = kept
         self._recent: OrderedDict[int, np.ndarray] = OrderedDict()
+
+    @property
+    def world_frame(self) -> str:  # type: ignore[override]  # Read late.
+        return self._drive.world_frame
 
     def scan(self, index: int) -> np.ndarray:
         if index not in self._recent:

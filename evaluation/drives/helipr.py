@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from evaluation.drives import utm
 from evaluation.drives.scan_files import (
+    DATUM,
     FileDrive,
     check_below,
     keep_spanned,
     list_stamped,
     read_packed,
+    to_world,
 )
 from evaluation.drives.text_tables import read_quaternions
 
@@ -70,7 +71,7 @@ class HeliprDrive(FileDrive):
     """The scans of one LiDAR of HeLiPR on a drive.
 
     With a `global_*_gt.txt`, W is the UTM grid with a nearer origin, see
-    `evaluation.drives.utm`; else W is the frame of the drive's own
+    `scan_files.to_world`; else W is the frame of the drive's own
     `*_gt.txt`. Points without a return are left out.
     """
 
@@ -94,16 +95,16 @@ class HeliprDrive(FileDrive):
         X_WS, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         if in_utm:
-            X_WS = utm.to_world(X_WS, trajectory.path)
+            X_WS = to_world(X_WS, trajectory.path)
         drive_name = drive.resolve().name
         super().__init__(
             name=f"{drive_name}_{lidar}",
-            world_frame=f"helipr/{utm.DATUM if in_utm else drive_name}",
+            world_frame=f"helipr/{DATUM if in_utm else drive_name}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
             notes=notes,
-            datum=utm.DATUM if in_utm else None,
+            datum=DATUM if in_utm else None,
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:

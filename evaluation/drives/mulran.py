@@ -14,12 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
-from evaluation.drives import utm
 from evaluation.drives.scan_files import (
+    DATUM,
     FileDrive,
     keep_spanned,
     list_stamped,
     read_packed,
+    to_world,
 )
 from evaluation.drives.text_tables import read_matrices
 
@@ -51,7 +52,7 @@ _X_BS = poses.make_pose(
 class MulranDrive(FileDrive):
     """A drive of MulRan.
 
-    W is the UTM grid with a nearer origin, see `evaluation.drives.utm`.
+    W is the UTM grid with a nearer origin, see `scan_files.to_world`.
     The pose of a scan is interpolated at its stamp. Points without a return,
     which are stored as (0, 0, 0), are left out. A complete scan has the fields
     `ring` and `t` [ns since the stamp] beside the stored ones. A scan with too
@@ -79,12 +80,12 @@ class MulranDrive(FileDrive):
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(
             name=path.resolve().name,
-            world_frame=f"mulran/{utm.DATUM}",
+            world_frame=f"mulran/{DATUM}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
-            X_WS=utm.to_world(X_UB, trajectory.path) @ _X_BS,
+            X_WS=to_world(X_UB, trajectory.path) @ _X_BS,
             notes=notes,
-            datum=utm.DATUM,
+            datum=DATUM,
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:

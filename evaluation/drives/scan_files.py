@@ -13,6 +13,43 @@ from cns_drake.base.points import FARTHEST_RETURN
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
+DATUM = "utm-52n"
+
+# Easting, northing and height of the origin of W [m]. It is in Daejeon. Its
+# coordinates are multiples of the voxel size, so that voxels have the same
+# borders as on the UTM grid.
+ORIGIN = (350_000.0, 4_020_000.0, 0.0)
+
+# Ranges of easting and northing on the northern half of the Earth.
+_LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
+
+
+def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
+    """Returns poses X_WB (N, 4, 4) from poses in the UTM grid U, zone 52N.
+
+    W has its axes east, north and up, and its origin at a fixed point of that
+    grid near the drives of MulRan and HeLiPR. Coordinates are a few kilometres
+    instead of thousands: a float32 resolves them to under a millimetre, but
+    easting and northing to 0.25 m.
+
+    Raises:
+        InputError: if a position cannot be in UTM metres.
+    """
+    p_UB = X_UB[:, :3, 3]
+    for axis, (name, limits) in enumerate(
+        zip(("easting", "northing"), _LIMITS, strict=True)
+    ):
+        bad = (p_UB[:, axis] < limits[0]) | (p_UB[:, axis] > limits[1])
+        if bad.any():
+            first = int(np.flatnonzero(bad)[0])
+            raise InputError(
+                f"{path}: {name}: {p_UB[first, axis]:g} m of pose {first + 1}"
+                " is no UTM coordinate"
+            )
+    X_WB = X_UB.copy()
+    X_WB[:, :3, 3] -= ORIGIN
+    return X_WB
+
 
 class FileDrive(Drive):
     """A drive with one file for each scan; the poses are in memory."""

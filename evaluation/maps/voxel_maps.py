@@ -81,53 +81,21 @@ def move(
 
 
 @compiled
-def locate(
-    points: np.ndarray,
-    number: int,
-    X: np.ndarray,
-    voxel_size: float,
-    divisions: int,
-    located: np.ndarray,
-    parts: np.ndarray,
-) -> None:
-    """Locates points in voxels, and in parts of voxels.
-
-    Args:
-        points: (3, N) in the frame of a sensor [m].
-        number: number of the points to locate, the first ones.
-        X: (4, 4) its pose in the world, which is lifted so that voxels begin at
-            height 0.
-        voxel_size: length of a voxel's side [m].
-        divisions: divisions of a side into parts; 0 for no parts.
-        located: (3, 3, N) to fill, for each axis with the place in that world
-            [m], the number of the voxel, and the distance from its corner [m].
-        parts: (N,) float64 to fill with the number of the part.
-    """
-    scale = divisions / voxel_size
-    last = np.float64(divisions - 1)
-    for axis in range(3):
-        a, b, c, d = X[axis, 0], X[axis, 1], X[axis, 2], X[axis, 3]
-        for i in range(number):
-            place = a * points[0, i] + b * points[1, i] + c * points[2, i] + d
-            cell = np.floor(place / voxel_size)
-            located[axis, 0, i] = place
-            located[axis, 1, i] = cell
-            located[axis, 2, i] = place - cell * voxel_size
-    if divisions > 0:
-        for i in range(number):
-            # Rounding may put a point on an end just outside; -0.1 becomes 0.
-            part = min(np.trunc(located[0, 2, i] * scale), last)
-            for axis in range(1, 3):
-                place = min(np.trunc(located[axis, 2, i] * scale), last)
-                part = part * divisions + place
-            parts[i] = part
+def _locate(
+    p: tuple[float, float, float], X: np.ndarray, voxel_size: float
+) -> tuple[float, float, float]:
+    """Returns a place along an axis, its voxel, and its offset in it [m]."""
+    place = X[0] * p[0] + X[1] * p[1] + X[2] * p[2] + X[3]
+    cell = np.floor(place / voxel_size)
+    return place, cell, place - cell * voxel_size
 
 
 @compiled
 def enter(
-    located: np.ndarray,
-    parts: np.ndarray,
+    points: np.ndarray,
     number: int,
+    X: np.ndarray,
+    voxel_size: float,
     divisions: int,
     table: np.ndarray,
     size: int,
@@ -135,26 +103,33 @@ def enter(
     samples: np.ndarray,
     num_samples: int,
 ) -> tuple[int, int, int]:
-    """Enters points into a table.
+    """Enters points into a table of voxels.
 
     Args:
-        located: (3, 3, N), see `locate`.
-        parts: (N,), likewise.
+        points: (3, N) in the frame of a sensor [m].
         number: number of the points to enter, the first ones.
+        X: (4, 4) its pose in the world, which is lifted so that voxels begin at
+            height 0.
+        voxel_size: length of a voxel's side [m].
         divisions: parts of a voxel's side; 0 for no samples.
         table: (S,) of `SLOT`, with room for all.
         size: number of its voxels up to now.
         sampled: (S, B) uint8, a bit for each part of a slot's voxel: whether it
             has a sample.
-        samples: (K, 3) to add to, with room for all.
+        samples: (K, 3) to add to, with room for all, in that world [m].
         num_samples: number of them up to now.
 
     Returns:
         New size and number of samples, and how many points were skipped.
     """
+    scale = divisions / voxel_size
+    last = np.float64(divisions - 1)
     skipped = 0
     for i in range(number):
-        fx, fy, fz = located[0, 1, i], located[1, 1, i], located[2, 1, i]
+        p = points[0, i], points[1, i], points[2, i]
+        x, fx, sx = _locate(p, X[0], voxel_size)
+        y, fy, sy = _locate(p, X[1], voxel_size)
+        z, fz, sz = _locate(p, X[2], voxel_size)
         # A comparison with NaN is false.
         if not (
             abs(fx) < FARTHEST and abs(fy) < FARTHEST and abs(fz) < FARTHEST
@@ -170,18 +145,22 @@ def enter(
             voxel.iz = iz
             size += 1
         voxel.count += 1
-        voxel.sx += located[0, 2, i]
-        voxel.sy += located[1, 2, i]
-        voxel.sz += located[2, 2, i]
+        voxel.sx += sx
+        voxel.sy += sy
+        voxel.sz += sz
         if divisions > 0:
-            part = np.uint64(parts[i])
+            # Rounding may put a point on an end just outside; -0.1 becomes 0.
+            parts = min(np.trunc(sx * scale), last)
+            parts = parts * divisions + min(np.trunc(sy * scale), last)
+            parts = parts * divisions + min(np.trunc(sz * scale), last)
+            part = np.uint64(parts)
             byte = part >> np.uint64(3)
             bit = np.uint8(np.uint64(1) << (part & np.uint64(7)))
             if not sampled[slot, byte] & bit:
                 sampled[slot, byte] |= bit
-                samples[num_samples, 0] = located[0, 0, i]
-                samples[num_samples, 1] = located[1, 0, i]
-                samples[num_samples, 2] = located[2, 0, i]
+                samples[num_samples, 0] = x
+                samples[num_samples, 1] = y
+                samples[num_samples, 2] = z
                 num_samples += 1
     return size, num_samples, skipped
 
@@ -269,8 +248,6 @@ class VoxelAccumulator:
         self._num_samples = 0
         self._num_ignored = 0
         self._columns = np.zeros((3, _BATCH))
-        self._located = np.empty((3, 3, _BATCH))
-        self._parts = np.empty(_BATCH)
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
         """Adds a cloud.
@@ -294,19 +271,11 @@ class VoxelAccumulator:
                 for column, name in zip(self._columns, "xyz", strict=True):
                     column[: len(batch)] = batch[name]
             self._reserve(len(batch))
-            locate(
+            self._size, self._num_samples, skipped = enter(
                 self._columns,
                 len(batch),
                 X,
                 self._voxel_size,
-                self._divisions,
-                self._located,
-                self._parts,
-            )
-            self._size, self._num_samples, skipped = enter(
-                self._located,
-                self._parts,
-                len(batch),
                 self._divisions,
                 self._table,
                 self._size,

@@ -9,11 +9,10 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from evaluation.drives.query_sensor import QuerySensor
-from evaluation.drives.sampling import gather, sample_frames
+from evaluation.drives.sampling import QuerySensor, gather, sample_frames
 from evaluation.methods.method import Method
+from evaluation.recognition.metrics import route_blocks
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.resampling import route_blocks
 
 # The role of a drive.
 Role = Literal["places", "queries"]

@@ -20,18 +20,310 @@ among their N best places.
 """
 
 from dataclasses import dataclass
+import math
 from typing import Literal
 
 import numpy as np
+from scipy.special import stdtr, stdtrit
 
-from evaluation.recognition.pr_curve import PrCurve, pr_curve
+from evaluation.drives.sampling import travelled
 from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.resampling import Interval, bootstrap_intervals
 
+# Length of a block of the route [m].
+BLOCK_LENGTH = 100.0
+_SAMPLES = 1000
+_CONFIDENCE = 0.95
 Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
 
 MAX_RANK = 25
+
+
+@dataclass(frozen=True)
+class PrCurve:
+    """Precision over recall at every distinct score, best scores first.
+
+    Attributes:
+        thresholds: (K,) scores from which on a place is accepted,
+            decreasing.
+        true_positives: (K,) TP at each.
+        false_positives: (K,) FP.
+        false_negatives: (K,) FN.
+    """
+
+    thresholds: np.ndarray
+    true_positives: np.ndarray
+    false_positives: np.ndarray
+    false_negatives: np.ndarray
+
+    @property
+    def precision(self) -> np.ndarray:
+        """(K,); every threshold accepts at least one query."""
+        return self.true_positives / (
+            self.true_positives + self.false_positives
+        )
+
+    @property
+    def recall(self) -> np.ndarray:
+        """(K,); 0 if there is nothing to recall."""
+        return recall_of(self.true_positives, self.false_negatives)
+
+    @property
+    def f1(self) -> np.ndarray:
+        """(K,) 2 TP / (2 TP + FP + FN)."""
+        return 2.0 * self.true_positives / (self.true_positives + self.counted)
+
+    @property
+    def counted(self) -> np.ndarray:
+        """(K,) T = TP + FP + FN."""
+        return self.true_positives + self.false_positives + self.false_negatives
+
+    @property
+    def auc(self) -> float:
+        """Area under the curve, by trapezoids over the recalls it reaches.
+
+        From recall 0 to its first point the curve keeps that point's
+        precision. 0 if nothing is ever accepted.
+        """
+        return float(areas_under(self.precision[None], self.recall[None])[0])
+
+    def strict_auc(self, num_with_match: int) -> float:
+        """Returns the area over recall = TP / N.
+
+        N, the number of queries with a match, includes those whose accepted
+        place is wrong; TP / (TP + FN) reaches 1 whatever they are.
+        """
+        recall = recall_of(
+            self.true_positives, num_with_match - self.true_positives
+        )
+        return float(areas_under(self.precision[None], recall[None])[0])
+
+    @property
+    def recall_at_full_precision(self) -> float:
+        """Greatest recall without a false positive; 0 if none."""
+        return float(self.recall[self.false_positives == 0].max(initial=0.0))
+
+
+def pr_curve(outcomes: QueryOutcomes) -> PrCurve:
+    """Returns the exact curve of queries, all of which count."""
+    thresholds, tp, fp, fn = weighted_counts(
+        outcomes, np.ones((1, len(outcomes)))
+    )
+    return PrCurve(
+        thresholds, *(row[0].astype(np.int64) for row in (tp, fp, fn))
+    )
+
+
+def weighted_counts(
+    outcomes: QueryOutcomes, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Counts TP, FP and FN at every distinct score, queries weighted.
+
+    Args:
+        outcomes: outcomes of Q queries.
+        weights: (B, Q) how often each query counts, in each of B samples.
+
+    Returns:
+        (K,) thresholds, decreasing; (B, K) TP; (B, K) FP; (B, K) FN.
+    """
+    answered = np.flatnonzero(~np.isnan(outcomes.best_scores))
+    order = answered[np.argsort(-outcomes.best_scores[answered], kind="stable")]
+    scores = outcomes.best_scores[order]
+    # The last query of each group of equal scores: all of them are accepted
+    # together.
+    is_last = np.ones(len(scores), dtype=bool)
+    is_last[:-1] = scores[1:] != scores[:-1]
+    ends = np.flatnonzero(is_last)
+
+    def accepted(counts: np.ndarray) -> np.ndarray:
+        return np.cumsum(weights[:, order] * counts[order], axis=1)[:, ends]
+
+    tp = accepted(outcomes.is_right)
+    fp = accepted(~outcomes.is_right)
+    with_match = (weights * outcomes.has_match).sum(axis=1, keepdims=True)
+    fn = with_match - accepted(outcomes.has_match)
+    return scores[ends], tp, fp, fn
+
+
+def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
+    """Returns the areas (B,) under curves (B, K), K possibly 0."""
+    if precision.shape[1] == 0:
+        return np.zeros(len(precision))
+    start = precision[:, 0] * recall[:, 0]
+    heights = 0.5 * (precision[:, 1:] + precision[:, :-1])
+    widths = np.diff(recall, axis=1)
+    return start + (heights * widths).sum(axis=1)
+
+
+def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
+    """Returns TP / (TP + FN), 0 if there is nothing to recall."""
+    return tp / np.maximum(tp + fn, 1)
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A confidence interval."""
+
+    low: float
+    high: float
+
+
+def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Returns the block (Q,) of the route in which each query lies.
+
+    Args:
+        positions: (N, 3) of the sensor along the drive [m].
+        frames: (Q,) of the queries.
+    """
+    passed = travelled(positions)[frames] / BLOCK_LENGTH
+    return np.floor(passed).astype(np.int64)
+
+
+def resampled_weights(
+    num_queries: int, seed: int = 0, blocks: np.ndarray | None = None
+) -> np.ndarray:
+    """Returns how often each query counts in each sample of a bootstrap.
+
+    Right and wrong correlate along a drive: whole blocks of queries are drawn
+    with replacement (Kuensch, Annals of Statistics 17, 1989; here they do not
+    overlap).
+
+    Args:
+        num_queries: Q, one or more.
+        seed: of the drawing; equal ones draw the same queries.
+        blocks: (Q,) the block of each query; whole blocks are drawn, as many
+            as there are. Each query is a block by default, and on a route
+            that is shorter than two blocks.
+
+    Returns:
+        (B, Q) float64 counts; without blocks, each row of sum Q.
+    """
+    number, of_query = num_queries, np.arange(num_queries)
+    if blocks is not None:
+        known, of_query = np.unique(blocks, return_inverse=True)
+        number = len(known)
+        if number == 1:
+            return resampled_weights(num_queries, seed)
+    rng = np.random.default_rng([seed, number])
+    draws = rng.integers(number, size=(_SAMPLES, number))
+    return np.stack(
+        [np.bincount(draw, minlength=number)[of_query] for draw in draws]
+    ).astype(np.float64)
+
+
+def resampled_metrics(
+    outcomes: QueryOutcomes, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns AUC (B,) and R@1 (B,) of samples of the queries.
+
+    Args:
+        outcomes: outcomes of Q queries, all of which count.
+        weights: (B, Q) how often each does in each sample.
+    """
+    _, tp, fp, fn = weighted_counts(outcomes, weights)
+    # Nothing is accepted before a sample's first query; there the curve keeps
+    # the precision of its first point.
+    with np.errstate(invalid="ignore"):
+        precision = tp / (tp + fp)
+    areas = areas_under(_filled_from_right(precision), recall_of(tp, fn))
+    with np.errstate(invalid="ignore"):
+        recalls = (weights * outcomes.is_right).sum(axis=1) / (
+            weights * outcomes.has_match
+        ).sum(axis=1)
+    return areas, recalls
+
+
+def percentile_interval(samples: np.ndarray) -> Interval:
+    """Returns the interval of 95 % of the samples; NaN do not count."""
+    known = samples[~np.isnan(samples)]
+    if len(known) == 0:
+        return Interval(math.nan, math.nan)
+    tail = 0.5 * (1.0 - _CONFIDENCE)
+    low, high = np.quantile(known, [tail, 1.0 - tail])
+    return Interval(float(low), float(high))
+
+
+def bootstrap_intervals(
+    outcomes: QueryOutcomes, seed: int
+) -> tuple[Interval, Interval]:
+    """Returns percentile intervals of AUC and R@1 over resampled blocks."""
+    if len(outcomes) == 0:
+        nothing = Interval(math.nan, math.nan)
+        return nothing, nothing
+    weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
+    areas, recalls = resampled_metrics(outcomes, weights)
+    return percentile_interval(areas), percentile_interval(recalls)
+
+
+def _filled_from_right(values: np.ndarray) -> np.ndarray:
+    """Returns rows whose leading NaNs are replaced by the first number.
+
+    A row without any number becomes zeros.
+    """
+    if values.shape[1] == 0:
+        return values
+    known = ~np.isnan(values)
+    first = known.argmax(axis=1)
+    rows = np.arange(len(values))
+    start = np.where(known.any(axis=1), values[rows, first], 0.0)
+    return np.where(known, values, start[:, None])
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The difference of two areas under precision-recall curves.
+
+    Attributes:
+        value: the first less the second.
+        interval: 95 % interval.
+        p_value: two-sided, of no difference; NaN with a single block.
+    """
+
+    value: float
+    interval: Interval
+    p_value: float
+
+
+def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
+    """Compares two methods on the same queries (mode all).
+
+    The bootstrap draws the same blocks for both. Its deviation, corrected for
+    the number n of blocks, gives a t test of n - 1 degrees of freedom, whose
+    small p-values do not end at the number of samples.
+
+    Args:
+        first: outcomes of Q queries.
+        second: outcomes of the same queries, in the same blocks.
+    """
+    value = pr_curve(first).auc - pr_curve(second).auc
+    blocks = first.blocks
+    number = len(first) if blocks is None else len(np.unique(blocks))
+    if number < 2:
+        return Difference(value, Interval(math.nan, math.nan), math.nan)
+    weights = resampled_weights(len(first), blocks=blocks)
+    samples = (
+        resampled_metrics(first, weights)[0]
+        - resampled_metrics(second, weights)[0]
+    )
+    spread = float(samples.std()) * math.sqrt(number / (number - 1))
+    margin = float(stdtrit(number - 1, 0.975)) * spread
+    p_value = 1.0
+    if spread > 0.0:
+        p_value = 2.0 * float(stdtr(number - 1, -abs(value) / spread))
+    return Difference(value, Interval(value - margin, value + margin), p_value)
+
+
+def holm(p_values: np.ndarray) -> np.ndarray:
+    """Returns p-values (N,) corrected for their number, by Holm's method.
+
+    NaN stay, and do not count.
+    """
+    known = np.flatnonzero(~np.isnan(p_values))
+    order = known[np.argsort(p_values[known], kind="stable")]
+    steps = p_values[order] * np.arange(len(order), 0, -1)
+    result = np.full(len(p_values), math.nan)
+    result[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
+    return result
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,15 @@ from cns_drake.base.progress import Track, silent
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
     MODES,
+    Interval,
     Mode,
     PlaceRecognitionMetrics,
     evaluate,
+    pr_curve,
 )
 from evaluation.recognition.pose_errors import PoseMetrics, pose_metrics
-from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
-from evaluation.recognition.resampling import Interval
 from evaluation.recognition.retrieval import Retrieval, retrieve
 
 # Radii of a match for which AUC is computed as well [m].

@@ -12,7 +12,7 @@ from cns_drake.base.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
-    from evaluation.drives.query_sensor import QuerySensor
+    from evaluation.drives.sampling import QuerySensor
     from evaluation.methods.method import Method, PlaceScan
 
 
@@ -116,7 +116,7 @@ class RetrievalProtocol:
         """Returns the sensor of a query; None for the recorded one."""
         if not self._changes_queries:
             return None
-        from evaluation.drives.query_sensor import QuerySensor
+        from evaluation.drives.sampling import QuerySensor
 
         return QuerySensor.draw(
             self.seed,

@@ -15,16 +15,16 @@ from scipy.stats import kendalltau
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_number
-from evaluation.recognition.pr_curve import pr_curve
-from evaluation.recognition.protocol import PROTOCOL_NAMES
-from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.resampling import (
+from evaluation.recognition.metrics import (
     Interval,
     percentile_interval,
+    pr_curve,
     resampled_metrics,
     resampled_weights,
     route_blocks,
 )
+from evaluation.recognition.protocol import PROTOCOL_NAMES
+from evaluation.recognition.query_outcomes import QueryOutcomes
 
 _NEEDED = ("map", "db", "query", "method", "correct", "has_match", "score")
 # Columns of a table of queries that name the pair of drives.

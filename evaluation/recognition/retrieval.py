@@ -125,54 +125,32 @@ def compare(
     Raises:
         InputError: if the method returns an invalid result.
     """
-    (found,) = _compare(
-        method,
-        database,
-        query,
-        protocol,
-        [protocol.gate_radius],
-        track,
-        overlaps,
+    radii = [protocol.gate_radius]
+    (found,) = compare_with_gates(
+        method, database, query, protocol, radii, track, overlaps
     )
     return found
 
 
-def compare_both_ways(
-    method: Method,
-    database: DescribedDrive,
-    query: DescribedDrive,
-    protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
-    track: Track = silent,
-) -> tuple[Retrieval, Retrieval]:
-    """Scores queries once; returns them without the gate, and with it.
-
-    Args:
-        method: see `compare`.
-        database: likewise.
-        query: likewise.
-        protocol: likewise; whether it has a gate does not matter.
-        track: reports progress.
-
-    Raises:
-        InputError: if the method returns an invalid result.
-    """
-    radii = [None, protocol.radius]
-    without, with_gate = _compare(
-        method, database, query, protocol, radii, track
-    )
-    return without, with_gate
-
-
-def _compare(
+def compare_with_gates(
     method: Method,
     database: DescribedDrive,
     query: DescribedDrive,
     protocol: RetrievalProtocol,
     gate_radii: Collection[float | None],
-    track: Track,
+    track: Track = silent,
     overlaps: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Returns what is retrieved with each gate; None is no gate."""
+    """Scores queries once; returns what is retrieved with each gate.
+
+    Args:
+        method, database, query, track, overlaps: see `compare`.
+        protocol: likewise; whether it has a gate does not matter.
+        gate_radii: radius of each gate [m]; None is no gate.
+
+    Raises:
+        InputError: if the method returns an invalid result.
+    """
     places, queries = database.places, query.queries
     is_known = _known_places(database, query, protocol)
     indexed = method.build_database(places.descriptors)

@@ -12,15 +12,15 @@ import math
 
 import numpy as np
 
-from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.resampling import (
+from evaluation.recognition.metrics import (
     Interval,
     percentile_interval,
     resampled_metrics,
     resampled_weights,
 )
+from evaluation.recognition.place_recognition import RecognitionResult
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.query_outcomes import QueryOutcomes
 
 
 @dataclass(frozen=True)

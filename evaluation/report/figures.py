@@ -19,8 +19,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
-from evaluation.change.tcr import TAU, TemporalChange
-from evaluation.geometry.hull import in_convex_hull
+from evaluation.change.tcr import TAU, TemporalChange, in_convex_hull
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.report.drawing import PIXELS, Legend, plain, save, unit
 

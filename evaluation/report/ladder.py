@@ -16,15 +16,15 @@ from matplotlib.patches import Rectangle
 import numpy as np
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.recognition.pr_curve import pr_curve
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.resampling import (
+from evaluation.recognition.metrics import (
     Interval,
     percentile_interval,
+    pr_curve,
     resampled_metrics,
     resampled_weights,
 )
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.rung_outcome import FAULTS, RungOutcome
 from evaluation.recognition.survival import Kept, kept_share
 from evaluation.report.drawing import plain, save

@@ -18,17 +18,19 @@ from scipy.spatial.transform import Rotation
 
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
-from evaluation.recognition.differences import (
-    Difference,
-    auc_difference,
-    holm,
-)
 from evaluation.recognition.fault_kinds import (
     FAULT_KINDS,
     PairEvidence,
     fault_kinds,
 )
-from evaluation.recognition.metrics import MODES, Mode, PlaceRecognitionMetrics
+from evaluation.recognition.metrics import (
+    MODES,
+    Difference,
+    Mode,
+    PlaceRecognitionMetrics,
+    auc_difference,
+    holm,
+)
 from evaluation.recognition.place_recognition import RADII, RecognitionResult
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import (

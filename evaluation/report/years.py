@@ -11,9 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
+from evaluation.recognition.metrics import Interval, pr_curve
 from evaluation.recognition.pose_errors import pose_success
-from evaluation.recognition.pr_curve import pr_curve
-from evaluation.recognition.resampling import Interval
 from evaluation.recognition.rung_outcome import RungOutcome
 from evaluation.recognition.survival import kept_share, paired_intervals
 from evaluation.report.drawing import method_style, save

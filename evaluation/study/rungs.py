@@ -18,11 +18,11 @@ from evaluation.recognition.description import (
     DescribedScans,
     Role,
 )
+from evaluation.recognition.metrics import pr_curve
 from evaluation.recognition.overlap_truth import best_overlaps
-from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import judge
-from evaluation.recognition.retrieval import compare, compare_both_ways
+from evaluation.recognition.retrieval import compare, compare_with_gates
 from evaluation.recognition.rung_outcome import RungOutcome
 from evaluation.recognition.scoring import score_places
 from evaluation.study.chosen_methods import MethodChoice
@@ -83,7 +83,9 @@ def measure_rung(
             ),
         )
         drives = [one.name for one in known for _ in one.places.frames]
-        both = compare_both_ways(choice.make(), searched, asked, protocol)
+        both = compare_with_gates(
+            choice.make(), searched, asked, protocol, [None, protocol.radius]
+        )
         if overlaps is None:
             overlaps = best_overlaps(
                 place_scans,

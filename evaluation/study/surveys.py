@@ -22,9 +22,8 @@ from cns_drake.base.progress import Track, silent
 from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import MovedDrive, RecentScans
 from evaluation.drives.sampling import cropped, within_range
-from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.thumbnails import thumbnail
-from evaluation.maps.voxel_maps import VoxelMap
+from evaluation.maps.voxel_maps import VOXEL_SIZE, VoxelAccumulator, VoxelMap
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.description import (
     DescribedDrive,
@@ -36,8 +35,45 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
 
+# Divisions of a voxel's side for pictures, with a point in each 0.5 m.
+PICTURE_DIVISIONS = 10
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
+
+
+class MappedDrive(RecentScans):
+    """A drive whose scans enter a map as they are read for the first time.
+
+    Reading and unpacking scans takes longer than mapping them. In nearly
+    increasing order, each scan is read only once.
+    """
+
+    def __init__(self, drive: Drive, kept: int):
+        super().__init__(drive, kept)
+        self._accumulator = VoxelAccumulator(VOXEL_SIZE, PICTURE_DIVISIONS)
+        self._num_mapped = 0
+
+    def scan(self, index: int) -> np.ndarray:
+        while self._num_mapped <= index:
+            self._map_next()
+        return super().scan(index)
+
+    def finish(self, track: Track = silent) -> tuple[VoxelMap, np.ndarray]:
+        """Reads the scans that have not been read yet.
+
+        Returns:
+            The map of all scans on the grid of the TCR, as `map_drive`
+            makes it; a finer cloud of them for pictures (K, 3) in W [m].
+        """
+        left = range(self._num_mapped, len(self))
+        for _ in track(left, f"mapping {self.name}", len(left)):
+            self._map_next()
+        return self._accumulator.to_map(), self._accumulator.samples()
+
+    def _map_next(self) -> None:
+        scan = super().scan(self._num_mapped)
+        self._accumulator.add(scan, self.X_WS[self._num_mapped])
+        self._num_mapped += 1
 
 
 class DriveSource(Protocol):
@@ -355,7 +391,7 @@ class Survey(Step):
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
         found = self.find(self.source(), reporter, missing)
-        self._write(found, missing)
+        self.write(found, missing)
 
     def find(
         self,
@@ -373,52 +409,38 @@ class Survey(Step):
         Raises:
             InputError: see `survey_recording`.
         """
-        wanted = self._described()
-        if missing is not None:
-            wanted = {p: one for p, one in wanted.items() if p in missing}
+
+        def needed(key: str) -> bool:
+            part = self.files.described(key)
+            return bool(self.roles) and (missing is None or part in missing)
+
+        methods, further = self.methods, self.further
         return survey_recording(
             drive,
             self.roles,
-            [
-                one.make()
-                for one in wanted.values()
-                if isinstance(one, MethodChoice)
-            ],
+            [one.make() for one in methods if needed(one.name)],
             self.protocol,
             reporter.track,
             with_scans=self.with_scans,
-            further=[
-                one.request()
-                for one in wanted.values()
-                if isinstance(one, Description)
-            ],
+            further=[one.request() for one in further if needed(one.key)],
         )
 
-    def write(self, found: RecordingSurvey) -> None:
+    def write(
+        self,
+        found: RecordingSurvey,
+        missing: Mapping[Part, Mapping] | None = None,
+    ) -> None:
         """Writes the parts of the survey that were missing.
 
         Raises:
             InputError: a file cannot be written.
         """
-        self._write(found, self._missing())
-
-    def _described(self) -> dict[Part, MethodChoice | Description]:
-        """Returns the part of each description."""
-        if not self.roles:
-            return {}
-        return {
-            **{self.files.described(one.name): one for one in self.methods},
-            **{self.files.described(one.key): one for one in self.further},
-        }
-
-    def _write(
-        self, found: RecordingSurvey, missing: Mapping[Part, Mapping]
-    ) -> None:
-        for part, what in self._described().items():
-            key = what.key if isinstance(what, Description) else what.name
-            if part in missing and key in found.described:
-                # Each value is dropped when it is written.
-                value = found.drive.placed, found.described.pop(key)
+        missing = self._missing() if missing is None else missing
+        for key in list(found.described):
+            part = self.files.described(key)
+            # Each value is dropped when it is written.
+            value = found.drive.placed, found.described.pop(key)
+            if part in missing:
                 part.write(missing[part], value)
         for part, one in (
             (self.files.scans, found.scans),
@@ -445,18 +467,19 @@ class Survey(Step):
             )
 
         own = inputs(self.roles, self.protocol)
-        expected = {}
-        for part, one in self._described().items():
-            if isinstance(one, Description):
-                made_of = inputs(one.roles, one.protocol)
-                identity = one.method.identity()
-            else:
-                made_of, identity = own, one.identity()
-            expected[part] = {**made_of, "method": identity}
-        others = [self.files.fine, self.files.drive]
+        expected = dict.fromkeys([self.files.fine, self.files.drive], own)
         if self.with_scans:
-            others.append(self.files.scans)
-        return _stale({**expected, **dict.fromkeys(others, own)})
+            expected[self.files.scans] = own
+        if self.roles:
+            for choice in self.methods:
+                part = self.files.described(choice.name)
+                expected[part] = {**own, "method": choice.identity()}
+            for one in self.further:
+                expected[self.files.described(one.key)] = {
+                    **inputs(one.roles, one.protocol),
+                    "method": one.method.identity(),
+                }
+        return _stale(expected)
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ import time
 
 from evaluation.drives import open_drive
 from evaluation.drives.sampling import gather
-from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import run
+from evaluation.study.surveys import MappedDrive
 
 
 def measure(label: str, work: Callable, number: int = 1):

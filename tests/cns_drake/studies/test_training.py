@@ -16,8 +16,14 @@ from cns_drake.studies.training import (
     train,
     write_weights,
 )
-from evaluation.methods.learned import Learned, LearnedConfig, LearnedScan
-from evaluation.methods.polar_images import CHANNELS, RINGS, SECTORS
+from evaluation.methods.learned import (
+    CHANNELS,
+    RINGS,
+    SECTORS,
+    Learned,
+    LearnedConfig,
+    LearnedScan,
+)
 
 
 def toy_scans(num_cities=2, num_drives=2, length=60):

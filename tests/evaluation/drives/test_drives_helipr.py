@@ -24,7 +24,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.drives.helipr import HeliprDrive
-from evaluation.drives.utm import ORIGIN
+from evaluation.drives.scan_files import ORIGIN
 
 FIELDS = {
     "Ouster": ("intensity", "t", "reflectivity", "ring", "ambient"),

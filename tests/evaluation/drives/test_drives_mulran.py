@@ -14,7 +14,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import check_same_world, open_drive
-from evaluation.drives.utm import ORIGIN
+from evaluation.drives.scan_files import ORIGIN
 
 # calib_base2ouster: Rz Ry Rx of 0.0001, 0.0003 and 179.6654 degrees.
 X_BS = np.array(

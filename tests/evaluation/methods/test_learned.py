@@ -11,11 +11,13 @@ from evaluation.methods import make_method
 from evaluation.methods.learned import (
     FEATURES,
     LAYERS,
+    RINGS,
+    SECTORS,
     SHIPPED,
     TURNS,
     _infer,
+    polar_image,
 )
-from evaluation.methods.polar_images import RINGS, SECTORS, polar_image
 
 RNG = np.random.default_rng(7)
 

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evaluation.recognition.differences import auc_difference, holm
-from evaluation.recognition.query_outcomes import judge
-from evaluation.recognition.resampling import (
+from evaluation.recognition.metrics import (
+    auc_difference,
     bootstrap_intervals,
+    holm,
     resampled_weights,
     route_blocks,
 )
+from evaluation.recognition.query_outcomes import judge
 
 
 def outcomes_of(scores, is_right, blocks=None):

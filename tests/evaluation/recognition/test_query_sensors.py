@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import make_pose, transform
 from evaluation.drives import open_drive
-from evaluation.drives.query_sensor import QuerySensor
-from evaluation.drives.sampling import gather
+from evaluation.drives.sampling import QuerySensor, gather
 from evaluation.methods import (
     Method,
     MethodConfig,

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 from helpers.small_page import make_content
 import pytest
 
+from evaluation.recognition.metrics import Interval
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.resampling import Interval
 from evaluation.recognition.survival import Kept
 from evaluation.report import survival
 from evaluation.report.page import write_page

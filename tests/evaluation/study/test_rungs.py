@@ -9,9 +9,9 @@ import pytest
 from cns_drake.base.jobs.step import Reporter
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
+from evaluation.recognition.metrics import pr_curve
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
-from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study import rungs
 from evaluation.study.chosen_methods import MethodChoice

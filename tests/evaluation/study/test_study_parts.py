@@ -8,8 +8,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.study.parts import Part
-from evaluation.study.plain_values import decode, encode
+from evaluation.study.parts import Part, decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 
