@@ -33,7 +33,10 @@ from evaluation.command_line.options import (
     Scheduler,
     SensorHeight,
     Settings,
+    aligned,
+    open_noted,
     overlap_of,
+    show,
     with_named_protocol,
     with_protocol,
 )
@@ -101,10 +104,7 @@ def tcr(
             )
     for alignment in alignments:
         terminal.note(alignment.to_text())
-    if json:
-        terminal.print_json(report.to_json())
-    else:
-        terminal.print_rows(_change_rows(report))
+    show(report.to_json(), _change_rows(report), json=json)
 
 
 app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(drives)
@@ -193,8 +193,6 @@ def pr(
     different world frames are aligned.
     """
     from cns_drake.base.errors import InputError
-    from evaluation.alignment import in_one_world
-    from evaluation.drives import open_drive
     from evaluation.recognition import place_recognition
     from evaluation.recognition.overlap_truth import (
         compared_frames,
@@ -223,22 +221,11 @@ def pr(
             f"is not {database}"
         )
     chosen = _chosen_method(method, parameter, sensor_height)
-    places, query_drive = (
-        open_drive(path, lidar) for path in (database, query)
-    )
-    for drive in (places, query_drive):
-        for note in drive.notes:
-            terminal.note(note)
-    alignment = in_one_world(
-        places,
-        query_drive,
-        align.value,
-        terminal.track,
+    places, query_drive = aligned(
+        *open_noted(database, query, lidar=lidar),
+        align,
         across_maps=across_maps,
     )
-    if alignment is not None:
-        places, query_drive = alignment.first, alignment.second
-        terminal.note(alignment.report.to_text())
     exact = None
     if exact_overlaps is not None:
         frames = compared_frames(places, query_drive, protocol)
@@ -265,10 +252,7 @@ def pr(
             f"{query}: every scan finds itself (--exclude-recent leaves out "
             "recent places)"
         )
-    if json:
-        terminal.print_json(result.to_json())
-    else:
-        terminal.print_rows(_recognition_rows(result))
+    show(result.to_json(), _recognition_rows(result), json=json)
 
 
 @app.command(
@@ -433,9 +417,6 @@ def ranking(
     from evaluation.recognition.rank_agreement import rank_agreement
 
     found = rank_agreement(first, second, protocol=protocol)
-    if json:
-        terminal.print_json(found.to_json())
-        return
     rows = [
         (
             method,
@@ -453,9 +434,8 @@ def ranking(
     ]
     low, high = map(terminal.number, (found.interval.low, found.interval.high))
     tau = f"{terminal.number(found.tau)}  (95 %: {low} to {high})"
-    terminal.print_rows(
-        [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
-    )
+    rows = [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
+    show(found.to_json(), rows, json=json)
 
 
 app.command(

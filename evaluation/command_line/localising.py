@@ -16,6 +16,8 @@ from evaluation.command_line.options import (
     Json,
     LidarName,
     Parameters,
+    aligned,
+    show,
 )
 
 
@@ -83,7 +85,6 @@ def localise(
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
     from cns_drake.base.process import num_cores
-    from evaluation.alignment import in_one_world
     from evaluation.drives import Drive, check_same_world
     from evaluation.localisation import localise as queries
     from evaluation.localisation import tracking
@@ -108,10 +109,7 @@ def localise(
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)
     if isinstance(source, Drive):
-        alignment = in_one_world(source, drive, align.value, terminal.track)
-        if alignment is not None:
-            source, drive = alignment.first, alignment.second
-            terminal.note(alignment.report.to_text())
+        source, drive = aligned(source, drive, align)
         check_same_world(source, drive)
     surroundings = make_map(source, settings, terminal.track)
     is_mapped = queries.mapped_frames(source, surroundings, drive)
@@ -150,10 +148,7 @@ def localise(
     if output is not None:
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
-    if json:
-        terminal.print_json(values)
-    else:
-        terminal.print_rows(_rows(values))
+    show(values, _rows(values), json=json)
 
 
 def _rows(values: dict) -> Iterator[tuple[str, str]]:

@@ -1,18 +1,24 @@
-"""Options that several commands share, such as those of the protocol."""
+"""What commands share: options, drives that are opened, results."""
 
-from collections.abc import Callable, Mapping
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from enum import Enum
 import functools
 import inspect
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, PROTOCOLS
+
+if TYPE_CHECKING:
+    from evaluation.drives import Drive
 
 
 class ModeName(str, Enum):
@@ -185,6 +191,42 @@ Costs = Annotated[
         "differ from run to run.",
     ),
 ]
+
+
+def open_noted(*paths: Path, lidar: str | None) -> list[Drive]:
+    """Opens drives, and shows the notes on how they were read."""
+    from evaluation.drives import open_drive
+
+    drives = [open_drive(path, lidar) for path in paths]
+    for drive in drives:
+        for note in drive.notes:
+            terminal.note(note)
+    return drives
+
+
+def aligned(
+    first: Drive, second: Drive, when: AlignName, *, across_maps: bool = False
+) -> tuple[Drive, Drive]:
+    """Returns two drives in one world, with a note if one was moved."""
+    from evaluation.alignment import in_one_world
+
+    alignment = in_one_world(
+        first, second, when.value, terminal.track, across_maps=across_maps
+    )
+    if alignment is None:
+        return first, second
+    terminal.note(alignment.report.to_text())
+    return alignment.first, alignment.second
+
+
+def show(
+    values: Mapping, rows: Iterable[tuple[str, str]], *, json: bool
+) -> None:
+    """Prints values as JSON, or as rows."""
+    if json:
+        terminal.print_json(dict(values))
+    else:
+        terminal.print_rows(rows)
 
 
 def overlap_of(truth: str) -> float | None:

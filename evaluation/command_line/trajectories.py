@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cns_drake.base import terminal
-from evaluation.command_line.options import Align, AlignName, Json, LidarName
+from evaluation.command_line.options import (
+    Align,
+    AlignName,
+    Json,
+    LidarName,
+    aligned,
+    open_noted,
+    show,
+)
 
 if TYPE_CHECKING:
     from evaluation.drives.comparison import DriveComparison
@@ -29,23 +37,11 @@ def drives(
     beside those of two pairs of real drives along one route (Boreas, 28 days
     apart; KAIST 01 and 02 of MulRan).
     """
-    from evaluation.alignment import in_one_world
-    from evaluation.drives import open_drive
     from evaluation.drives.comparison import compare_drives
 
-    a, b = (open_drive(path, lidar) for path in (first, second))
-    for drive in (a, b):
-        for note in drive.notes:
-            terminal.note(note)
-    alignment = in_one_world(a, b, align.value, terminal.track)
-    if alignment is not None:
-        a, b = alignment.first, alignment.second
-        terminal.note(alignment.report.to_text())
-    found = compare_drives(a, b)
-    if json:
-        terminal.print_json(found.to_json())
-    else:
-        terminal.print_rows(_drive_rows(found))
+    pair = aligned(*open_noted(first, second, lidar=lidar), align)
+    found = compare_drives(*pair)
+    show(found.to_json(), _drive_rows(found), json=json)
 
 
 def trajectory(
@@ -75,23 +71,17 @@ def trajectory(
     100 m of path.
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
-    from evaluation.drives import open_drive
     from evaluation.drives.text_tables import read_tum
 
-    truth = open_drive(drive, lidar)
-    for note in truth.notes:
-        terminal.note(note)
+    (truth,) = open_noted(drive, lidar=lidar)
     errors = trajectory_errors(truth, read_tum(estimate), frame, time_offset)
     if errors.num_outside:
         terminal.note(
             f"{estimate}: {errors.num_outside} poses before or after the drive,"
             " left out"
         )
-    if json:
-        named = {"drive": truth.name, "frame": frame}
-        terminal.print_json(named | errors.to_json())
-    else:
-        terminal.print_rows(errors.to_rows())
+    named = {"drive": truth.name, "frame": frame}
+    show(named | errors.to_json(), errors.to_rows(), json=json)
 
 
 def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:
