@@ -26,6 +26,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtr, stdtrit
 
+from cns_drake.base.json_text import json_number
 from evaluation.drives.sampling import travelled
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
@@ -162,10 +163,17 @@ def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Interval:
-    """A confidence interval."""
+    """A confidence interval; NaN if it is unknown."""
 
-    low: float
-    high: float
+    low: float = math.nan
+    high: float = math.nan
+
+    def to_json(self) -> list[float | None]:
+        """Returns both limits; NaN becomes None."""
+        return [json_number(self.low), json_number(self.high)]
+
+
+UNKNOWN = Interval()
 
 
 def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -237,7 +245,7 @@ def percentile_interval(samples: np.ndarray) -> Interval:
     """Returns the interval of 95 % of the samples; NaN do not count."""
     known = samples[~np.isnan(samples)]
     if len(known) == 0:
-        return Interval(math.nan, math.nan)
+        return UNKNOWN
     tail = 0.5 * (1.0 - _CONFIDENCE)
     low, high = np.quantile(known, [tail, 1.0 - tail])
     return Interval(float(low), float(high))
@@ -248,8 +256,7 @@ def bootstrap_intervals(
 ) -> tuple[Interval, Interval]:
     """Returns percentile intervals of AUC and R@1 over resampled blocks."""
     if len(outcomes) == 0:
-        nothing = Interval(math.nan, math.nan)
-        return nothing, nothing
+        return UNKNOWN, UNKNOWN
     weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
     areas, recalls = resampled_metrics(outcomes, weights)
     return percentile_interval(areas), percentile_interval(recalls)
@@ -299,7 +306,7 @@ def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
     blocks = first.blocks
     number = len(first) if blocks is None else len(np.unique(blocks))
     if number < 2:
-        return Difference(value, Interval(math.nan, math.nan), math.nan)
+        return Difference(value, UNKNOWN, math.nan)
     weights = resampled_weights(len(first), blocks=blocks)
     samples = (
         resampled_metrics(first, weights)[0]

@@ -15,7 +15,6 @@ from cns_drake.base.progress import Track, silent
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
     MODES,
-    Interval,
     Mode,
     PlaceRecognitionMetrics,
     evaluate,
@@ -87,10 +86,10 @@ class PlaceRecognition:
             "query": self.query,
             "auc": metrics.auc,
             "auc_strict": metrics.auc_strict,
-            "auc_interval_95": _interval(metrics.auc_interval),
+            "auc_interval_95": metrics.auc_interval.to_json(),
             "recall_at_1": json_number(metrics.recall_at_1),
             "r1": json_number(metrics.recall_at_1),
-            "recall_at_1_interval_95": _interval(metrics.recall_at_1_interval),
+            "recall_at_1_interval_95": metrics.recall_at_1_interval.to_json(),
             "recall_at_n": [
                 json_number(float(value)) for value in metrics.recall_at_n
             ],
@@ -208,10 +207,6 @@ def judge_retrieval(
         pose=pose_metrics(retrieval.pose_errors, outcomes, metrics),
         protocol=protocol.of(method),
     )
-
-
-def _interval(interval: Interval) -> list[float | None]:
-    return [json_number(interval.low), json_number(interval.high)]
 
 
 @dataclass(frozen=True)

@@ -62,13 +62,13 @@ class RankAgreement:
         """Returns all numbers; NaN becomes None."""
         return {
             "kendall_tau": json_number(self.tau),
-            "interval_95": _limits(self.interval),
+            "interval_95": self.interval.to_json(),
             "methods": {
                 method: {
                     "first": float(one),
                     "second": float(other),
-                    "first_interval_95": _limits(one_interval),
-                    "second_interval_95": _limits(other_interval),
+                    "first_interval_95": one_interval.to_json(),
+                    "second_interval_95": other_interval.to_json(),
                 }
                 for method, one, other, one_interval, other_interval in zip(
                     self.methods,
@@ -80,10 +80,6 @@ class RankAgreement:
                 )
             },
         }
-
-
-def _limits(interval: Interval) -> list[float | None]:
-    return [json_number(interval.low), json_number(interval.high)]
 
 
 def rank_agreement(

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from evaluation.recognition.description import DescribedDrive
+from evaluation.recognition.fault_kinds import NEARLY
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
 
 # Kinds of wrong best places, in order of precedence.
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
-# Within this number of radii a place counts as too far away and not as
-# elsewhere.
-_NEARLY = 2.0
 _HALF = 0.5
 
 
@@ -122,7 +120,7 @@ class RungOutcome:
             ~self.outcomes.has_match,
             self.match_frames < 0,
             np.isnan(self.distances),
-            self.distances <= _NEARLY * radius,
+            self.distances <= NEARLY * radius,
         ]
         return np.where(
             self.outcomes.is_right,

@@ -142,17 +142,7 @@ def _reranked(
     query: np.ndarray,
     places: Sequence[np.ndarray],
 ) -> np.ndarray:
-    """Returns the scores (D,) after the second stage of a method.
-
-    Args:
-        method: that has one.
-        scores: (D,) of its first stage.
-        query: cloud of the query.
-        places: clouds of the D places.
-
-    Raises:
-        InputError: if the method does not return scores.
-    """
+    """Returns the scores (D,) after the second stage of a method."""
     order = ranking(scores)
     num_candidates = int((~np.isnan(scores)).sum())
     best = order[: min(method.rerank_best, num_candidates)]
@@ -167,11 +157,9 @@ def _reranked(
 def _checked(
     method: Method, function: str, scores: object, number: int
 ) -> np.ndarray:
-    """Returns scores (number,) as float64.
+    """Returns scores (number,) as float64; refuses anything else.
 
-    Raises:
-        InputError: if they are not that. A conversion would drop the
-            imaginary part of a complex score and the mask of a masked one.
+    A conversion would drop an imaginary part, or a mask.
     """
     fault = ""
     try:

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from evaluation.recognition.metrics import (
+    UNKNOWN,
     Interval,
     percentile_interval,
     resampled_metrics,
@@ -37,7 +38,7 @@ class Kept:
 
     unchanged: float
     changed: float
-    interval: Interval
+    interval: Interval = UNKNOWN
 
     @property
     def share(self) -> float:
@@ -68,12 +69,11 @@ class Survival:
         """Compares a result with the control's result, if there is one."""
         after = changed.metrics["all"]
         if unchanged is None:
-            unknown = Interval(math.nan, math.nan)
             return cls(
                 changed,
                 None,
-                Kept(math.nan, after.auc, unknown),
-                Kept(math.nan, after.recall_at_1, unknown),
+                Kept(math.nan, after.auc),
+                Kept(math.nan, after.recall_at_1),
             )
         before = unchanged.metrics["all"]
         auc, recall = paired_intervals(
@@ -144,8 +144,7 @@ def paired_intervals(
         zero.
     """
     if len(unchanged) != len(changed) or len(changed) == 0:
-        unknown = Interval(math.nan, math.nan)
-        return unknown, unknown
+        return UNKNOWN, UNKNOWN
     weights = resampled_weights(len(changed), seed, changed.blocks)
     before = resampled_metrics(unchanged, weights)
     after = resampled_metrics(changed, weights)

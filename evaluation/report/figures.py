@@ -7,7 +7,6 @@ Boucheny 2009), which shows shape without normals.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import itertools
 import math
 from pathlib import Path
 
@@ -19,7 +18,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
-from evaluation.change.tcr import TAU, TemporalChange, in_convex_hull
+from evaluation.change.drive_change import ChangeResult
+from evaluation.change.tcr import TAU, in_convex_hull
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.report.drawing import PIXELS, Legend, plain, save, unit
 
@@ -121,38 +121,6 @@ _SMALL_OBLIQUE = View(
 _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 
 
-@dataclass(frozen=True)
-class Stage:
-    """The drawn data of one drive.
-
-    Attributes:
-        name: the stage, e.g. `04`.
-        fine: (K, 3) cloud for pictures, in W [m].
-        coarse: map on the grid of the TCR.
-        positions: (N, 3) where the sensor was [m].
-    """
-
-    name: str
-    fine: np.ndarray
-    coarse: VoxelMap
-    positions: np.ndarray
-
-
-@dataclass(frozen=True)
-class SeenRoute:
-    """A route in its surroundings.
-
-    Attributes:
-        name: the stage, e.g. `04`.
-        view: its surroundings from above.
-        positions: (N, 3) where the sensor was [m].
-    """
-
-    name: str
-    view: Picture
-    positions: np.ndarray
-
-
 def judge_points(
     points: np.ndarray, other: np.ndarray, tau: float = TAU
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -192,27 +160,37 @@ def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
     return render(shown, rgb, _FROM_ABOVE)
 
 
-def draw_routes(map_name: str, routes: Sequence[SeenRoute], stem: Path) -> None:
+def draw_routes(
+    map_name: str,
+    stages: Sequence[str],
+    views: Sequence[Picture],
+    routes: Sequence[np.ndarray],
+    stem: Path,
+) -> None:
     """Draws the routes of a city over their maps, red to blue, from above.
 
     Args:
         map_name: name of the city.
-        routes: one for each of its stages.
+        stages: N names, such as `04`.
+        views: N surroundings of the routes from above.
+        routes: N arrays (M, 3) of where the sensor was [m].
         stem: path to write, without ending.
     """
     _draw_panels(
-        [f"{map_name} {route.name}" for route in routes],
-        [route.view for route in routes],
+        [f"{map_name} {stage}" for stage in stages],
+        views,
         stem,
-        routes=[route.view.project(route.positions) for route in routes],
+        routes=[
+            view.project(route)
+            for view, route in zip(views, routes, strict=True)
+        ],
     )
 
 
 def draw_change(
-    map_name: str,
-    earlier: Stage,
-    later: Stage,
-    change: TemporalChange,
+    result: ChangeResult,
+    clouds: tuple[np.ndarray, np.ndarray],
+    maps: tuple[VoxelMap, VoxelMap],
     stems: tuple[Path, Path],
 ) -> None:
     """Draws what changed between two stages, and the sets behind the TCR.
@@ -224,15 +202,23 @@ def draw_change(
     orders and united; a point has the colour of its voxel.
 
     Args:
-        map_name: name of the city.
-        earlier: stage A.
-        later: stage B.
-        change: from A to B.
+        result: the change.
+        clouds: (K, 3) for pictures, of the earlier and the later stage, in W
+            [m].
+        maps: their maps on the grid of the TCR.
         stems: paths to write, without endings.
     """
-    stages = (earlier, later)
-    _draw_absent(map_name, stages, stems[0])
-    _draw_sets(map_name, stages, change, stems[1])
+    titles, pictures = [], []
+    for one, other in ((0, 1), (1, 0)):
+        absent, in_hull = judge_points(clouds[one], maps[other].centroids_W)
+        rgb = np.full((len(absent), 3), _UNCHANGED, dtype=np.uint8)
+        rgb[absent] = _ABSENT_OUTSIDE
+        rgb[absent & in_hull] = _CHANGED
+        stage, lacking = result.stages[one], result.stages[other]
+        titles.append(f"{result.map_name} {stage}: what {lacking} lacks")
+        pictures.append(_render_shaded(clouds[one], rgb, _OBLIQUE))
+    _draw_panels(titles, pictures, stems[0], CHANGE_LEGEND)
+    _draw_sets(result, clouds, maps, stems[1])
 
 
 def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
@@ -256,45 +242,33 @@ def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
     return owners
 
 
-def _draw_absent(
-    map_name: str, stages: tuple[Stage, Stage], stem: Path
-) -> None:
-    titles, pictures = [], []
-    for stage, other in itertools.permutations(stages):
-        absent, in_hull = judge_points(stage.fine, other.coarse.centroids_W)
-        rgb = np.full((len(absent), 3), _UNCHANGED, dtype=np.uint8)
-        rgb[absent] = _ABSENT_OUTSIDE
-        rgb[absent & in_hull] = _CHANGED
-        titles.append(f"{map_name} {stage.name}: what {other.name} lacks")
-        pictures.append(_render_shaded(stage.fine, rgb, _OBLIQUE))
-    _draw_panels(titles, pictures, stem, CHANGE_LEGEND)
-
-
 def _draw_sets(
-    map_name: str,
-    stages: tuple[Stage, Stage],
-    change: TemporalChange,
+    result: ChangeResult,
+    clouds: tuple[np.ndarray, np.ndarray],
+    maps: tuple[VoxelMap, VoxelMap],
     stem: Path,
 ) -> None:
-    clouds, colours = [stage.fine for stage in stages], []
+    change = result.report.change
     sides = (change.source_to_target, change.target_to_source)
-    for stage, side in zip(stages, sides, strict=True):
-        rgb = np.full((len(stage.coarse), 3), _OUTSIDE_H, dtype=np.uint8)
+    colours = []
+    for cloud, coarse, side in zip(clouds, maps, sides, strict=True):
+        rgb = np.full((len(coarse), 3), _OUTSIDE_H, dtype=np.uint8)
         rgb[side.in_hull] = _ONLY_IN_H
         rgb[side.unchanged] = _IN_O
-        colours.append(rgb[voxel_of_each(stage.fine, stage.coarse)])
-    clouds.append(np.concatenate(clouds))
-    colours.append(np.concatenate(colours))
-    first, last = (stage.name for stage in stages)
+        colours.append(rgb[voxel_of_each(cloud, coarse)])
+    (first, last), name = result.stages, result.map_name
     _draw_panels(
         [
-            f"{map_name} {first} beside {last}: TCR {sides[0].ratio:.4f}",
-            f"{map_name} {last} beside {first}: TCR {sides[1].ratio:.4f}",
-            f"{map_name}, both together: TCR_sym {change.symmetric:.4f}",
+            f"{name} {first} beside {last}: TCR {sides[0].ratio:.4f}",
+            f"{name} {last} beside {first}: TCR {sides[1].ratio:.4f}",
+            f"{name}, both together: TCR_sym {change.symmetric:.4f}",
         ],
         [
             _render_shaded(cloud, rgb, _SMALL_OBLIQUE)
-            for cloud, rgb in zip(clouds, colours, strict=True)
+            for cloud, rgb in (
+                *zip(clouds, colours, strict=True),
+                (np.concatenate(clouds), np.concatenate(colours)),
+            )
         ],
         stem,
         SETS_LEGEND,

@@ -17,6 +17,7 @@ import numpy as np
 
 from cns_drake.base.jobs.fingerprint import fingerprint
 from evaluation.recognition.metrics import (
+    UNKNOWN,
     Interval,
     percentile_interval,
     pr_curve,
@@ -183,7 +184,7 @@ def _row(
     num_queries = len(draws[0].outcomes)
     weights = resampled_weights(num_queries, blocks=draws[0].outcomes.blocks)
     samples = _sampled_auc(draws, weights)
-    share = Interval(math.nan, math.nan)
+    share = UNKNOWN
     if len(unchanged[0].outcomes) == num_queries:
         before = _sampled_auc(unchanged, weights)
         share = percentile_interval(kept_share(samples, before))
@@ -333,15 +334,9 @@ def strongest_causes(rows: Sequence[LadderRow]) -> list[str]:
         rows: rows for all maps.
     """
     shares: dict[str, list[float]] = {}
-    for name in dict.fromkeys(row.rung.map_name for row in rows):
-        of_map = [
-            row
-            for row in rows
-            if row.rung.map_name == name and not row.is_gated
-        ]
-        for row in _strongest(of_map):
-            if not math.isnan(row.kept.share):
-                shares.setdefault(row.rung.cause, []).append(row.kept.share)
+    for row in _strongest(rows).values():
+        if not (row.is_gated or math.isnan(row.kept.share)):
+            shares.setdefault(row.rung.cause, []).append(row.kept.share)
     means = {cause: float(np.mean(kept)) for cause, kept in shares.items()}
     return sorted(means, key=lambda cause: (means[cause], cause))
 
@@ -378,11 +373,7 @@ def crossed_rows(
         rows: rows for all maps, with single causes.
         pairs: rows with two, whose names are joined by "+".
     """
-    strongest: dict[tuple[object, ...], LadderRow] = {}
-    for row in rows:
-        key = row.rung.map_name, row.method, row.is_gated, row.rung.cause
-        if key not in strongest or strongest[key].rung.level < row.rung.level:
-            strongest[key] = row
+    strongest = _strongest(rows)
     found = []
     for pair in pairs:
         drive = pair.rung.map_name, pair.method, pair.is_gated
@@ -393,7 +384,7 @@ def crossed_rows(
         weights = resampled_weights(
             len(pair.outcomes), blocks=pair.outcomes.blocks
         )
-        interval = Interval(math.nan, math.nan)
+        interval = UNKNOWN
         if len({len(part[0].outcomes) for part in draws}) == 1:
             none, *kept = (_sampled_auc(part, weights) for part in draws)
             first, second, both = (kept_share(part, none) for part in kept)
@@ -488,8 +479,9 @@ def _findings(rows: Sequence[LadderRow]) -> str:
         " level, leaves of the AUC without a change (without the gate, 95 %"
         " intervals):"
     )
+    strongest = _strongest(rows).values()
     ungated, gated = (
-        _strongest([row for row in rows if row.is_gated == is_gated])
+        [row for row in strongest if row.is_gated == is_gated]
         for is_gated in (False, True)
     )
     lines = [
@@ -562,14 +554,16 @@ def _differences(
     yield f"The gate changes {other} by {much} or more."
 
 
-def _strongest(rows: Sequence[LadderRow]) -> list[LadderRow]:
-    """Returns the row of the strongest level of each cause and method."""
-    found: dict[tuple[str, str], LadderRow] = {}
+def _strongest(
+    rows: Iterable[LadderRow],
+) -> dict[tuple[str, str, bool, str], LadderRow]:
+    """Returns (map, method, gate, cause) -> row of its strongest level."""
+    found: dict[tuple[str, str, bool, str], LadderRow] = {}
     for row in rows:
-        key = row.rung.cause, row.method
+        key = row.rung.map_name, row.method, row.is_gated, row.rung.cause
         if key not in found or found[key].rung.level < row.rung.level:
             found[key] = row
-    return list(found.values())
+    return found
 
 
 def _cause(row: LadderRow) -> str:

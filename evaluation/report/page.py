@@ -163,7 +163,7 @@ def write_report(report: Report, folder: Path) -> Path:
     if report.costs:
         numbers["costs"] = cost_numbers(report.costs)
     for name, table in numbers.items():
-        _write(folder / f"{name}.csv", table.to_csv())
+        table.write_csv(folder / f"{name}.csv")
         if name not in ("why", "differences") and name in tables:
             forms = {
                 "md": map(_captioned, tables[name]),

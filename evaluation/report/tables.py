@@ -8,12 +8,14 @@ import html
 from itertools import groupby
 import math
 from operator import attrgetter
+from pathlib import Path
 import re
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from cns_drake.base.csv_files import csv_text
+from cns_drake.base.files import completing
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 
 _Item = TypeVar("_Item")
@@ -158,6 +160,15 @@ class Table:
             for row in rows
         )
         return csv_text(header, cells)
+
+    def write_csv(self, path: Path) -> None:
+        """Writes `to_csv`.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        with completing(path) as part:
+            part.write_text(self.to_csv(), encoding="utf-8")
 
     def to_markdown(self) -> str:
         """Returns the table with four decimals, as the paper prints them.

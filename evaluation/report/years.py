@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
-from evaluation.recognition.metrics import Interval, pr_curve
+from evaluation.recognition.metrics import UNKNOWN, Interval, pr_curve
 from evaluation.recognition.pose_errors import pose_success
 from evaluation.recognition.rung_outcome import RungOutcome
 from evaluation.recognition.survival import kept_share, paired_intervals
@@ -125,7 +125,7 @@ def year_rows(pairs: Sequence[AgedPair]) -> list[YearRow]:
             math.nan
             if task == MAP_TASK
             else today[pair.map_name][task, method][0],
-            Interval(math.nan, math.nan),
+            UNKNOWN,
             math.nan,
             math.nan,
             number,
@@ -138,7 +138,6 @@ def year_rows(pairs: Sequence[AgedPair]) -> list[YearRow]:
 def _rows(
     pair: AgedPair, now: RungOutcome, then: RungOutcome
 ) -> Iterable[YearRow]:
-    unknown = Interval(math.nan, math.nan)
     interval, _ = paired_intervals(then.outcomes, now.outcomes)
     r1 = now.outcomes.recall_at(1)
     hidden = _hidden(now) - _hidden(then)
@@ -147,7 +146,7 @@ def _rows(
     poses = [pose_success(o.pose_errors, o.outcomes) for o in (now, then)]
     values = {"place": (auc, auc_then, interval)}
     if not math.isnan(poses[1]):
-        values["pose"] = (poses[0], poses[1], unknown)
+        values["pose"] = (poses[0], poses[1], UNKNOWN)
     for task, (value, today, kept) in values.items():
         yield YearRow(
             pair,

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from cns_drake.base.files import make_folder
 from evaluation.change.drive_change import symmetric_changes
-from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.survival import Survival
 from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
@@ -122,25 +121,21 @@ def _collect(
     )
     for pair in pairs:
         control = city.unchanged_pair(*pair)
+        results = files.recognition(*(one.name for one in pair))
+        beside = control and files.recognition(*(one.name for one in control))
         for method in methods:
-            changed = _read_recognition(pair, method.name, files)
+            changed = results.result(method.name).read()
             if pair[0] is pair[1]:
                 if changed is not None:
                     closures.append(changed)
                 continue
-            assert changed is not None  # Only loops may be missing.
-            unchanged = None
-            if control is not None:
-                unchanged = _read_recognition(control, method.name, files)
+            unchanged = beside and beside.result(method.name).read()
             survivals.append(Survival.of(changed, unchanged))
         for again in city.repetitions(pair, methods, protocol):
-            found = _read_recognition(pair, again.key, files)
-            assert found is not None
-            report.repeated.append(found)
-        names = pair[0].name, pair[1].name
-        evidence = files.recognition(*names).evidence.read()
+            report.repeated.append(results.result(again.key).read())
+        evidence = results.evidence.read()
         if evidence is not None:
-            report.evidence[names] = evidence
+            report.evidence[pair[0].name, pair[1].name] = evidence
         for drive in (*pair, *(control or ())):
             if drive.name in report.tracks:
                 continue
@@ -156,20 +151,3 @@ def _collect(
     report.recognitions += compared
     report.drives.update(files.page_drives(city.name).read())
     report.illustrations += illustrations(city, files.figures)
-
-
-def _read_recognition(
-    pair: tuple[RecordingInfo, RecordingInfo],
-    key: str,
-    files: StudyFiles,
-) -> RecognitionResult | None:
-    """Returns a result; None for a drive that closes no loop.
-
-    Args:
-        pair: database and query.
-        key: name of the method, or a `described_key`.
-        files: those of the study.
-    """
-    database, query = pair
-    results = files.recognition(database.name, query.name)
-    return results.result(key).read()

@@ -8,8 +8,6 @@ from evaluation.report.drawing import PIXELS
 from evaluation.report.figures import (
     CHANGE_LEGEND,
     SETS_LEGEND,
-    SeenRoute,
-    Stage,
     draw_change,
     draw_routes,
     top_view,
@@ -36,18 +34,20 @@ def draw_city(
         stages: the name of each, and its drive's `SurveyedDrive` and cloud.
         stem: path of the figure, without ending.
     """
-    routes, drives = [], {}
+    names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine) in enumerate(stages):
         reporter.progress(done, len(stages) + 1)
         drive = surveyed.read()
         view = top_view(fine.read(), drive.positions)
-        routes.append(SeenRoute(name, view, drive.positions))
+        names.append(name)
+        views.append(view)
+        routes.append(drive.positions)
         drives[drive.name] = make_drive(
             drive.name, view, drive.X_WS, drive.frames, drive.thumbnails
         )
     reporter.progress(len(stages), len(stages) + 1)
     make_folder(stem.parent)
-    draw_routes(map_name, routes, stem)
+    draw_routes(map_name, names, views, routes, stem)
     return drives
 
 
@@ -67,14 +67,14 @@ def draw_changes(
         stems: paths of the two figures, without endings.
     """
     del reporter
-    result = change.read()
-    shown = []
-    for name, (surveyed, fine) in zip(result.stages, drives, strict=True):
-        drive = surveyed.read()
-        shown.append(Stage(name, fine.read(), drive.coarse, drive.positions))
+    earlier, later = drives
     make_folder(stems[0].parent)
-    earlier, later = shown
-    draw_change(result.map_name, earlier, later, result.report.change, stems)
+    draw_change(
+        change.read(),
+        (earlier[1].read(), later[1].read()),
+        (earlier[0].read().coarse, later[0].read().coarse),
+        stems,
+    )
 
 
 def figure_files(*stems: Path) -> tuple[Path, ...]:
@@ -125,28 +125,28 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
     ]
     for pair in city.change_pairs():
         first, last = (one.stage for one in pair)
-        change, sets = change_stems(city, pair)
-        shown.append(
+        titles = (
+            f"What changed in {city.name} between {first} and {last}",
+            f"What TCR_sym counts in {city.name}: {first} beside {last},"
+            f" {last} beside {first}, both together",
+        )
+        shown += [
             Illustration(
-                folder / change,
-                f"What changed in {city.name} between {first} and {last}",
+                folder / stem,
+                title,
                 _PAGE_KIND,
                 section="change",
-                num_panels=2,
-                legend=CHANGE_LEGEND,
+                num_panels=num_panels,
+                legend=legend,
             )
-        )
-        shown.append(
-            Illustration(
-                folder / sets,
-                f"What TCR_sym counts in {city.name}: {first} beside {last},"
-                f" {last} beside {first}, both together",
-                _PAGE_KIND,
-                section="change",
-                num_panels=3,
-                legend=SETS_LEGEND,
+            for stem, title, num_panels, legend in zip(
+                change_stems(city, pair),
+                titles,
+                (2, 3),
+                (CHANGE_LEGEND, SETS_LEGEND),
+                strict=True,
             )
-        )
+        ]
     num_pairs = len(city.recognition_pairs())
     if num_pairs:
         shown.append(

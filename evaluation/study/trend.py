@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 import numpy as np
 from scipy.stats import rankdata
 
-from cns_drake.base.files import completing, make_folder
+from cns_drake.base.files import make_folder
+from evaluation.recognition.metrics import percentile_interval
 from evaluation.recognition.protocol import check_one_protocol
 from evaluation.report.drawing import method_entry, method_style, save
 from evaluation.report.tables import (
@@ -52,7 +53,6 @@ _CHANGES = {
     "tcr_sym": r"TCR$_\mathrm{sym}$",
     "visible_change": "visible change",
 }
-_CONFIDENCE = (2.5, 97.5)
 
 
 def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
@@ -79,12 +79,8 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
     }
     columns = {**numbers, **protocol_columns("protocol"), **strict}
     table = Table.of(points, columns)
-    for name, one in (
-        (path.name, table),
-        ("correlations.csv", correlation_table(points)),
-    ):
-        with completing(folder / name) as part:
-            part.write_text(one.to_csv(), encoding="utf-8")
+    table.write_csv(path)
+    correlation_table(points).write_csv(folder / "correlations.csv")
     draw_trend(points, folder / "trend")
     _draw_failures(points, folder / "visible_change")
     return path
@@ -121,9 +117,10 @@ def correlation_table(points: Sequence[TrendPoint]) -> Table:
             *zip(found, samples.T, strict=True),
             (found[1] - found[0], samples[:, 1] - samples[:, 0]),
         ):
+            interval = percentile_interval(sampled)
             cells += [
                 _rounded(number)
-                for number in (float(value), *_interval(sampled))
+                for number in (float(value), interval.low, interval.high)
             ]
         rows.append(tuple(cells))
     names = ("rho_tcr_sym", "rho_visible_change", "difference")
@@ -154,14 +151,6 @@ def _correlations(values: np.ndarray) -> np.ndarray:
     with np.errstate(invalid="ignore", divide="ignore"):
         ranks /= np.linalg.norm(ranks, axis=-2, keepdims=True)
     return (ranks[..., :1] * ranks[..., 1:]).sum(axis=-2)
-
-
-def _interval(samples: np.ndarray) -> tuple[float, float]:
-    known = samples[~np.isnan(samples)]
-    if len(known) == 0:
-        return math.nan, math.nan
-    low, high = np.percentile(known, _CONFIDENCE)
-    return float(low), float(high)
 
 
 def _draw_failures(points: Sequence[TrendPoint], stem: Path) -> None:
