@@ -222,7 +222,7 @@ def pr(
         )
     chosen = _chosen_method(method, parameter, sensor_height)
     places, query_drive = aligned(
-        *open_noted(database, query, lidar=lidar),
+        open_noted(database, query, lidar=lidar),
         align,
         across_maps=across_maps,
     )

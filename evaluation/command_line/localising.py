@@ -109,7 +109,7 @@ def localise(
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)
     if isinstance(source, Drive):
-        source, drive = aligned(source, drive, align)
+        source, drive = aligned((source, drive), align)
         check_same_world(source, drive)
     surroundings = make_map(source, settings, terminal.track)
     is_mapped = queries.mapped_frames(source, surroundings, drive)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 import functools
@@ -205,11 +205,12 @@ def open_noted(*paths: Path, lidar: str | None) -> list[Drive]:
 
 
 def aligned(
-    first: Drive, second: Drive, when: AlignName, *, across_maps: bool = False
+    drives: Sequence[Drive], when: AlignName, *, across_maps: bool = False
 ) -> tuple[Drive, Drive]:
     """Returns two drives in one world, with a note if one was moved."""
     from evaluation.alignment import in_one_world
 
+    first, second = drives
     alignment = in_one_world(
         first, second, when.value, terminal.track, across_maps=across_maps
     )

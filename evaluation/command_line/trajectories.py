@@ -39,7 +39,7 @@ def drives(
     """
     from evaluation.drives.comparison import compare_drives
 
-    pair = aligned(*open_noted(first, second, lidar=lidar), align)
+    pair = aligned(open_noted(first, second, lidar=lidar), align)
     found = compare_drives(*pair)
     show(found.to_json(), _drive_rows(found), json=json)
 

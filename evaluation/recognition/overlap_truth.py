@@ -75,13 +75,7 @@ def overlap_matrix(
 
     query_frames, placed = compared_frames(database, query, protocol)
     clouds = [
-        gather(
-            query,
-            frame,
-            1,
-            protocol.max_range,
-            sensor=protocol.query_sensor(frame),
-        )
+        protocol.query_scan(query, frame)
         for frame in track(
             query_frames.tolist(),
             f"overlap: reading {query.name}",

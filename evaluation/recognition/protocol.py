@@ -12,6 +12,7 @@ from cns_drake.base.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
+    from cns_drake.base.drives.drive import Drive
     from evaluation.drives.sampling import QuerySensor
     from evaluation.methods.method import Method, PlaceScan
 
@@ -125,6 +126,13 @@ class RetrievalProtocol:
             self.tilt_queries,
             self.hide_sector,
         )
+
+    def query_scan(self, drive: Drive, frame: int) -> np.ndarray:
+        """Returns the single scan (N, 3) of a query, in its sensor's frame."""
+        from evaluation.drives.sampling import gather
+
+        sensor = self.query_sensor(frame)
+        return gather(drive, frame, 1, self.max_range, sensor=sensor)
 
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the poses (Q, 4, 4) of the queries' sensors.

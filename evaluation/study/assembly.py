@@ -122,14 +122,18 @@ def _collect(
     for pair in pairs:
         control = city.unchanged_pair(*pair)
         results = files.recognition(*(one.name for one in pair))
-        beside = control and files.recognition(*(one.name for one in control))
+        beside = None
+        if control is not None:
+            beside = files.recognition(*(one.name for one in control))
         for method in methods:
             changed = results.result(method.name).read()
             if pair[0] is pair[1]:
                 if changed is not None:
                     closures.append(changed)
                 continue
-            unchanged = beside and beside.result(method.name).read()
+            unchanged = None
+            if beside is not None:
+                unchanged = beside.result(method.name).read()
             survivals.append(Survival.of(changed, unchanged))
         for again in city.repetitions(pair, methods, protocol):
             report.repeated.append(results.result(again.key).read())

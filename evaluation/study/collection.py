@@ -55,6 +55,10 @@ class RecordingInfo:
         return self.way is not None and self.way == other.way
 
 
+# Two drives: a database and its query, or an earlier stage and a later one.
+Pair = tuple[RecordingInfo, RecordingInfo]
+
+
 @dataclass(frozen=True)
 class Repetition:
     """A method on a pair by the protocol of published numbers.
@@ -97,14 +101,12 @@ class City:
     others: tuple[RecordingInfo, ...]
     reference: Reference = NO_REFERENCE
 
-    def change_pairs(self) -> list[tuple[RecordingInfo, RecordingInfo]]:
+    def change_pairs(self) -> list[Pair]:
         """Returns every stage with the last one."""
         *earlier, last = (self.stages[key] for key in sorted(self.stages))
         return [(recording, last) for recording in earlier]
 
-    def recognition_pairs(
-        self, *, with_itself: bool = False
-    ) -> list[tuple[RecordingInfo, RecordingInfo]]:
+    def recognition_pairs(self, *, with_itself: bool = False) -> list[Pair]:
         """Returns pairs of database and query.
 
         Every earlier stage is a database for the last one. The last one is a
@@ -126,7 +128,7 @@ class City:
 
     def repetitions(
         self,
-        pair: tuple[RecordingInfo, RecordingInfo],
+        pair: Pair,
         methods: Iterable[MethodChoice],
         protocol: RetrievalProtocol,
     ) -> list[Repetition]:
@@ -169,7 +171,7 @@ class City:
 
     def unchanged_pair(
         self, database: RecordingInfo, query: RecordingInfo
-    ) -> tuple[RecordingInfo, RecordingInfo] | None:
+    ) -> Pair | None:
         """Returns the control of a pair: its routes, in one stage.
 
         One drive of the pair is replaced by a drive on its route in the stage

@@ -14,6 +14,7 @@ from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
+    Pair,
     RecordingInfo,
     Repetition,
     find_recordings,
@@ -223,9 +224,7 @@ def _plan_city(
     return jobs
 
 
-def _compared_pairs(
-    city: City, protocol: RetrievalProtocol
-) -> dict[str, tuple[RecordingInfo, RecordingInfo]]:
+def _compared_pairs(city: City, protocol: RetrievalProtocol) -> dict[str, Pair]:
     """Returns all pairs of database and query, and their controls, by name.
 
     Two pairs may share a control.
@@ -243,16 +242,14 @@ def _compared_pairs(
     return named
 
 
-def _pair_name(city: City, pair: tuple[RecordingInfo, RecordingInfo]) -> str:
+def _pair_name(city: City, pair: Pair) -> str:
     database, query = pair
     return f"{city.name} {database.stage} > {query.stage}"
 
 
 def _further(
     recording: RecordingInfo,
-    repeated: Iterable[
-        tuple[tuple[RecordingInfo, RecordingInfo], Sequence[Repetition]]
-    ],
+    repeated: Iterable[tuple[Pair, Sequence[Repetition]]],
 ) -> tuple[Description, ...]:
     """Returns what repetitions describe of a drive."""
     roles: dict[Repetition, set[Role]] = {}
@@ -289,9 +286,7 @@ def _roles(
     return list(roles.values())
 
 
-def _change_job(
-    city: City, pair: tuple[RecordingInfo, RecordingInfo], files: StudyFiles
-) -> Job:
+def _change_job(city: City, pair: Pair, files: StudyFiles) -> Job:
     control = city.control(*pair)
     drives = [*pair] if control is None else [*pair, control]
     earlier, later = pair
@@ -326,7 +321,7 @@ def _change_job(
 
 def _recognition_job(
     city: City,
-    pair: tuple[RecordingInfo, RecordingInfo],
+    pair: Pair,
     name: str,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
@@ -340,20 +335,21 @@ def _recognition_job(
     surveys = files.survey(database.name), files.survey(query.name)
     results = files.recognition(database.name, query.name)
     stages = database.stage, query.stage
-    steps = tuple(
-        MakePart(
-            results.result(method.name),
+
+    def recognise(
+        method: MethodChoice,
+        protocol: RetrievalProtocol,
+        places_key: str,
+        key: str,
+    ) -> MakePart:
+        described = surveys[0].described(places_key), surveys[1].described(key)
+        return MakePart(
+            results.result(key),
             recognise_places,
-            (
-                city.name,
-                stages,
-                tuple(survey.described(method.name) for survey in surveys),
-                method,
-                protocol,
-            ),
+            (city.name, stages, described, method, protocol),
         )
-        for method in methods
-    )
+
+    steps = [recognise(one, protocol, one.name, one.name) for one in methods]
     if name == _pair_name(city, pair):
         cost += _EVIDENCE_COST
         evidence = MakePart(
@@ -367,33 +363,20 @@ def _recognition_job(
             ),
         )
         repeated = (
-            MakePart(
-                results.result(one.key),
-                recognise_places,
-                (
-                    city.name,
-                    stages,
-                    (
-                        surveys[0].described(one.places_key),
-                        surveys[1].described(one.key),
-                    ),
-                    one.method,
-                    one.protocol,
-                ),
-            )
+            recognise(one.method, one.protocol, one.places_key, one.key)
             for one in city.repetitions(pair, methods, protocol)
         )
-        steps = (*steps, evidence, *repeated)
+        steps += [evidence, *repeated]
     return Job(
         name=name,
-        step=Steps(results.folder, steps),
+        step=Steps(results.folder, tuple(steps)),
         needs=_survey_names(pair),
         cost=_START_COST + cost,
     )
 
 
 def _cost_job(
-    pair: tuple[RecordingInfo, RecordingInfo],
+    pair: Pair,
     files: StudyFiles,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,

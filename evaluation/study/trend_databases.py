@@ -147,14 +147,13 @@ def measure_trend(
         names.add(drive.name)
         check_same_world(drive, query_drive)
         opened[path] = drive
-    serving = [opened[path] for path in controls]
     searched = {}
     for path in databases:
         way = driven_way(opened[path].scenario)
         same = [
-            control.name
-            for control in serving
-            if way is not None and driven_way(control.scenario) == way
+            opened[control].name
+            for control in controls
+            if way is not None and driven_way(opened[control].scenario) == way
         ]
         searched[opened[path].name] = TrendDatabase(
             _recorded(path, lidar), same[0] if same else None
@@ -335,16 +334,7 @@ def _visible_change(
         )
     ]
     frames = retrieval.query_frames
-    query_scans = [
-        gather(
-            query,
-            frame,
-            1,
-            protocol.max_range,
-            sensor=protocol.query_sensor(frame),
-        )
-        for frame in frames.tolist()
-    ]
+    query_scans = [protocol.query_scan(query, k) for k in frames.tolist()]
     overlaps = best_overlaps(
         place_scans,
         database.X_WS[retrieval.database_frames],
