@@ -129,6 +129,12 @@ class DirectedChange:
         """1 - |O| / |H|, the TCR of the NSS benchmark; NaN if H is empty."""
         return _ratio(self.num_unchanged, self.num_in_hull)
 
+    def restricted(self, kept: np.ndarray) -> DirectedChange:
+        """Returns the change with only the points kept (N,) bool counted."""
+        return DirectedChange(
+            self.in_hull & kept, self.unchanged & kept, self.distances
+        )
+
 
 @dataclass(frozen=True)
 class TemporalChange:
@@ -191,8 +197,8 @@ class TemporalChange:
             target_kept: (M,) bool.
         """
         return TemporalChange(
-            _restrict(self.source_to_target, source_kept),
-            _restrict(self.target_to_source, target_kept),
+            self.source_to_target.restricted(source_kept),
+            self.target_to_source.restricted(target_kept),
         )
 
 
@@ -276,12 +282,6 @@ def _directed(
     if restrict:
         unchanged &= in_hull
     return DirectedChange(in_hull, unchanged, distances)
-
-
-def _restrict(change: DirectedChange, kept: np.ndarray) -> DirectedChange:
-    return DirectedChange(
-        change.in_hull & kept, change.unchanged & kept, change.distances
-    )
 
 
 def _ratio(num_unchanged: int, num_in_hull: int) -> float:

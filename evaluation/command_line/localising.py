@@ -95,7 +95,7 @@ def localise(
     )
     from evaluation.study.chosen_methods import parse_setting
 
-    starts = queries.Starts(start, start_turn, seed).checked()
+    starts = queries.Starts(start, start_turn, seed)
     if not (math.isfinite(query_spacing) and query_spacing > 0.0):
         raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
     tracking.check_drift(odometry_drift)

@@ -133,10 +133,6 @@ class FileDrive(Drive):
 def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
     """Finds files whose names are their times.
 
-    Args:
-        folder: their folder.
-        suffix: end of their names, after the time.
-
     Returns:
         The files in order of time; (N,) int64 times [ns]; N >= 1.
 

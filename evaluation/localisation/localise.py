@@ -88,18 +88,16 @@ class Starts:
         radius: distance to the true position [m].
         turn_deg: angle to the true orientation [deg].
         seed: of all directions.
+
+    Raises:
+        InputError: if a value is out of range.
     """
 
     radius: float
     turn_deg: float
     seed: int = 0
 
-    def checked(self) -> "Starts":
-        """Returns itself.
-
-        Raises:
-            InputError: if it is out of range.
-        """
+    def __post_init__(self) -> None:
         if not 0.0 < self.radius <= FARTHEST_START:
             raise InputError(
                 f"--start: {self.radius:g} m is not above 0 and up to"
@@ -111,7 +109,6 @@ class Starts:
             )
         if self.seed < 0:
             raise InputError(f"--seed: {self.seed} is below 0")
-        return self
 
     def draw(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns the start of a frame, the same for all methods.

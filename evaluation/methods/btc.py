@@ -246,21 +246,16 @@ class Btc(Method[BtcDescription, BtcDatabase]):
                 scores[place] = overlap
         return scores
 
-    def relative_pose(
-        self, query: BtcDescription, database: BtcDatabase, place: int
-    ) -> np.ndarray | None:
-        """Returns the common motion of the triangles.
-
-        None if too few match or agree.
-        """
-        return self.relative_poses(query, database, [place])[0]
-
     def relative_poses(
         self,
         query: BtcDescription,
         database: BtcDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
+        """Returns the common motions of the triangles.
+
+        None if too few match or agree.
+        """
         some = self.build_database([database.places[place] for place in places])
         found = dict(self._motions(query, some, None))
         return [found.get(index) for index in range(len(places))]

@@ -189,21 +189,16 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
                 scores[pose[0]] = self._rate(query, place, found)
         return scores
 
-    def relative_pose(
-        self, query: LayeredScan, database: LayeredDatabase, place: int
-    ) -> np.ndarray | None:
-        """Returns turn and horizontal translation of the query.
-
-        None if one of the two shows nothing.
-        """
-        return self.relative_poses(query, database, [place])[0]
-
     def relative_poses(
         self,
         query: LayeredScan,
         database: LayeredDatabase,
         places: Sequence[int],
     ) -> list[np.ndarray | None]:
+        """Returns turns and horizontal translations of the query.
+
+        None if one of the two shows nothing.
+        """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)
         if len(query.cells) == 0 or len(scans) == 0:

@@ -21,9 +21,13 @@ import numpy as np
 from pydantic import computed_field
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.poses import make_pose
 from cns_drake.base.terminal import note
-from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.method import (
+    Method,
+    MethodConfig,
+    register,
+    yaw_pose,
+)
 
 RINGS = 64
 SECTORS = 192
@@ -207,9 +211,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         turn = int(_correlations(query, spectrum)[:, 0].argmax())
         # What the query sees at azimuth a, the place sees at a + turn.
         yaw = 2.0 * math.pi * turn / HEADINGS
-        c, s = math.cos(yaw), math.sin(yaw)
-        R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return make_pose(R_PQ, np.zeros(3))
+        return yaw_pose(yaw)
 
     def _check_seen(self, image: np.ndarray) -> None:
         """Notes once that the sensor sees less than any in training."""

@@ -7,6 +7,7 @@ import functools
 import importlib
 import importlib.util
 import inspect
+import math
 import os
 from pathlib import Path
 import sys
@@ -18,6 +19,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.poses import make_pose
 
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")
@@ -180,8 +182,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         None if the method does not estimate it.
         """
-        del query, database, place
-        return None
+        if type(self).relative_poses is Method.relative_poses:
+            return None
+        return self.relative_poses(query, database, [place])[0]
 
     def relative_poses(
         self, query: Descriptor, database: Database, places: Sequence[int]
@@ -191,6 +194,13 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         For methods that are faster with several.
         """
         return [self.relative_pose(query, database, one) for one in places]
+
+
+def yaw_pose(yaw: float, x: float = 0.0, y: float = 0.0) -> np.ndarray:
+    """Returns a pose (4, 4) turned about the vertical [rad] and moved [m]."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return make_pose(R, np.array([x, y, 0.0]))
 
 
 _METHODS: dict[str, type[Method]] = {}

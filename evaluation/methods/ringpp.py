@@ -23,9 +23,13 @@ import scipy.sparse
 import scipy.special
 
 from cns_drake.base.compiled import compiled
-from cns_drake.base.poses import make_pose
 from evaluation.geometry.neighbours import nearest_neighbours
-from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.method import (
+    Method,
+    MethodConfig,
+    register,
+    yaw_pose,
+)
 
 # See `local_features`.
 _NUM_FEATURES = 6
@@ -179,18 +183,13 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         ]
         return np.where(database.is_empty, np.nan, scores)
 
-    def relative_pose(
-        self, query: Ring, database: RingDatabase, place: int
-    ) -> np.ndarray | None:
-        """Returns turn and horizontal translation of the query.
-
-        None if one of the two shows nothing.
-        """
-        return self.relative_poses(query, database, [place])[0]
-
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
     ) -> list[np.ndarray | None]:
+        """Returns turns and horizontal translations of the query.
+
+        None if one of the two shows nothing.
+        """
         if len(query.filled) == 0:
             return [None] * len(places)
         num_cells = self.config.cells
@@ -237,10 +236,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         ]
         best = 1 if fits[1][0] > fits[0][0] else 0
         offset, yaw = fits[best][1], headings[best]
-        c, s = math.cos(yaw), math.sin(yaw)
-        R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         cell = 2.0 * self.config.half_width / num_cells
-        return make_pose(R_PQ, np.array([-offset[0], -offset[1], 0.0]) * cell)
+        return yaw_pose(yaw, -offset[0] * cell, -offset[1] * cell)
 
     def _bev(self, points: np.ndarray) -> np.ndarray:
         """Returns the map from above, (n, n, 6): rows along x, columns y.

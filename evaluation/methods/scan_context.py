@@ -35,7 +35,12 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
 from evaluation.maps.voxel_maps import thin
-from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.method import (
+    Method,
+    MethodConfig,
+    register,
+    yaw_pose,
+)
 
 # Bounds the memory of an exhaustive comparison.
 _CONTEXTS_AT_ONCE = 512
@@ -203,26 +208,20 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         best = int(np.nanargmax(similarities))
         num_columns = query.images.shape[2]
         shift = int(shifts[best])
-        X_PQ = np.eye(4)
         if self.config.variant in ("polar", "augmented-polar"):
             # Shift s turns the place's context to the query's: what the
             # place sees at azimuth a, the query sees at a + s cells.
-            yaw = -2.0 * math.pi * shift / num_columns
-            X_PQ[:2, :2] = [
-                [math.cos(yaw), -math.sin(yaw)],
-                [math.sin(yaw), math.cos(yaw)],
-            ]
-            if best > 0:
-                side = -1.0 if best == 1 else 1.0
-                X_PQ[1, 3] = side * self.config.lateral_shift
-            return X_PQ
+            side = (0.0, -1.0, 1.0)[best]
+            return yaw_pose(
+                -2.0 * math.pi * shift / num_columns,
+                y=side * self.config.lateral_shift,
+            )
         # Half of the shifts are to the right: 0, 1, ..., -2, -1.
         signed = (shift + num_columns // 2) % num_columns - num_columns // 2
-        if best > 0:
-            X_PQ[0, 0] = X_PQ[1, 1] = -1.0
-            X_PQ[1, 3] = signed * self.config.cart_cell[1]
-            return X_PQ
-        X_PQ[1, 3] = -signed * self.config.cart_cell[1]
+        # The second context is the view of a car in the opposite direction.
+        sign = 1.0 if best > 0 else -1.0
+        X_PQ = np.diag([-sign, -sign, 1.0, 1.0])
+        X_PQ[1, 3] = sign * signed * self.config.cart_cell[1]
         return X_PQ
 
     def _prepare(self, points: np.ndarray) -> np.ndarray:

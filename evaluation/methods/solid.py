@@ -15,9 +15,13 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from cns_drake.base.poses import make_pose
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
-from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.method import (
+    Method,
+    MethodConfig,
+    register,
+    yaw_pose,
+)
 
 
 class SolidConfig(MethodConfig):
@@ -159,10 +163,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         rolled = azimuths[(cell - cell[:, None]) % num_cells]
         shift = int(np.abs(query.azimuths - rolled).sum(axis=1).argmin())
         # What the place sees at azimuth a, the query sees at a + shift.
-        yaw = -2.0 * math.pi * shift / num_cells
-        c, s = math.cos(yaw), math.sin(yaw)
-        R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return make_pose(R_PQ, np.zeros(3))
+        return yaw_pose(-2.0 * math.pi * shift / num_cells)
 
     def _prepare(self, points: np.ndarray) -> np.ndarray:
         """Returns the thinned points within range.

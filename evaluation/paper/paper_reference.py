@@ -154,10 +154,6 @@ def findings(
 
     Only the paper's maps and methods are judged by them, and only by its
     protocol.
-
-    Args:
-        results: place recognition of all pairs.
-        changes: TCR of all pairs.
     """
     results = [r for r in results if paper().covers(r)]
     changes = [c for c in changes if c.map_name in paper().city_names]
@@ -388,10 +384,6 @@ def aims(
 
     RING++ is counted on queries with a match, the others on all, as the paper
     seems to have done.
-
-    Args:
-        results: place recognition of all pairs.
-        changes: TCR of all pairs.
     """
     differences = _differences(results)
     if differences.keys() != {

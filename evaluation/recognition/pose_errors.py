@@ -107,13 +107,7 @@ def pose_metrics(
     outcomes: QueryOutcomes,
     metrics: PlaceRecognitionMetrics,
 ) -> PoseMetrics:
-    """Summarises errors.
-
-    Args:
-        errors: errors of the queries.
-        outcomes: outcomes of the same queries.
-        metrics: metrics of the same queries, in mode all.
-    """
+    """Summarises errors; the metrics of the queries are in mode all."""
     accepted = np.zeros(len(outcomes), dtype=bool)
     if metrics.f1_max_index is not None:
         least = metrics.curve.thresholds[metrics.f1_max_index]
@@ -133,12 +127,7 @@ def pose_metrics(
 
 
 def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
-    """Returns `PoseMetrics.success`.
-
-    Args:
-        errors: errors of the queries.
-        outcomes: outcomes of the same queries.
-    """
+    """Returns `PoseMetrics.success`."""
     # A method that finds no place localises no query.
     known = ~np.isnan(errors.translation)
     estimates = known.any() or np.isnan(outcomes.best_scores).all()

@@ -329,9 +329,6 @@ def strongest_causes(rows: Sequence[LadderRow]) -> list[str]:
 
     Means over maps and methods count, without the gate, at the strongest level
     of each cause.
-
-    Args:
-        rows: rows for all maps.
     """
     shares: dict[str, list[float]] = {}
     for row in _strongest(rows).values():
@@ -459,11 +456,7 @@ def ladder_query_table(
 
 
 def ladder_text(rows: Sequence[LadderRow]) -> str:
-    """Returns the findings of each map: a heading and a list.
-
-    Args:
-        rows: rows for all maps.
-    """
+    """Returns the findings of each map: a heading and a list."""
     maps = dict.fromkeys(row.rung.map_name for row in rows)
     return "\n\n".join(
         _findings([row for row in rows if row.rung.map_name == name])

@@ -95,13 +95,7 @@ class Reference:
     def protocol_of(
         self, map_name: str, database: str, query: str, method: str
     ) -> RetrievalProtocol | None:
-        """Returns the protocol of a method's numbers of a pair, if published.
-
-        Args:
-            map_name: name of the map.
-            database, query: the two stages.
-            method: its name.
-        """
+        """Returns the protocol of a method's numbers of a pair, if published."""
         key = map_name, database, query, method
         if not any(known[:4] == key for known in self.recognitions):
             return None

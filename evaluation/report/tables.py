@@ -122,11 +122,7 @@ class Table:
         )
 
     def without_empty(self, name: str) -> Table:
-        """Returns the table without a column that has no value in any row.
-
-        Args:
-            name: the column's, in a table without groups.
-        """
+        """Returns the table without a column that has no value in any row."""
         column = self.header.index(name)
         if not all(_is_missing(row[column]) for row in self.rows):
             return self

@@ -132,13 +132,7 @@ class City:
         methods: Iterable[MethodChoice],
         protocol: RetrievalProtocol,
     ) -> list[Repetition]:
-        """Returns the methods to compare with published numbers of a pair.
-
-        Args:
-            pair: database and query.
-            methods: those of the study.
-            protocol: that of the study.
-        """
+        """Returns the methods to compare with published numbers of a pair."""
         database, query = (one.stage for one in pair)
         found = []
         for choice in methods:

@@ -353,6 +353,8 @@ def _identity(argument: Any) -> object:
 class SurveyFiles:
     """The parts that hold the survey of a recording.
 
+    A key is the name of a method, or a `described_key`.
+
     A job that needs one method's descriptions reads no other's.
 
     Attributes:
@@ -377,17 +379,15 @@ class SurveyFiles:
         return Part(self.folder / "scans.data")
 
     def described(self, key: str) -> Part:
-        """Returns the part with (`PlacedDrive`, `DescribedDrive`).
-
-        Args:
-            key: name of the method, or a `described_key`.
-        """
+        """Returns the part with (`PlacedDrive`, `DescribedDrive`)."""
         return Part(self.folder / f"described_{file_name(key)}.data")
 
 
 @dataclass(frozen=True)
 class RecognitionFiles:
     """The parts that hold the results of methods on two recordings.
+
+    A key is the name of a method, or a `described_key`.
 
     Attributes:
         folder: the folder of the parts.
@@ -396,11 +396,7 @@ class RecognitionFiles:
     folder: Path
 
     def result(self, key: str) -> Part:
-        """Returns the part with the `RecognitionResult` of a method.
-
-        Args:
-            key: name of the method, or a `described_key`.
-        """
+        """Returns the part with the `RecognitionResult` of a method."""
         return Part(self.folder / f"{file_name(key)}.data")
 
     @property

@@ -5,6 +5,7 @@ before or after the drive is recorded. The job therefore has the source of the
 drive, not the drive.
 """
 
+import abc
 from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 import io
@@ -359,8 +360,25 @@ class Description:
         return self.method.make(), self.roles, self.protocol
 
 
+class _PartsStep(Step):
+    """Writes those parts of a drive that are missing."""
+
+    files: SurveyFiles
+
+    @property
+    def output(self) -> Path:
+        return self.files.folder
+
+    def is_done(self) -> bool:
+        return not self._missing()
+
+    @abc.abstractmethod
+    def _missing(self) -> dict[Part, Mapping]:
+        """Returns the missing parts, each with its inputs."""
+
+
 @dataclass(frozen=True)
-class Survey(Step):
+class Survey(_PartsStep):
     """Writes the survey of a drive, or its missing parts.
 
     Attributes:
@@ -380,13 +398,6 @@ class Survey(Step):
     files: SurveyFiles
     with_scans: bool = False
     further: tuple[Description, ...] = ()
-
-    @property
-    def output(self) -> Path:
-        return self.files.folder
-
-    def is_done(self) -> bool:
-        return not self._missing()
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
@@ -451,7 +462,6 @@ class Survey(Step):
                 part.write(missing[part], one)
 
     def _missing(self) -> dict[Part, Mapping]:
-        """Returns the missing parts, each with its inputs."""
         drive = self.source.identity()
 
         def inputs(
@@ -483,7 +493,7 @@ class Survey(Step):
 
 
 @dataclass(frozen=True)
-class DescribeDrive(Step):
+class DescribeDrive(_PartsStep):
     """Writes each method's descriptions of a drive, without its map.
 
     Only the scans that are described are read.
@@ -505,13 +515,6 @@ class DescribeDrive(Step):
     files: SurveyFiles
     with_scans: bool = False
 
-    @property
-    def output(self) -> Path:
-        return self.files.folder
-
-    def is_done(self) -> bool:
-        return not self._missing()
-
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
         files = {one: self.files.described(one.name) for one in self.methods}
@@ -528,7 +531,6 @@ class DescribeDrive(Step):
             self.files.scans.write(missing[self.files.scans], scans)
 
     def _missing(self) -> dict[Part, Mapping]:
-        """Returns the missing parts, each with its inputs."""
         inputs = self.made_of(
             {
                 "drive": self.source.identity(),

@@ -92,9 +92,6 @@ def correlation_table(points: Sequence[TrendPoint]) -> Table:
     A row has Spearman's rank correlation of 1 - AUC with TCR_sym and with the
     visible change over all databases, with 95 % intervals by bootstrap over
     databases, and the interval of the difference of the two.
-
-    Args:
-        points: those of all databases and methods.
     """
     rows: list[tuple[object, ...]] = []
     for method in in_table_order(point.method for point in points):
