@@ -226,42 +226,6 @@ class Localiser:
     estimator: Estimator
     settings: Settings
 
-    def end(
-        self, scan: np.ndarray, X_WS0: np.ndarray, where: str
-    ) -> tuple[np.ndarray | None, np.ndarray, dict[str, Any]]:
-        """Aligns one scan.
-
-        Args:
-            scan: structured array, in S.
-            X_WS0: the start.
-            where: name of the scan, for messages.
-
-        Returns:
-            X_WS or None; the thinned scan (N, 3); fields of `QUERY`.
-
-        Raises:
-            InputError: if the scan has hardly a point.
-        """
-        measured = cropped(scan, MAX_RANGE)
-        points = thinned(measured, self.settings, where)
-        begin = time.process_time()
-        found = self.estimator(self.surroundings, points, measured, X_WS0)
-        seconds = time.process_time() - begin
-        known: dict[str, Any] = {
-            "iterations": found.iterations,
-            "seconds": seconds,
-        }
-        known |= dict.fromkeys(("own_score", "fit"), -math.inf)
-        if found.X_WS is not None:
-            fit = judge(self.surroundings.surface, points, found.X_WS)
-            known |= {
-                "own_score": fit.share if found.score is None else found.score,
-                "fit": fit.share,
-                "residual": fit.residual,
-                "covariance": fit.covariance,
-            }
-        return found.X_WS, points, known
-
     def query(
         self,
         frame: int,
@@ -287,29 +251,38 @@ class Localiser:
 
         Returns:
             A record of `QUERY`; the end X_WS or None.
+
+        Raises:
+            InputError: if the scan has hardly a point.
         """
         if X_WS0 is None:
             R = Rotation.from_rotvec(turn).as_matrix()
             X_WS0 = poses.make_pose(X_WS[:3, :3] @ R, X_WS[:3, 3] + offset)
-        where = f"scan {frame}"
-        end, points, known = self.end(scan, X_WS0, where)
+        measured = cropped(scan, MAX_RANGE)
+        points = thinned(measured, self.settings, f"scan {frame}")
+        begin = time.process_time()
+        found = self.estimator(self.surroundings, points, measured, X_WS0)
+        end = found.X_WS
         row = np.zeros((), QUERY)
+        row["seconds"] = time.process_time() - begin
+        row["iterations"] = found.iterations
         for name in COLUMNS[8:-2]:
             row[name] = np.nan
-        covariance = known.pop("covariance", None)
-        for name, value in known.items():
-            row[name] = value
+        row["own_score"] = row["fit"] = -math.inf
         row["frame"], row["stamp_ns"] = frame, stamp_ns
         for axis, o, t in zip("xyz", offset, np.degrees(turn), strict=True):
             row[f"start_{axis}"], row[f"start_turn_{axis}_deg"] = o, t
         far = self.surroundings.distances(poses.transform(X_WS, points))
         row["unmapped"] = np.mean(far > self.settings.voxel)
         if end is not None:
+            fit = judge(self.surroundings.surface, points, end)
+            row["own_score"] = fit.share if found.score is None else found.score
+            row["fit"], row["residual"] = fit.share, fit.residual
             row["translation_error"], row["rotation_error_deg"] = pose_error(
                 end, np.eye(4), X_WS
             )
             errors = R_WT.T @ (end[:3, 3] - X_WS[:3, 3])
-            spread = R_WT.T @ covariance[3:, 3:] @ R_WT
+            spread = R_WT.T @ fit.covariance[3:, 3:] @ R_WT
             for k, name in enumerate(("along", "across", "up")):
                 row[name] = errors[k]
                 row[f"std_{name}"] = math.sqrt(spread[k, k])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DescribedDrive
+from evaluation.recognition.description import DescribedDrive, DescribedScans
 from evaluation.recognition.scoring import ranking, score_places
 
 
@@ -59,10 +59,43 @@ def measure_cost(
         gate_radius: see `score_places`.
     """
     describing = [cpu_ms(method.describe, cloud) for cloud in clouds]
-    places, queries = database.places, query.queries
+    places = database.places
+    sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
+    return Cost(
+        method=method.name,
+        scans_per_place=scans_per_place,
+        points=float(np.mean([len(cloud) for cloud in clouds])),
+        describe_ms=float(np.median(describing[1:])),
+        query_ms=query_ms(
+            method, places, query.queries, len(clouds), gate_radius
+        ),
+        places=len(places.frames),
+        place_bytes=float(np.mean(sizes)),
+    )
+
+
+def query_ms(
+    method: Method,
+    places: DescribedScans,
+    queries: DescribedScans,
+    number: int,
+    gate_radius: float | None = None,
+    *,
+    with_pose: bool = True,
+) -> float:
+    """Returns the median time of some queries [ms]; the first does not count.
+
+    Args:
+        method: to measure.
+        places: all are candidates.
+        queries: to ask.
+        number: how many are asked, two or more.
+        gate_radius: see `score_places`.
+        with_pose: whether the pose of the best place is estimated, too.
+    """
     indexed = method.build_database(places.descriptors)
     is_known = np.ones(len(places.frames), dtype=bool)
-    rows = np.linspace(0, len(queries.frames) - 1, len(clouds)).astype(int)
+    rows = np.linspace(0, len(queries.frames) - 1, number).astype(int)
 
     def ask(row: int) -> None:
         found = score_places(
@@ -74,21 +107,11 @@ def measure_cost(
             is_known,
             gate_radius=gate_radius,
         )
-        if not np.isnan(found).all():
+        if with_pose and not np.isnan(found).all():
             best = int(ranking(found)[0])
             method.relative_pose(queries.descriptors[row], indexed, best)
 
-    query_times = [cpu_ms(ask, row) for row in rows.tolist()]
-    sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
-    return Cost(
-        method=method.name,
-        scans_per_place=scans_per_place,
-        points=float(np.mean([len(cloud) for cloud in clouds])),
-        describe_ms=float(np.median(describing[1:])),
-        query_ms=float(np.median(query_times[1:])),
-        places=len(places.frames),
-        place_bytes=float(np.mean(sizes)),
-    )
+    return float(np.median([cpu_ms(ask, row) for row in rows.tolist()][1:]))
 
 
 def cpu_ms(function: Callable[[Any], object], argument: object) -> float:

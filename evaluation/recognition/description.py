@@ -234,50 +234,46 @@ class _Describing:
         return self._drive
 
     def _flush(self) -> None:
-        waiting, self._waiting = self._waiting, []
-        places = self._describe(waiting, "places")
-        self._keep(self._drive.places, "places", places, waiting)
+        places = self._describe("places", {})
         shared = {}
         if self._method.describes_alike:
             shared = {
                 frame: places[frame]
-                for frame, clouds in waiting
+                for frame, clouds in self._waiting
                 if frame in places and clouds.get("queries") is clouds["places"]
             }
-        asked = [one for one in waiting if one[0] not in shared]
-        queries = shared | self._describe(asked, "queries")
-        self._keep(self._drive.queries, "queries", queries, waiting)
+        self._describe("queries", shared)
+        self._waiting = []
 
     def _describe(
-        self, waiting: list[_Waiting], role: Role
+        self, role: Role, known: Mapping[int, object]
     ) -> dict[int, object]:
-        """Returns frame -> descriptor of the frames that have a role."""
-        chosen = [
-            (frame, clouds[role]) for frame, clouds in waiting if role in clouds
-        ]
-        if not chosen:
-            return {}
-        found = self._method.describe_batch(
-            [cloud for _, cloud in chosen], of_places=role == "places"
-        )
-        if len(found) != len(chosen):
+        """Describes the waiting frames of a role, but for those known.
+
+        Returns:
+            Frame -> descriptor.
+        """
+        chosen = {
+            frame: clouds[role]
+            for frame, clouds in self._waiting
+            if role in clouds
+        }
+        asked = {k: cloud for k, cloud in chosen.items() if k not in known}
+        found: list = []
+        if asked:
+            found = self._method.describe_batch(
+                list(asked.values()), of_places=role == "places"
+            )
+        if len(found) != len(asked):
             raise InputError(
                 f"{self._method.name}: describe_batch returned {len(found)}"
-                f" descriptors of {len(chosen)} clouds"
+                f" descriptors of {len(asked)} clouds"
             )
-        return {
-            frame: one for (frame, _), one in zip(chosen, found, strict=True)
-        }
-
-    def _keep(
-        self,
-        scans: DescribedScans,
-        role: Role,
-        described: dict[int, object],
-        waiting: list[_Waiting],
-    ) -> None:
-        for frame, clouds in waiting:
-            if frame in described:
-                scans.descriptors.append(described[frame])
-                if self._method.rerank_best:
-                    scans.clouds.append(clouds[role])
+        described = {**known, **dict(zip(asked, found, strict=True))}
+        drive = self._drive
+        scans = drive.places if role == "places" else drive.queries
+        for frame, cloud in chosen.items():
+            scans.descriptors.append(described[frame])
+            if self._method.rerank_best:
+                scans.clouds.append(cloud)
+        return described

@@ -95,7 +95,7 @@ class Reference:
     def protocol_of(
         self, map_name: str, database: str, query: str, method: str
     ) -> RetrievalProtocol | None:
-        """Returns the protocol of a method's numbers of a pair, if published."""
+        """Returns the protocol of a method's published numbers of a pair."""
         key = map_name, database, query, method
         if not any(known[:4] == key for known in self.recognitions):
             return None

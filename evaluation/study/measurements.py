@@ -7,6 +7,7 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeResult, Surveyed
 from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
+from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
 from evaluation.recognition.costs import Cost, measure_cost
 from evaluation.recognition.place_recognition import (
@@ -17,7 +18,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource, SurveyedDrive, open_surveyed
+from evaluation.study.surveys import DriveSource, SurveyedDrive
 
 # Number of clouds and of queries whose costs are measured; the time of the
 # first does not count.
@@ -93,7 +94,9 @@ def measure_costs(
             drive.
         protocol: the protocol of the descriptions.
     """
-    drive = open_surveyed(source, surveyed)
+    drive, known = source(), surveyed.read()
+    # A recording would be unpacked as a whole for its poses.
+    drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
     costs = []
     with threadpool_limits(limits=1):
         for choice, parts in reporter.track(

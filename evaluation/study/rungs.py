@@ -11,8 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
-from evaluation.methods import Method
-from evaluation.recognition.costs import cpu_ms
+from evaluation.recognition.costs import cpu_ms, query_ms
 from evaluation.recognition.description import (
     DescribedDrive,
     DescribedScans,
@@ -24,7 +23,6 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import judge
 from evaluation.recognition.retrieval import compare, compare_with_gates
 from evaluation.recognition.rung_outcome import RungOutcome
-from evaluation.recognition.scoring import score_places
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource, describe
@@ -201,9 +199,11 @@ def measure_size(
     places = joined_places(known, num_distractors)
     number = len(asked.queries.frames)
     build_ms = cpu_ms(method.build_database, places.descriptors)
-    query_ms = _query_ms(method, places, asked.queries)
+    one_ms = query_ms(
+        method, places, asked.queries, _TIMED + 1, with_pose=False
+    )
     auc = r1 = math.nan
-    if query_ms * number <= _LONGEST_MS:
+    if one_ms * number <= _LONGEST_MS:
         found = compare(
             method,
             replace(mapped, places=places),
@@ -220,28 +220,6 @@ def measure_size(
         number,
         float(auc),
         r1,
-        query_ms,
+        one_ms,
         build_ms,
     )
-
-
-def _query_ms(
-    method: Method, places: DescribedScans, queries: DescribedScans
-) -> float:
-    """Returns the median time of some queries; the first does not count."""
-    indexed = method.build_database(places.descriptors)
-    is_known = np.ones(len(places.frames), dtype=bool)
-    rows = np.linspace(0, len(queries.frames) - 1, _TIMED + 1).astype(int)
-
-    def ask(row: int) -> None:
-        score_places(
-            method,
-            queries.descriptors[: row + 1],
-            queries.clouds[row] if queries.clouds else None,
-            indexed,
-            places.clouds,
-            is_known,
-        )
-
-    times = [cpu_ms(ask, row) for row in rows.tolist()]
-    return float(np.median(times[1:]))

@@ -21,7 +21,7 @@ from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
 from cns_drake.base.progress import Track, silent
 from evaluation.drives import Drive, PlacedDrive, open_drive
-from evaluation.drives.drive_views import MovedDrive, RecentScans
+from evaluation.drives.drive_views import RecentScans
 from evaluation.drives.sampling import cropped, within_range
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VOXEL_SIZE, VoxelAccumulator, VoxelMap
@@ -602,17 +602,3 @@ def describe(
     return {
         method.name: one for method, one in zip(running, found, strict=True)
     }
-
-
-def open_surveyed(source: DriveSource, surveyed: Part) -> Drive:
-    """Opens a drive that has been surveyed.
-
-    Its poses are those of the survey: a recording would be unpacked as a whole
-    for them.
-
-    Raises:
-        InputError: if it cannot be opened.
-    """
-    drive = source()
-    known: SurveyedDrive = surveyed.read()
-    return MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
