@@ -194,14 +194,13 @@ def align(
             be read.
     """
     if hold_first:
-        held = Straightened(Submaps(first), 0.0)
+        target, held = Submaps(first), 0.0
     else:
-        held = make_consistent(first, track)
-    moving = make_consistent(second, track)
-    swapped = held.disagreement > moving.disagreement and not hold_first
+        target, held = make_consistent(first, track)
+    source, moving = make_consistent(second, track)
+    swapped = held > moving and not hold_first
     if swapped:
-        held, moving = moving, held
-    target, source = held.drive, moving.drive
+        target, held, source, moving = source, moving, target, held
     search, guess, num_candidates = _start(source, target, track)
     search.grow(track)
     X_TK, model = _fit(search)
@@ -226,7 +225,7 @@ def align(
         ground = 0.0
     X_TS = source.bend(X_TK)
     frame = target.drive.world_frame
-    if ground != 0.0 or held.disagreement > 0.0:
+    if ground != 0.0 or held > 0.0:
         # The result is no longer in the world that the name stands for.
         frame = f"{frame}, corrected by {target.name}"
     held_drive = _lowered(target.drive, target.X_WS, ground, frame, target)
@@ -247,7 +246,7 @@ def align(
             distance_95=float(np.quantile(distances[is_inlier], 0.95)),
             angle_median_deg=float(np.degrees(np.median(angles[is_inlier]))),
             model=model,
-            straightened=(held.disagreement, moving.disagreement),
+            straightened=(held, moving),
             ground=ground,
             **_motion((first if swapped else second).X_WS, X_TS),
         ),
@@ -377,24 +376,12 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
     }
 
 
-@dataclass(frozen=True)
-class Straightened:
-    """A drive that agrees with itself.
-
-    Attributes:
-        drive: with new poses, if it had drifted.
-        disagreement: disagreement of the drive with itself before, see
-            `AlignmentReport`.
-    """
-
-    drive: Submaps
-    disagreement: float
-
-
-def make_consistent(drive: Drive, track: Track) -> Straightened:
+def make_consistent(drive: Drive, track: Track) -> tuple[Submaps, float]:
     """Makes a drive agree with itself, if it passes a place again.
 
-    It can where it passes a place again.
+    Returns:
+        The drive, with new poses if it had drifted; its disagreement with
+        itself before, see `AlignmentReport`.
 
     Raises:
         InputError: if a scan cannot be read.
@@ -415,4 +402,4 @@ def make_consistent(drive: Drive, track: Track) -> Straightened:
         submaps = Submaps(
             MovedDrive(drive, X_WS, drive.world_frame, drive.datum)
         )
-    return Straightened(submaps, worst)
+    return submaps, worst

@@ -6,7 +6,7 @@ two pairs (RANSAC) fixes the four numbers that two upright worlds can differ
 by: a turn about the vertical and a move.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
@@ -60,26 +60,26 @@ class Ties:
     """M measured relative poses between poses of N variables V.
 
     A measurement is Z = inverse(V_i A) V_j B; for i == FIXED the first pose is
-    A itself.
+    A itself. A and B are identities unless they are given.
 
     Attributes:
         i: (M,) first variable, or FIXED.
         j: (M,) second variable.
-        A: (M, 4, 4).
-        B: (M, 4, 4).
         Z: (M, 4, 4).
         covariance: (M, 6, 6) of a small motion of Z from the left: turn
             [rad], then move [m].
         is_doubtful: whether they may be wrong.
+        A: (M, 4, 4).
+        B: (M, 4, 4).
     """
 
     i: np.ndarray
     j: np.ndarray
-    A: np.ndarray
-    B: np.ndarray
     Z: np.ndarray
     covariance: np.ndarray
     is_doubtful: bool
+    A: np.ndarray = field(default_factory=lambda: np.eye(4)[None])
+    B: np.ndarray = field(default_factory=lambda: np.eye(4)[None])
 
     def errors(self, V: np.ndarray) -> np.ndarray:
         """Returns the errors (M, 6) of the ties: turn and move."""
@@ -148,10 +148,11 @@ def _jacobian(ties: Ties, num_variables: int) -> sparse.csr_matrix:
     """
     number = len(ties.j)
     free = np.flatnonzero(ties.i != FIXED)
+    A = np.broadcast_to(ties.A, (number, 4, 4))
     blocks = np.concatenate(
         [
             _adjoint(ties.Z @ poses.inverse(ties.B)),
-            -_adjoint(poses.inverse(ties.A[free])),
+            -_adjoint(poses.inverse(A[free])),
         ]
     )
     rows = np.concatenate([np.arange(number), free])
@@ -409,7 +410,7 @@ def fit_bent(
         X_TS: (4, 4) anchor to start from.
     """
     k = np.array([loop.source for loop in loops])
-    ties = _loop_ties(loops, X_TL, k, np.tile(np.eye(4), (len(k), 1, 1)))
+    ties = _loop_ties(loops, X_TL, k, np.eye(4)[None])
     return optimise(X_TS @ source.X_WK, [ties, _drive_ties(source)])
 
 
@@ -418,13 +419,9 @@ def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
 
     Its first keyframe stays.
     """
-    number = len(loops)
-    eye = np.tile(np.eye(4), (number, 1, 1))
     ties = Ties(
         i=np.array([loop.target for loop in loops]),
         j=np.array([loop.source for loop in loops]),
-        A=eye,
-        B=eye,
         Z=np.array([loop.X_LK for loop in loops]),
         covariance=np.array([loop.covariance for loop in loops]),
         is_doubtful=True,
@@ -432,11 +429,10 @@ def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
     hold = Ties(
         i=np.array([FIXED]),
         j=np.array([0]),
-        A=drive.X_WK[:1],
-        B=np.eye(4)[None],
         Z=np.eye(4)[None],
         covariance=_TIGHT[None],
         is_doubtful=False,
+        A=drive.X_WK[:1],
     )
     return optimise(drive.X_WK, [ties, hold, _drive_ties(drive)])
 
@@ -455,24 +451,21 @@ def _loop_ties(
     return Ties(
         i=np.full(len(loops), FIXED),
         j=j,
-        A=X_TL[[loop.target for loop in loops]],
-        B=B,
         Z=np.array([loop.X_LK for loop in loops]),
         covariance=np.array([loop.covariance for loop in loops]),
         is_doubtful=True,
+        A=X_TL[[loop.target for loop in loops]],
+        B=B,
     )
 
 
 def _drive_ties(drive: Submaps) -> Ties:
     """Returns the ties of neighbouring keyframes by the drive's own poses."""
     number = len(drive) - 1
-    eye = np.tile(np.eye(4), (number, 1, 1))
     step = np.maximum(np.diff(drive.path), _LEAST_STEP)
     return Ties(
         i=np.arange(number),
         j=np.arange(1, number + 1),
-        A=eye,
-        B=eye,
         Z=poses.inverse(drive.X_WK[:-1]) @ drive.X_WK[1:],
         covariance=step[:, None, None] * _BEND,
         is_doubtful=False,

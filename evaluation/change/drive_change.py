@@ -133,7 +133,7 @@ def survey(path: Path, track: Track = silent) -> Surveyed:
     Raises:
         InputError: if it can be read as neither.
     """
-    return _survey(_open(path), track)
+    return _survey(open_source(path), track)
 
 
 def survey_in_one_world(
@@ -156,7 +156,7 @@ def survey_in_one_world(
     Raises:
         InputError: if a path cannot be read, or a drive cannot be aligned.
     """
-    opened = [_open(path, lidar) for path in paths]
+    opened = [open_source(path, lidar) for path in paths]
     drives = {i: one for i, one in enumerate(opened) if isinstance(one, Drive)}
     if when == "always" and len(drives) < len(opened):
         raise InputError("--align always: a map file cannot be aligned")
@@ -237,8 +237,12 @@ def compare(
     )
 
 
-def _open(path: Path, lidar: str | None = None) -> Drive | Path:
-    """Returns the drive at a path, or the path if it is a map file."""
+def open_source(path: Path, lidar: str | None = None) -> Drive | Path:
+    """Opens a drive; returns the path of a cloud.
+
+    Raises:
+        InputError: if it cannot be read.
+    """
     path = Path(path)
     if path.is_file() and is_cloud(path):
         return path

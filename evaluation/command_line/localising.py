@@ -85,6 +85,7 @@ def localise(
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
     from cns_drake.base.process import num_cores
+    from evaluation.change.drive_change import open_source
     from evaluation.drives import Drive, check_same_world
     from evaluation.localisation import localise as queries
     from evaluation.localisation import tracking
@@ -103,8 +104,8 @@ def localise(
         map(parse_setting, parameter or [])
     )
     estimator = make_estimator(method, settings)
-    source = queries.open_source(place, lidar)
-    drive = queries.as_query(queries.open_source(query, lidar))
+    source = open_source(place, lidar)
+    drive = queries.as_query(open_source(query, lidar))
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)

@@ -23,8 +23,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_number
 from cns_drake.base.progress import Track, silent
-from evaluation.clouds.cloud_files import is_cloud, read_cloud
-from evaluation.drives import open_drive
+from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
 from evaluation.localisation.estimators import (
     MAX_RANGE,
@@ -147,18 +146,6 @@ class _OneScan(Drive):
     def scan(self, index: int) -> np.ndarray:
         del index
         return self._scan
-
-
-def open_source(path: Path, lidar: str | None = None) -> Drive | Path:
-    """Opens a drive; returns the path of a cloud.
-
-    Raises:
-        InputError: if it cannot be read.
-    """
-    path = Path(path)
-    if path.is_file() and is_cloud(path):
-        return path
-    return open_drive(path, lidar)
 
 
 def as_query(source: Drive | Path) -> Drive:

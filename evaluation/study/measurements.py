@@ -41,7 +41,11 @@ def measure_change(
             of their control if there is one.
     """
     del reporter
-    earlier, later, *controls = (_to_surveyed(part.read()) for part in drives)
+    read: list[SurveyedDrive] = [part.read() for part in drives]
+    earlier, later, *controls = (
+        Surveyed(one.name, one.coarse, one.positions, one.placed)
+        for one in read
+    )
     control = controls[0] if controls else None
     report = compare_maps(earlier, later, control)
     return ChangeResult(map_name, stages, report)
@@ -129,7 +133,3 @@ def measure_costs(
                 )
             )
     return costs
-
-
-def _to_surveyed(drive: SurveyedDrive) -> Surveyed:
-    return Surveyed(drive.name, drive.coarse, drive.positions, drive.placed)
