@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -19,14 +19,12 @@ from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
 from evaluation.command_line.options import (
     Align,
-    AlignName,
     Costs,
     Gate,
     Jobs,
     Json,
     LidarName,
     MethodName,
-    ModeName,
     OwnMethods,
     Parameters,
     Radius,
@@ -70,7 +68,7 @@ def tcr(
             "A's stage. It gives the TCR_sym that the routes alone cause.",
         ),
     ] = None,
-    align: Align = AlignName.AUTO,
+    align: Align = "auto",
     lidar: LidarName = None,
     json: Json = False,
 ) -> None:
@@ -85,7 +83,7 @@ def tcr(
 
     paths = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
-        paths, align.value, terminal.track, lidar
+        paths, align, terminal.track, lidar
     )
     report = change.compare(
         surveys[0],
@@ -122,12 +120,12 @@ def pr(
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
     method: MethodName,
     mode: Annotated[
-        ModeName,
+        Literal["all", "filtered"],
         typer.Option(help="Count all queries, or those that have a match."),
-    ] = ModeName.ALL,
+    ] = "all",
     parameter: Parameters = None,
     sensor_height: SensorHeight = 1.6,
-    align: Align = AlignName.AUTO,
+    align: Align = "auto",
     lidar: LidarName = None,
     across_maps: Annotated[
         bool,
@@ -234,7 +232,7 @@ def pr(
         places,
         query_drive,
         chosen,
-        mode.value,
+        mode,
         protocol,
         terminal.track,
         across_maps=across_maps,

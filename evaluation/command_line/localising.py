@@ -11,7 +11,6 @@ import typer
 from cns_drake.base import terminal
 from evaluation.command_line.options import (
     Align,
-    AlignName,
     Jobs,
     Json,
     LidarName,
@@ -59,7 +58,7 @@ def localise(
             "many degrees for each metre.",
         ),
     ] = 0.01,
-    align: Align = AlignName.AUTO,
+    align: Align = "auto",
     lidar: LidarName = None,
     jobs: Jobs = None,
     output: Annotated[

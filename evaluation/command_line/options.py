@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from enum import Enum
 import functools
 import inspect
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -21,37 +20,17 @@ if TYPE_CHECKING:
     from evaluation.drives import Drive
 
 
-class ModeName(str, Enum):
-    """The queries of a precision-recall curve."""
-
-    ALL = "all"
-    FILTERED = "filtered"
-
-
-class ProtocolName(str, Enum):
-    """How queries are asked."""
-
-    FAIR = "fair"
-    PAPER = "paper"
-
-
-class AlignName(str, Enum):
-    """When drives are aligned to one world."""
-
-    AUTO = "auto"
-    ALWAYS = "always"
-    NEVER = "never"
-
-
+# When drives are aligned to one world.
+When = Literal["auto", "always", "never"]
 NamedProtocol = Annotated[
-    ProtocolName,
+    Literal["fair", "paper"],
     typer.Option(
         "--protocol",
         help="Queries turned and tilted at random, or as the paper asked.",
     ),
 ]
 Align = Annotated[
-    AlignName,
+    When,
     typer.Option(
         help="Align drives: those whose world frames differ, all, or none."
     ),
@@ -205,14 +184,14 @@ def open_noted(*paths: Path, lidar: str | None) -> list[Drive]:
 
 
 def aligned(
-    drives: Sequence[Drive], when: AlignName, *, across_maps: bool = False
+    drives: Sequence[Drive], when: When, *, across_maps: bool = False
 ) -> tuple[Drive, Drive]:
     """Returns two drives in one world, with a note if one was moved."""
     from evaluation.alignment import in_one_world
 
     first, second = drives
     alignment = in_one_world(
-        first, second, when.value, terminal.track, across_maps=across_maps
+        first, second, when, terminal.track, across_maps=across_maps
     )
     if alignment is None:
         return first, second
@@ -276,12 +255,12 @@ def with_named_protocol(command: Callable[..., None]) -> Callable[..., None]:
     Args:
         command: likewise; the rest is that of the named protocol.
     """
-    named = (NamedProtocol, ProtocolName.FAIR)
+    named = (NamedProtocol, "fair")
 
     @functools.wraps(command)
     def with_options(**values: Any) -> None:
         chosen = {name: values.pop(name) for name in _OPTIONS}
-        base = PROTOCOLS[values.pop("named_protocol").value]
+        base = PROTOCOLS[values.pop("named_protocol")]
         command(**values, protocol=replace(base, **chosen))
 
     options = {"named_protocol": named, **_OPTIONS}

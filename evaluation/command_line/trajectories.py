@@ -12,7 +12,6 @@ import typer
 from cns_drake.base import terminal
 from evaluation.command_line.options import (
     Align,
-    AlignName,
     Json,
     LidarName,
     aligned,
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 def drives(
     first: Annotated[Path, typer.Argument(metavar="A")],
     second: Annotated[Path, typer.Argument(metavar="B")],
-    align: Align = AlignName.AUTO,
+    align: Align = "auto",
     lidar: LidarName = None,
     json: Json = False,
 ) -> None:
