@@ -240,13 +240,7 @@ def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
         command: has a keyword `protocol`, a `RetrievalProtocol`, which the
             options replace on the command line; the rest is the default.
     """
-
-    @functools.wraps(command)
-    def with_options(**values: Any) -> None:
-        chosen = {name: values.pop(name) for name in _OPTIONS}
-        command(**values, protocol=replace(DEFAULT_PROTOCOL, **chosen))
-
-    return _with_parameters(command, with_options, _OPTIONS)
+    return _with_options(command, _OPTIONS)
 
 
 def with_named_protocol(command: Callable[..., None]) -> Callable[..., None]:
@@ -255,38 +249,35 @@ def with_named_protocol(command: Callable[..., None]) -> Callable[..., None]:
     Args:
         command: likewise; the rest is that of the named protocol.
     """
-    named = (NamedProtocol, "fair")
-
-    @functools.wraps(command)
-    def with_options(**values: Any) -> None:
-        chosen = {name: values.pop(name) for name in _OPTIONS}
-        base = PROTOCOLS[values.pop("named_protocol")]
-        command(**values, protocol=replace(base, **chosen))
-
-    options = {"named_protocol": named, **_OPTIONS}
-    return _with_parameters(command, with_options, options)
+    named = {"named_protocol": (NamedProtocol, "fair")}
+    return _with_options(command, {**named, **_OPTIONS})
 
 
-def _with_parameters(
+def _with_options(
     command: Callable[..., None],
-    wrapper: Callable[..., None],
     options: Mapping[str, tuple[object, object]],
 ) -> Callable[..., None]:
-    """Returns a wrapper of a command, with options instead of `protocol`."""
+    """Returns a command with options instead of `protocol`."""
+
+    @functools.wraps(command)
+    def wrapper(**values: Any) -> None:
+        chosen = {name: values.pop(name) for name in _OPTIONS}
+        base = DEFAULT_PROTOCOL
+        if "named_protocol" in options:
+            base = PROTOCOLS[values.pop("named_protocol")]
+        command(**values, protocol=replace(base, **chosen))
+
     signature = inspect.signature(command, eval_str=True)
-    own = [p for p in signature.parameters.values() if p.name != "protocol"]
-    added = [
-        inspect.Parameter(
-            name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=default,
-            annotation=annotation,
-        )
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        one.replace(kind=keyword)
+        for one in signature.parameters.values()
+        if one.name != "protocol"
+    ]
+    parameters += [
+        inspect.Parameter(name, keyword, default=default, annotation=annotation)
         for name, (annotation, default) in options.items()
     ]
-    parameters = [
-        one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own
-    ] + added
     wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     wrapper.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapper
