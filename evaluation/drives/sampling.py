@@ -19,7 +19,6 @@ from cns_drake.base import poses
 from cns_drake.base.compiled import compiled
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.poses import make_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +66,7 @@ class QuerySensor:
         if turns or tilt_deg > 0.0:
             angles = [yaw if turns else 0.0, pitch, roll]
             R_SQ = Rotation.from_euler("ZYX", angles).as_matrix()
-            X_SQ = make_pose(R_SQ, np.zeros(3))
+            X_SQ = poses.make_pose(R_SQ, np.zeros(3))
         return cls(X_SQ, float(hidden_from), math.radians(hidden_deg))
 
     def without_hidden(self, scan: np.ndarray) -> np.ndarray:

@@ -22,12 +22,7 @@ from pydantic import computed_field
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.terminal import note
-from evaluation.methods.method import (
-    Method,
-    MethodConfig,
-    register,
-    yaw_pose,
-)
+from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 RINGS = 64
 SECTORS = 192

@@ -22,12 +22,7 @@ from pydantic import PositiveFloat, PositiveInt
 
 from cns_drake.base.errors import InputError
 from evaluation.maps.voxel_maps import thin
-from evaluation.methods.method import (
-    Method,
-    MethodConfig,
-    PlaceScan,
-    register,
-)
+from evaluation.methods.method import Method, MethodConfig, PlaceScan, register
 
 # Larger than any number of local maps, and the number of the first query. The
 # numbers of later queries fall, and stay far above those of places, since the

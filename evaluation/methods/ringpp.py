@@ -24,12 +24,7 @@ import scipy.special
 
 from cns_drake.base.compiled import compiled
 from evaluation.geometry.neighbours import nearest_neighbours
-from evaluation.methods.method import (
-    Method,
-    MethodConfig,
-    register,
-    yaw_pose,
-)
+from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 # See `local_features`.
 _NUM_FEATURES = 6

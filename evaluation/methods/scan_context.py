@@ -35,12 +35,7 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
 from evaluation.maps.voxel_maps import thin
-from evaluation.methods.method import (
-    Method,
-    MethodConfig,
-    register,
-    yaw_pose,
-)
+from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 # Bounds the memory of an exhaustive comparison.
 _CONTEXTS_AT_ONCE = 512

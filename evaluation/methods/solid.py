@@ -16,12 +16,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
-from evaluation.methods.method import (
-    Method,
-    MethodConfig,
-    register,
-    yaw_pose,
-)
+from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 
 class SolidConfig(MethodConfig):

@@ -33,10 +33,7 @@ from evaluation.recognition.metrics import (
 )
 from evaluation.recognition.place_recognition import RADII, RecognitionResult
 from evaluation.recognition.pose_errors import PoseErrors
-from evaluation.recognition.protocol import (
-    PROTOCOL_COLUMNS,
-    check_one_protocol,
-)
+from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.report.tables import (

@@ -13,11 +13,7 @@ from evaluation.drives import open_drive
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.surveys import (
-    DriveSource,
-    RecordedDrive,
-    described_key,
-)
+from evaluation.study.surveys import DriveSource, RecordedDrive, described_key
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
 _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"

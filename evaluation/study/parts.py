@@ -9,8 +9,7 @@ takes a tenth of a second.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-import dataclasses
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 import importlib
 import io
 import json
@@ -115,12 +114,12 @@ class _Encoder:
         if isinstance(value, np.generic):
             return {"scalar": self._add(np.asarray(value))}
         name = [kind.__module__, kind.__qualname__]
-        if dataclasses.is_dataclass(value):
-            fields = {
+        if is_dataclass(value):
+            values = {
                 field.name: self.encode(getattr(value, field.name))
-                for field in dataclasses.fields(value)
+                for field in fields(value)
             }
-            return {"dataclass": name, "fields": fields}
+            return {"dataclass": name, "fields": values}
         if isinstance(value, tuple) and hasattr(value, "_fields"):
             return {"named": name, "values": [self.encode(v) for v in value]}
         raise TypeError(
@@ -172,7 +171,7 @@ def _decode(tree: Any, arrays: list[np.ndarray]) -> Any:
             raise TypeError(f"{kind.__name__} is no such tuple")
         return tuple.__new__(kind, values)
     kind = _find(*tree["dataclass"])
-    names = {field.name for field in dataclasses.fields(kind)}
+    names = {field.name for field in fields(kind)}
     if names != tree["fields"].keys():
         raise TypeError(f"{kind.__name__} has other fields")
     made = object.__new__(kind)
