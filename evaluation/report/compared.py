@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.files import completing
 from evaluation.report.ladder import (
     RUNG_COLUMNS,
     CauseCell,
@@ -70,9 +69,7 @@ def write_compared(
         columns: further ones.
     """
     keys = {**RUNG_COLUMNS, "method": lambda row: row.method}
-    with completing(path) as unfinished:
-        table = Table.of(rows, {**keys, **columns})
-        unfinished.write_text(table.to_csv(), encoding="utf-8")
+    Table.of(rows, {**keys, **columns}).write_csv(path)
 
 
 def draw_compared(
