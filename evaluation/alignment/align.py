@@ -258,12 +258,8 @@ def _start(
 ) -> tuple[LoopSearch, str, int | None]:
     """Finds first loops.
 
-    Returns:
-        A search with some loops; the source of the guess; the number of
-        candidates if places had to be recognised.
-
-    Raises:
-        InputError: if no guess fits.
+    Returns the search with them, the source of the guess, and the number of
+    candidates if places had to be recognised. Refuses drives if no guess fits.
     """
     a, b = source.drive, target.drive
     known = None

@@ -235,16 +235,9 @@ def _way(drive: Drive) -> _Way:
 
 
 def _nearest(p_A: np.ndarray, direction: np.ndarray, way: _Way) -> np.ndarray:
-    """Returns the steps of a way nearest to stops, in given directions.
+    """Returns the steps of a way nearest to stops (N, 3), in directions (N, 2).
 
-    Args:
-        p_A: (N, 3) places of the stops [m].
-        direction: (N, 2) directions, of length 1.
-        way: the way.
-
-    Returns:
-        (N,) numbers of the steps; -1 where it does not pass by in a direction
-        less than 90 deg away.
+    -1 where the way does not pass by in a direction less than 90 deg away.
     """
     xy = way.p_WS[:, :2]
     found = np.full(len(p_A), -1)
@@ -270,12 +263,8 @@ def _offsets(
 def _correlation_length(offset: np.ndarray, within: np.ndarray) -> float:
     """Returns the distance at which the correlation has fallen to 1/e [m].
 
-    Between stops it is interpolated. It is NaN if the correlation does not fall
-    so far within a quarter of the stops.
-
-    Args:
-        offset: (N,) offsets at the stops [m].
-        within: (N,) the stops that count.
+    Between the stops that count it is interpolated. It is NaN if the
+    correlation does not fall so far within a quarter of the stops.
     """
     if not within.any():
         return math.nan

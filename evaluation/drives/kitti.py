@@ -195,14 +195,7 @@ def _rows_of_scans(
 ) -> np.ndarray:
     """Returns the rows of a table that belong to the scans.
 
-    Args:
-        path: the table.
-        rows: (M, ...): one for each scan, or one for each number.
-        numbers: numbers of the N scans.
-        notes: gets a note if scans are missing.
-
-    Raises:
-        InputError: if the table is too short.
+    A table has a row for each scan; or for each number, which gives a note.
     """
     if len(rows) == len(numbers):
         return rows

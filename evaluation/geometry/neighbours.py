@@ -109,7 +109,7 @@ def _search(
     boxes: np.ndarray,
     k: int,
 ) -> np.ndarray:
-    """Finds the neighbours, group by group.
+    """Finds the neighbours (N, k), group by group, in the caller's order.
 
     Args:
         cloud: (3, N) in the order of the groups, N >= k.
@@ -117,9 +117,6 @@ def _search(
         starts: (G + 1,) where each group starts, and the last one ends.
         boxes: (6, G) least and greatest coordinates of the groups.
         k: how many.
-
-    Returns:
-        (N, k) in the caller's order and indices.
     """
     # Separate arrays are indexed faster than one array.
     x, y, z = cloud[0], cloud[1], cloud[2]
@@ -201,14 +198,7 @@ def _search(
 def _squared_gaps(
     box: np.ndarray, others: np.ndarray, number: int, gaps: np.ndarray
 ) -> None:
-    """Writes the squared distances of a box (6,) to some others.
-
-    Args:
-        box: least and greatest coordinates.
-        others: (6, G) likewise.
-        number: number of the others to look at, the first ones.
-        gaps: (G,) to write to.
-    """
+    """Writes the squared distances of a box (6,) to the first others (6, G)."""
     x0, y0, z0 = box[0], box[1], box[2]
     x1, y1, z1 = box[3], box[4], box[5]
     for index in range(number):

@@ -260,12 +260,8 @@ def _search(
 ) -> np.ndarray:
     """Searches for the places and poses at which coarse maps overlap most.
 
-    Args:
-        query: not empty.
-        database: with the places.
-        number: how many places with a heading the second search takes.
-        refined: how many of these the third search takes.
-        exhaustive: keep each place to the last search, with its best heading.
+    The second search takes `number` places with a heading, the third `refined`
+    of them; an exhaustive one keeps each place with its best heading.
 
     Returns:
         (N, 4) int64 places, each with heading and shifts to climb from;
@@ -312,15 +308,8 @@ def _overlaps(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns by how much overlaps near some poses exceed those by chance.
 
-    Args:
-        query: maps at all headings.
-        places: to compare with.
-        weights: (4,) of a common bit of each map.
-        starts: (N, 4) place, heading and shifts to look near.
-        moves: see `best_overlaps`.
-
-    Returns:
-        (N,) standard deviations above chance, and (N, 4) the best poses.
+    Poses, starts among them, are (N, 4): place, heading and shifts. The first
+    result is (N,) standard deviations, the second the best poses.
     """
     counts, found = best_overlaps(
         query.bits, places.bits, weights, starts, moves

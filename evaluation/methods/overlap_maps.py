@@ -104,14 +104,8 @@ def _ground_below(
 ) -> np.ndarray:
     """Returns the height of the ground below each point (N,) [m].
 
-    In each sector it is followed from ring to ring by the lowest points.
-
-    Args:
-        x: (N,) coordinates [m].
-        y: (N,) likewise.
-        z: (N,) likewise.
-        half: greatest of x and y [m].
-        start: height of the ground below the sensor [m].
+    In each sector it is followed by the lowest points, from ring to ring up to
+    `half` of x and y [m], from its height `start` below the sensor [m].
     """
     # Sectors are equal along a square: its angles need no arc tangent, whose
     # last bits differ between processors.
@@ -138,15 +132,9 @@ def _ground_below(
 def _extremes(
     values: np.ndarray, cells: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the least and the greatest value in each of some cells.
+    """Returns the least and the greatest of values (N,) in each cell, (size,).
 
-    Args:
-        values: (N,).
-        cells: (N,) int64, in which cell each is.
-        size: number of cells.
-
-    Returns:
-        (size,) each; infinite, and minus infinite, for a cell without values.
+    They are infinite, and minus infinite, for a cell without values.
     """
     least, greatest = np.full(size, np.inf), np.full(size, -np.inf)
     for i in range(len(values)):

@@ -208,14 +208,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         database: RingDatabase,
         place: int,
     ) -> np.ndarray:
-        """Returns X_PQ (4, 4) of the query in a place that shows something.
-
-        Args:
-            weighted: see `_weigh`.
-            turned: returns the spectrum of the query's map at a heading.
-            database: the places.
-            place: which of them.
-        """
+        """Returns X_PQ (4, 4) of a weighed query in a place with features."""
         num_cells = self.config.cells
         correlation = self._correlate(weighted, database.places[place].spectrum)
         shift = -_signed(int(correlation.argmax()), num_cells)
@@ -295,17 +288,11 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def _correlate(
         self, weighted: np.ndarray, spectrum: np.ndarray
     ) -> np.ndarray:
-        """Correlates a query with one place.
+        """Correlates a query, see `_weigh`, with the spectrum of one place.
 
-        The circular correlation over the angles is taken for each channel
-        and frequency, and the magnitudes are summed, as in the program.
-
-        Args:
-            weighted: (6 F, F), see `_weigh`.
-            spectrum: (6 F, F) of the place.
-
-        Returns:
-            (n,) for each shift of the place's rows by 0, ..., n - 1.
+        The circular correlation over the angles is taken for each channel and
+        frequency, and the magnitudes are summed, as in the program: (n,), for
+        each shift of the place's rows by 0, ..., n - 1.
         """
         correlations = scipy.fft.irfft(
             weighted * spectrum.conj(), n=self.config.cells, axis=1
@@ -365,16 +352,11 @@ def _spectrum(image: np.ndarray) -> np.ndarray:
 
 
 def _best_offset(product: np.ndarray, n: int) -> tuple[float, tuple[int, int]]:
-    """Returns how far an image is shifted against a reference.
+    """Returns how far an image with sides n is shifted against a reference.
 
-    Args:
-        product: (C, n, F) spectrum of the image, times the conjugate of that of
-            the reference.
-        n: length of their sides.
-
-    Returns:
-        The correlation, summed over the magnitudes of its channels, and the
-        shift (rows, columns) at which it is greatest.
+    The product (C, n, F) is that of the image's spectrum with the conjugate of
+    the reference's. The correlation, summed over the magnitudes of its
+    channels, comes before the shift (rows, columns) at which it is greatest.
     """
     correlations = scipy.fft.irfft2(product, s=(n, n))
     correlation = np.abs(correlations, out=correlations).sum(axis=0)
@@ -450,14 +432,10 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 
 @compiled
 def _moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Returns the second moments of each point's neighbours about their mean.
+    """Returns the second moments of each point's K neighbours about their mean.
 
-    Args:
-        points: (N, 3) float64.
-        neighbours: (N, K) indices.
-
-    Returns:
-        (7, N) sums of products xx, yy, zz, xy, xz and yz, and the range of z.
+    They are (7, N): sums of products xx, yy, zz, xy, xz and yz, and the range
+    of z.
     """
     num_points, num_neighbours = neighbours.shape
     result = np.empty((7, num_points))

@@ -329,14 +329,9 @@ def _highest(
     min_points: int,
     floor: float,
 ) -> np.ndarray:
-    """Returns the greatest height in each cell, 0 where there are too few.
+    """Returns the greatest of heights (N,) in each cell, 0 with too few [m].
 
-    Args:
-        heights: (N,) [m].
-        cells: (N,) number of each point's cell.
-        shape: rows and columns of the result.
-        min_points: that a cell needs.
-        floor: what a filled cell holds at least.
+    A filled cell holds `floor` at least.
     """
     size = shape[0] * shape[1]
     highest = np.full(size, floor)
@@ -356,15 +351,10 @@ def _unit_columns(images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _key_shift(key: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Returns the shift of each row of `others` that fits `key` best.
+    """Returns the shift (C,) of each row of others that fits a key best.
 
-    Args:
-        key: (columns,).
-        others: (C, columns).
-
-    Returns:
-        (C,) the s that minimises |key - roll(other, s)|, which is the one that
-        maximises their product; the lowest of equal ones.
+    It is the s that minimises |key - roll(other, s)|, which is the one that
+    maximises their product; the lowest of equal ones.
     """
     column = np.arange(len(key))
     rolled = key[(column + column[:, None]) % len(key)]

@@ -252,11 +252,7 @@ def _best_methods(
     """Returns the methods of the greatest AUC on each pair.
 
     They are those that Table II prints in bold: two or more if its digits are
-    the same.
-
-    Args:
-        results: on all pairs.
-        mode: mode in which methods are counted; None for the paper's of each.
+    the same. Without a mode, each is counted in the paper's.
     """
     table = recognition_table(results, (), mode, paper())
     methods = [name for name, _ in table.groups[1:]]

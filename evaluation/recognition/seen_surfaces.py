@@ -150,14 +150,10 @@ def _find_corners(
     corners: np.ndarray,
     away: np.ndarray,
 ) -> None:
-    """Finds the nearest return in each quadrant around a direction.
+    """Finds the nearest return in each quadrant around a point's direction.
 
-    Args:
-        p: (3,) a point in the direction.
-        angles: see `SeenSurfaces`.
-        starts: likewise.
-        corners: (4,) to fill with indices of returns; -1 without one.
-        away: (4,) to fill with their angular distances [deg].
+    Fills (4,) indices of returns, -1 without one, and (4,) their angular
+    distances [deg].
     """
     corners[:] = -1
     away[:] = math.inf

@@ -288,15 +288,7 @@ def _draw_panels(
     legend: Legend = (),
     routes: Sequence[np.ndarray] = (),
 ) -> None:
-    """Draws pictures side by side, of equal height.
-
-    Args:
-        titles: one for each picture.
-        pictures: from left to right.
-        stem: path to write, without ending.
-        legend: stands below all pictures.
-        routes: the route (N, 2) on each picture [m]; empty for none.
-    """
+    """Draws pictures side by side, of equal height; the legend stands below."""
     shapes = [(e[1] - e[0], e[3] - e[2]) for e in (p.extent for p in pictures)]
     tallest = max(height / width for width, height in shapes)
     figure = Figure(
@@ -448,12 +440,9 @@ def _height_parts(heights: np.ndarray) -> np.ndarray:
 
 
 def _shade(depth: np.ndarray) -> np.ndarray:
-    """Returns the brightness of each pixel, 0 to 1, from steps in depth.
+    """Returns the brightness of each pixel, 0 to 1, from steps in depth [m].
 
-    It is NaN where there is nothing.
-
-    Args:
-        depth: (H, W) towards the camera [m]; -inf where there is nothing.
+    The depth is -inf, and the brightness NaN, where there is nothing.
     """
     padded = np.pad(depth, 1, constant_values=-np.inf)
     height, width = depth.shape

@@ -227,11 +227,6 @@ def _change(
 
     Points have come or gone if they stand on a structure without a point in the
     other scan, although nothing hides them from its sensor.
-
-    Args:
-        place: scan of the right place of the query.
-        query: its own scan.
-        classes: instance -> class of the structure.
     """
     changed: Counter[str] = Counter()
     total = 0

@@ -137,11 +137,8 @@ def correlation_table(points: Sequence[TrendPoint]) -> Table:
 def _correlations(values: np.ndarray) -> np.ndarray:
     """Returns Spearman's correlation of the first column with the others.
 
-    Args:
-        values: (..., N, C).
-
-    Returns:
-        (..., C - 1); NaN where a column is constant.
+    Values are (..., N, C), correlations (..., C - 1); NaN where a column is
+    constant.
     """
     ranks = rankdata(values, axis=-2)
     ranks -= ranks.mean(axis=-2, keepdims=True)
