@@ -32,7 +32,7 @@ class ComparedPair:
 
     @property
     def name(self) -> str:
-        """What tells it from other pairs."""
+        """Its drives, cause, level and seed, which no other pair has."""
         names = (get(self) for get in RUNG_COLUMNS.values())
         return " ".join(map(str, (*names, self.seed)))
 
