@@ -53,10 +53,6 @@ def _for_all(
 
     That is, processes side by side, and calls with a number that is written
     out: numba would compile for that one number.
-
-    Args:
-        compile_for: compiles for types of arguments.
-        file: to lock meanwhile.
     """
 
     def compile_once(types: tuple) -> object:

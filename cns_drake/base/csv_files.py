@@ -64,10 +64,6 @@ def read_records(
 ) -> list[tuple[int, dict[str, str]]]:
     """Returns the rows of a CSV file whose first line names the columns.
 
-    Args:
-        path: the file.
-        columns: those that must be there.
-
     Returns:
         For each row the number of its line, and column -> cell. A column that
         had another name in earlier versions has that of now.

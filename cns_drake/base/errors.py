@@ -86,8 +86,6 @@ def describe_validation_error(
     An unknown field comes first, a missing one last: its name may be misspelt.
 
     Args:
-        source: the file or object that was validated.
-        error: a `pydantic.ValidationError`.
         model: the pydantic model, used to suggest the names of misspelt fields.
     """
     fault = min(error.errors(), key=_urgency)
@@ -127,7 +125,6 @@ def nearest_field(
     """Returns the field that is written most like an unknown one.
 
     Args:
-        model: the model that the whole file should fit.
         place: keys and indices that lead to the unknown field; the last is the
             field itself.
     """

@@ -117,7 +117,6 @@ def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
     """Reads a whole file, unless it is too large.
 
     Args:
-        path: the file.
         limit: greatest size [bytes]; the default is ample for files written by
             hand.
 

@@ -17,7 +17,6 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
 
     Args:
         points: structured array of shape (N,) with fields `x`, `y`, `z`.
-        dtype: type of the result.
     """
     coordinates = np.empty((len(points), 3), dtype=dtype)
     # NumPy warns when it converts some NaN.
@@ -73,7 +72,6 @@ def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
 
     Args:
         points: (N,) structured array.
-        name: the field's name.
         values: (N,) or (N, K) float64.
 
     Raises:

@@ -47,7 +47,6 @@ def show_bars(
 
     Args:
         columns: shown between bar and note.
-        console: where; stderr by default.
     """
     progress = Progress(
         TextColumn("{task.description}", table_column=fixed_column()),
@@ -76,9 +75,6 @@ def show_progress(console: Console | None = None) -> Iterator[Progress]:
     """Shows progress bars, each one line, with elapsed and remaining time.
 
     See `show_bars`; without a terminal see `count_progress`.
-
-    Args:
-        console: where; stderr by default.
     """
     with show_bars(
         TimeElapsedColumn(table_column=fixed_column()),
@@ -95,11 +91,6 @@ def count_progress(
     """Returns a callback that shows how many frames of how many are done.
 
     On a terminal the bar moves; elsewhere a line is printed every few seconds.
-
-    Args:
-        progress: where the task is shown.
-        task: its id.
-        unit: what is counted.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else LINE_INTERVAL

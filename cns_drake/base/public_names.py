@@ -14,10 +14,6 @@ def attach(
 
     The stub `__init__.pyi`, which type checkers read, says which names there
     are and where they are defined.
-
-    Args:
-        package: its name.
-        file: its `__init__.py`.
     """
     stub = Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
     homes = {

@@ -36,9 +36,6 @@ def plain_app(**settings: Any) -> typer.Typer:
 
     Rich would take units such as "[m, rad]" for markup, and its frames and
     columns leave little room for words on a narrow terminal.
-
-    Args:
-        **settings: more arguments of `typer.Typer`.
     """
     return typer.Typer(
         rich_markup_mode=None, pretty_exceptions_enable=False, **settings
@@ -50,11 +47,6 @@ def make_program(name: str, summary: str, epilog: str) -> typer.Typer:
 
     It has `--version` and the options of shell completion, and shows its help
     when called without arguments.
-
-    Args:
-        name: the program's name.
-        summary: how its help begins.
-        epilog: how it ends; see `example`.
     """
     app = plain_app(help=summary, epilog=epilog)
 

@@ -79,7 +79,6 @@ def read_elements(
     Prefixes of names need not be declared.
 
     Args:
-        path: the file.
         root: tag of its outermost element; any if None.
         encoding: that of the file; what it says itself if None.
 

@@ -34,10 +34,6 @@ def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
     than memory holds, or contain themselves. A key that is there twice is
     refused; YAML's libraries would silently use the last.
 
-    Args:
-        text: the document, as bytes in an encoding of YAML.
-        loader: the class that makes values of nodes.
-
     Returns:
         Its value; None for an empty document.
 
@@ -70,11 +66,7 @@ def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
 
 
 def _check_depth(text: str | bytes, loader: type) -> None:
-    """Refuses YAML whose nesting is too deep for the parser of nodes.
-
-    Raises:
-        ValueError: if it is.
-    """
+    """Refuses YAML whose nesting is too deep for the parser of nodes."""
     depth = 0
     for event in yaml.parse(text, Loader=loader):
         if isinstance(event, yaml.CollectionStartEvent):
@@ -89,16 +81,7 @@ def _check_depth(text: str | bytes, loader: type) -> None:
 
 
 def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Returns how many nodes a node stands for when aliases are resolved.
-
-    Args:
-        node: the node.
-        sizes: sizes of the nodes seen before, by id; 0 for the nodes that
-            contain this one.
-
-    Raises:
-        ValueError: if it is out of bounds.
-    """
+    """Returns how many nodes a node stands for when aliases are resolved."""
     if isinstance(node, yaml.ScalarNode):
         return 1
     line = node.start_mark.line + 1

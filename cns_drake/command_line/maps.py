@@ -91,7 +91,6 @@ def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
     """Yields the lines of a table of drives.
 
     Args:
-        rows: the drives.
         width: the most characters of a line; columns other than the names are
             dropped to keep it. None keeps all columns.
     """

@@ -189,11 +189,7 @@ def simulate(
 
 
 def _switches(texts: Iterable[str]) -> dict[str, str]:
-    """Returns the switches of `--transient` by name.
-
-    Raises:
-        InputError: one has no value, or has two.
-    """
+    """Returns the switches of `--transient` by name."""
     found: dict[str, str] = {}
     for text in texts:
         for item in text.split(","):

@@ -38,14 +38,11 @@ def export_drive(
     """Exports a recording.
 
     Args:
-        recording: the .mcap file, or the folder that holds it.
-        format_name: `cns`, `kitti` or `tum`.
         output: the folder of drives; new, empty, or one that this function
             has written drives of the same format to.
         lidar: name of the LiDAR to export, if the recording has several.
         absent_in: another stage of the recording's map; points of structures
             that are absent there get the labels of `MarkedDrive`.
-        on_frame: takes how many frames of how many are done.
 
     Returns:
         The folder of the drive.

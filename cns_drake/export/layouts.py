@@ -78,7 +78,6 @@ def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
     """Returns `scenario.yaml`, if the recording has a scenario.
 
     Args:
-        drive: the recording.
         name: the drive's name; by default the recording's.
     """
     if drive.scenario is None:

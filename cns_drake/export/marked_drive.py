@@ -30,8 +30,6 @@ class MarkedDrive(McapDrive):
         """Opens a recording and loads the other stage.
 
         Args:
-            path: the .mcap file, or the folder that holds it.
-            lidar: see `McapDrive`.
             stage: the other stage's name, as in `stage_<stage>.sdf`.
 
         Raises:

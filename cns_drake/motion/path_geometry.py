@@ -267,7 +267,6 @@ class PathIntegral:
         """Tabulates the integral at the knots.
 
         Args:
-            path: the path.
             integrand: function of a `PathJet` that returns (N,) values.
         """
         self._integrand = integrand

@@ -65,9 +65,7 @@ def find_speed_profile(
     taken off the acceleration bound.
 
     Args:
-        path: the path.
         speed_limits: (N,) limits at the path's control points [m/s].
-        speeds: the bounds.
     """
     count = max(2, int(np.ceil(path.end / _STEP)) + 1)
     u = np.linspace(0.0, path.end, count)

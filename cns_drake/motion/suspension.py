@@ -260,11 +260,6 @@ def ride_on_springs(
     The vehicle follows the same path at the same speed. Its springs feel the
     acceleration of the body's centre of mass, gravity on slopes, and the
     profile below each wheel.
-
-    Args:
-        trajectory: without ride.
-        suspension: the car's.
-        profile: the road's.
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS

@@ -51,11 +51,7 @@ class FrameMotion(NamedTuple):
         return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
 
     def of_frame(self, motion: FrameMotion) -> FrameMotion:
-        """Returns the motion in E of a frame B that moves in F.
-
-        Args:
-            motion: motion of B in F.
-        """
+        """Returns the motion in E of a frame B that moves in F."""
         p, w, v, alpha, a = (rotated(self.R, vector) for vector in motion[1:])
         rotating = cross(self.alpha, p) + cross(self.w, cross(self.w, p))
         return FrameMotion(
@@ -353,7 +349,6 @@ def _path_motion(
     """Returns the motion of the path's frame F in the world.
 
     Args:
-        jet: the path at N places.
         rate: (N,) rates of its parameter [1/s].
         acceleration: (N,) their rates [1/s^2].
     """

@@ -54,8 +54,6 @@ class VehicleImu(LeafSystem):
         """Declares the ports.
 
         Args:
-            trajectory: motion of the vehicle B.
-            X_BI: pose of the IMU on it.
             gravity_W: the acceleration of free fall [m/s^2].
             rate: samples per second [1/s].
             measure: adds errors. It takes the number of the first sample and

@@ -63,7 +63,6 @@ class WheelMotion:
         """Prepares the wheel.
 
         Args:
-            trajectory: motion of the vehicle.
             p_BC: position of the wheel's centre in the vehicle frame [m].
         """
         self._x, self._y, self._radius = p_BC
@@ -366,7 +365,6 @@ class VehicleSweep(LeafSystem):
         """Declares the port.
 
         Args:
-            trajectory: motion of B.
             offsets: (N,) times after the present one [s].
         """
         super().__init__()

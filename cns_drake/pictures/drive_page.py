@@ -136,13 +136,10 @@ def make_drive_page(
     then violet. Below the time line are plots of speed, IMU and stage.
 
     Args:
-        drive: the record of the drive.
-        world: the stage, with the vehicle.
         other_stage: the stage to show the difference to.
         other_name: its name in the page.
         stage: name of the stage, if the world is one of a map.
         stages: names of all stages of that map, the earliest first.
-        title: title of the page.
     """
     with _quiet():
         meshcat = Meshcat(MeshcatParams(host="127.0.0.1", port=0))
@@ -171,8 +168,6 @@ def make_panel(
     """Returns the HTML of title, legend, plots and buttons.
 
     Args:
-        title: plain text.
-        drive: the record of the drive.
         changes: the keys of `CHANGE_RGB` that the page has.
         other_name: the name of the other stage.
         stage: name of the stage, if the world is one of a map.

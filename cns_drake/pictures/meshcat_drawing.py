@@ -53,9 +53,6 @@ def draw_parts(
     """Draws parts of a city as one mesh for each class, `<path>/<class>`.
 
     Args:
-        meshcat: where to draw.
-        path: the layer's path.
-        parts: what to draw.
         rgba: colour of all of it; by default each part has its own.
     """
     by_class: dict[str, list[Part]] = {}
@@ -100,8 +97,6 @@ def draw_route(
     """Draws a route as a ribbon on the ground, red (start) to blue (end).
 
     Args:
-        meshcat: where to draw.
-        path: the route's path.
         X_WBs: poses along the route; its width lies along y of B.
     """
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
@@ -143,8 +138,6 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
     """Draws points coloured by their height, as large near as far away.
 
     Args:
-        meshcat: where to draw.
-        path: the path of the points.
         p_WRset: (N, 3) positions in the world [m].
     """
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
@@ -161,7 +154,6 @@ def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     """Lights a scene by day and looks at it from the air, from the south.
 
     Args:
-        meshcat: the scene.
         lower: (3,) least coordinates of the view [m].
         upper: (3,) greatest coordinates of the view [m].
     """

@@ -64,7 +64,6 @@ class MeshcatRecorder(LeafSystem):
         """Declares the ports and the schedule.
 
         Args:
-            world: the stage, with the vehicle.
             X_BSs: LiDAR name -> pose of its frame S in B.
             period: time between frames [s].
             num_frames: number of frames to record, if not all.
@@ -124,7 +123,6 @@ class MeshcatRecorder(LeafSystem):
 
         Args:
             path: the HTML file; an older one is replaced.
-            title: the title of the page.
 
         Raises:
             InputError: if the file cannot be written.

@@ -57,7 +57,6 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
 
     Args:
         stages: title -> SDF world, from left to right.
-        view: the camera.
         path: the picture to write; its ending chooses the format.
 
     Raises:

@@ -86,10 +86,6 @@ class StageScene:
     def __init__(self, path: Path, without: Collection[str] = ()):
         """Loads an SDF world.
 
-        Args:
-            path: file of the world.
-            without: names of structures to leave out.
-
         Raises:
             InputError: the world cannot be loaded.
         """
@@ -159,7 +155,6 @@ def render(
 
     Args:
         scene: the ray-casting scene of `geometries`.
-        geometries: give the colours.
         X_WC: camera pose; x forward, y left, z up.
         width: columns [pixel].
         height: rows [pixel].

@@ -65,8 +65,6 @@ def make_static_page(
     space. Browsers of 2023 or later decompress them.
 
     Args:
-        meshcat: holds the scene.
-        title: the title of the page, plain text.
         body: HTML before the scene, visible while it loads.
         script: JavaScript module, run when the page is ready; its `commands` is
             a promise of the scene.

@@ -89,9 +89,7 @@ class EmbreeHierarchy:
         """Builds the hierarchy.
 
         Args:
-            groups: all groups, placed.
             merge: makes primitives of a group; it may make none.
-            num_threads: number of threads that share the rays of a cast.
             previous: a hierarchy of the same primitives, whose scenes of
                 unchanged groups are reused.
 
@@ -232,13 +230,7 @@ class EmbreeHierarchy:
         mask: int = ALL,
         with_normals: bool = False,
     ) -> Hits:
-        """Casts rays.
-
-        Args:
-            rays: N of them.
-            mask: the geometries that rays can hit.
-            with_normals: whether to return normals.
-        """
+        """Casts rays."""
         num_rays = len(rays.d_Sset)
         hits = Hits.room_for(num_rays, with_normals)
         # All threads draw from one iterator, which gives each part once.
@@ -372,14 +364,6 @@ def _cast_packets(
     result of a matrix library depends on the processor.
 
     One Python call per packet would cost more than its rays.
-
-    Args:
-        intersect: casts a packet.
-        tree: what to cast on.
-        mask: the geometries that rays can hit.
-        rays: all rays.
-        hits: their hits, to fill.
-        first, last: select the rays.
     """
     # A packet is an RTCRayHit16, or one of fewer lanes: 12 ray fields and 9 hit
     # fields (10 with room for the primitive of an instance array). It and the

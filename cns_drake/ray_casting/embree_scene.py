@@ -41,8 +41,6 @@ class EmbreeScene:
         """Builds the scene of groups that are placed.
 
         Args:
-            groups: the geometry of the scene.
-            num_threads: number of threads that share the rays of a cast.
             previous: a scene whose parts for unchanged groups are reused.
 
         Raises:

@@ -102,12 +102,7 @@ class MovingGroups:
     """The groups of a scene that are on frames which are not anchored."""
 
     def __init__(self, groups: Sequence[RayGroup], p_WO: np.ndarray):
-        """Takes groups that are placed.
-
-        Args:
-            groups: all groups of the scene.
-            p_WO: the scene's origin.
-        """
+        """Takes groups that are placed."""
         self._groups = groups
         self._p_WO = p_WO
         self._rows = np.array(

@@ -248,11 +248,6 @@ def _cast_on_planes(
     """Updates `hits` where rays meet a half space's plane first.
 
     Rays meet a plane from both sides, like any other surface.
-
-    Args:
-        groups: row -> group of one half space, placed.
-        rays: N of them.
-        hits: their hits so far.
     """
     p, d, ray = rays.p_Oset(), rays.d_Oset(), np.arange(len(rays.d_Sset))
     for row, group in groups.items():

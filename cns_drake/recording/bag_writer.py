@@ -494,7 +494,6 @@ def take_over_frames(
 
     Args:
         bag: an open bag, to which nothing has been written.
-        topics: the bag's topics.
         schedule: ticks of the topics that are not latched, by name.
         frame_topic: the topic with one message a frame.
 

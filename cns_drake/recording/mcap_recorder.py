@@ -232,11 +232,7 @@ class McapRecorder(LeafSystem):
     def _imu_messages(
         self, context: Context, tick: int, stamp_ns: int
     ) -> dict[Topic, Any]:
-        """Writes the IMU's samples of earlier ticks; returns that of this one.
-
-        Raises:
-            ValueError: the port `imu_samples` shows too few samples.
-        """
+        """Writes samples of earlier ticks; returns the message of this one."""
         if self._imu is not None:
             R_WB = self._motion.orientation(context)
             R_WI = None

@@ -74,12 +74,7 @@ def encode_point_cloud(
 
 @functools.cache
 def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
-    """Returns what is about the stamp, the width and the data of a cloud.
-
-    Args:
-        dtype: its records' type.
-        frame_id: see `encode_point_cloud`.
-    """
+    """Returns what is about the stamp, the width and the data of a cloud."""
     data = ros_types.serialize(
         message_class(POINT_CLOUD)(
             header=make_header(frame_id, _MARK * _NS_PER_S + _MARK),
@@ -180,7 +175,6 @@ def make_odometry(
     """Returns an Odometry message: pose in the map, twist in the vehicle.
 
     Args:
-        X_WB: exact pose of the vehicle B in the map W.
         V_WB_B: its spatial velocity, expressed in B [rad/s, m/s].
         stamp_ns: the time of both [ns].
 
@@ -305,7 +299,6 @@ def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
     """Returns a CameraInfo message of a pinhole without distortion.
 
     Args:
-        camera: its intrinsics.
         frame_id: the camera's frame, z ahead and y down.
         stamp_ns: the time of the image [ns].
     """

@@ -95,7 +95,6 @@ class MessageTemplate:
         Args:
             message: made with `number_marks(num_numbers)` and with times of
                 the seconds and nanoseconds of `STAMP_MARK_NS`.
-            num_numbers: N.
 
         Raises:
             ValueError: a number is missing.
@@ -163,7 +162,6 @@ class BoxMessages:
         """Returns the CDR form of the message.
 
         Args:
-            objects: all present objects.
             stamp_ns: the time of all of them [ns].
         """
         who = (objects.instance.tobytes(), objects.semantic_classes)
@@ -202,11 +200,7 @@ def marked_detections(
 
 
 def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
-    """Returns a SceneUpdate that replaces all boxes by those of N objects.
-
-    Args:
-        who, numbers: see `marked_detections`.
-    """
+    """Returns a SceneUpdate that replaces all boxes by those of N objects."""
     deletion = message_class("foxglove_msgs/msg/SceneEntityDeletion")(
         timestamp=_stamp(), type=_DELETE_ALL, id=""
     )

@@ -266,7 +266,6 @@ def repair_mcap(
     Args:
         path: any MCAP file, whole or damaged; it is only read.
         output: the new file; by default `<name>_repaired.mcap` beside it.
-        on_bytes: takes the progress.
 
     Raises:
         InputError: nothing can be read, or the new file exists already, or
@@ -355,11 +354,7 @@ class _Definitions:
         }
 
     def take(self, record: McapRecord | Fault, path: Path) -> None:
-        """Keeps what a record defines.
-
-        Raises:
-            InputError: the file defines more than any recording does.
-        """
+        """Keeps what a record defines."""
         if isinstance(record, Header) and self.header is None:
             self.header = record
             kept: tuple = (record.profile,)

@@ -49,10 +49,7 @@ def describe_topic(
     """Returns the description of a topic and its messages.
 
     Args:
-        name: the topic's name.
         message_type: e.g. `sensor_msgs/msg/PointCloud2`.
-        count: number of its messages.
-        metadata: its channel's; see `channel_metadata`.
         encoding: how the messages are serialised.
     """
     return {
@@ -79,7 +76,6 @@ def make_bag_information(
 
     Args:
         file_name: name of the MCAP file within its folder.
-        topics: the topics, see `describe_topic`.
         start_ns: time of the first message [ns].
         end_ns: time of the last message [ns].
         custom_data: key -> text for `ros2 bag info`.

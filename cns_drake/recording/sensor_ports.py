@@ -63,8 +63,6 @@ class MotionPorts:
         """Declares the port `<name>_pose`.
 
         Args:
-            system: the recorder.
-            name: name of the frame C.
             X_PC: pose of C in the frame P whose pose the port has.
         """
         port = system.DeclareAbstractInputPort(
@@ -118,7 +116,6 @@ class ImuPorts:
         """Returns the message; None if no port is connected.
 
         Args:
-            context: the recorder's.
             R_WI: orientation of the imu frame I; None if it is not known.
             stamp_ns: time of the message [ns].
         """
@@ -155,8 +152,6 @@ class ImuSamplesPort:
         """Yields number, stamp [ns] and message of each new sample.
 
         Args:
-            context: the recorder's.
-            schedule: the recording's.
             since: the last tick whose sample is written.
             tick: the present one.
             start_ns: the stamp of time zero [ns].

@@ -63,7 +63,6 @@ def drive_rows(
 
     Args:
         folder: the map's folder, with `sequence_NN.yaml` and `stage_NN.sdf`.
-        progress: takes a line for each row that has to be measured.
         sizes: stage -> its structures and triangles; for other stages they are
             counted in the world, which takes long to load.
 

@@ -119,11 +119,7 @@ def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     kerbs and walls. An edge at which the ground only falls is not found.
 
     Args:
-        scenario: names the world.
         points: (N, 3) of the path, close together [m].
-
-    Raises:
-        InputError: the world cannot be loaded.
     """
     world = load_world(world_file(scenario), without=scenario.without)
     context = world.plant.CreateDefaultContext()
@@ -155,11 +151,7 @@ def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
 
 
 def _check_steering(trajectory: Trajectory, source: str, cure: str) -> None:
-    """Checks that no bend of a drive is too tight for the car.
-
-    Raises:
-        InputError: naming the source, the place and the remedy.
-    """
+    """Checks that no bend of a drive is too tight for the car."""
     radius, (x, y, _) = trajectory.path.tightest_bend()
     if radius < TIGHTEST_RADIUS:
         raise InputError(

@@ -53,7 +53,6 @@ def digest_inputs(
     files they name.
 
     Args:
-        scenario: the scenario that is recorded.
         watch: also notes each file, before it is read.
 
     Returns:

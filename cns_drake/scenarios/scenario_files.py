@@ -107,11 +107,7 @@ def read_scenario_file(path: Path) -> Scenario:
 
 
 def _read_fields(path: Path) -> dict:
-    """Returns the fields of a file, with absolute paths.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
+    """Returns the fields of a file, with absolute paths."""
     values = read_yaml(path)
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of scenario fields")
@@ -131,16 +127,7 @@ def _read_fields(path: Path) -> dict:
 def _find_base(
     base: object, path: Path, found: Collection[Path]
 ) -> Path | None:
-    """Returns the file of a base; None without one.
-
-    Args:
-        base: the field `base`.
-        path: the file with this field.
-        found: this file, and all files that it is the base of.
-
-    Raises:
-        InputError: there is no such drive, or it has this file as its base.
-    """
+    """Returns the file of a base; None without one."""
     if base is None:
         return None
     drives = shipped_drives()
@@ -194,7 +181,6 @@ def check_files(scenario: Scenario, source: object = None) -> None:
     With traffic the map needs roads.
 
     Args:
-        scenario: it names the files.
         source: the file at the beginning of errors; by default the scenario's.
 
     Raises:
@@ -249,7 +235,6 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     a fixed name beside the scenario.
 
     Args:
-        scenario: the scenario to describe.
         folder: paths of files are relative to it; without it, they are file
             names only.
     """

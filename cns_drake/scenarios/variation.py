@@ -143,10 +143,6 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     A member's name consists of base, seed of the city if that varies, missing
     part in per mille, seed, and route and LiDAR if they vary.
 
-    Args:
-        path: the file.
-        redraw: see `vary`.
-
     Raises:
         InputError: the file, or one that it names, cannot be used.
     """
@@ -171,8 +167,6 @@ def vary(
     """Returns the members of a family.
 
     Args:
-        base: the common scenario.
-        family: the variations.
         source: the file that errors name.
         redraw: draws cities; only a family with `city_seeds` needs it. It is
             called last, when all else is checked.
@@ -291,17 +285,7 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
 def _check_redrawable(
     base: Scenario, family: Family, last: str, source: object
 ) -> None:
-    """Checks that the city can be drawn anew.
-
-    Args:
-        base: the family's base.
-        family: the variations.
-        last: the map's last stage.
-        source: the file that errors name.
-
-    Raises:
-        InputError: it cannot.
-    """
+    """Checks that the city can be drawn anew."""
     why = (
         f"not with city_seeds: stages before the last one, {last}, are lists "
         "of names that another draw of the city need not have"
@@ -342,11 +326,7 @@ def _routes(
 def _difference(
     base: Scenario, stage: str, other: str, source: object
 ) -> frozenset[str]:
-    """Returns the structures of a stage that another one lacks.
-
-    Raises:
-        InputError: a stage cannot be read, or the other lacks nothing.
-    """
+    """Returns the structures of a stage that another one lacks."""
     names = []
     for one in (stage, other):
         scenario = base.model_copy(update={"stage": one})
@@ -363,17 +343,7 @@ def _difference(
 def _decay_order(
     table: Path, seed: int, removable: Set[str] | None
 ) -> list[str]:
-    """Returns the structures that can be missing, the first to go first.
-
-    Args:
-        table: file of all structures.
-        seed: seed of the place from which the city decays.
-        removable: names of structures that can be missing; all buildings and
-            plants if None.
-
-    Raises:
-        InputError: the table cannot be read, or lacks places of structures.
-    """
+    """Returns the structures that can be missing, the first to go first."""
     rows = [
         row
         for _, row in read_records(table, ("name", "class"))
@@ -413,9 +383,7 @@ def draw_losses(
     A greater part includes all structures of a smaller one.
 
     Args:
-        table: file of all structures.
         parts: class -> missing part of its structures, 0 to 1.
-        seed: seed of the draw.
         source: the file that errors name.
 
     Raises:

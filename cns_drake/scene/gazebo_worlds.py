@@ -154,11 +154,6 @@ def simplify_world(
 ) -> tuple[str, tuple[str, ...]]:
     """Returns a world of static models with visuals only, and notes.
 
-    Args:
-        path: file of the world.
-        root: its root element.
-        model_paths: folders to search first.
-
     Raises:
         InputError: a model that was found cannot be read.
     """

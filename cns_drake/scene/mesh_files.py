@@ -35,9 +35,6 @@ _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 def check_obj(path: Path) -> None:
     """Refuses an OBJ file with a face that names missing vertices.
 
-    Args:
-        path: an existing file.
-
     Raises:
         ValueError: if so; it names the line.
         InputError: if it cannot be read.
@@ -129,7 +126,6 @@ class MeshFiles:
         """Returns the surface of a shape in G.
 
         Args:
-            name: name of the geometry.
             shape: a mesh, or the convex hull of one.
 
         Raises:
@@ -263,12 +259,7 @@ def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def _parse_small_obj(
     path: Path, identity: tuple[int, int, int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what a file holds: the stages of a city share most files.
-
-    Args:
-        path: the file.
-        identity: changes whenever the file does.
-    """
+    """Returns what a file holds: the stages of a city share most files."""
     del identity
     p_GVset, triangles = _parse_obj(path)
     for array in (p_GVset, triangles):

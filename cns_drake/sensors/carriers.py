@@ -22,7 +22,6 @@ def body_and_pose(
 
     Args:
         place: P, a body or a frame fixed on one, of a finalized plant.
-        X_PS: pose of a sensor in P.
 
     Raises:
         RuntimeError: the plant is not finalized.
@@ -53,10 +52,8 @@ def connect_motion(
     """Connects inputs to the source of the bodies' motion.
 
     Args:
-        builder: holds the source and the inputs.
         motion: a system with the kinematic output ports of a MultibodyPlant;
             None for the body's plant itself.
-        body: a body of the plant.
         inputs: name of an output port -> the input to connect.
     """
     source = body.GetParentPlant() if motion is None else motion

@@ -396,13 +396,7 @@ class _SignalToLcm(LeafSystem):
         names: list[str],
         values: Callable[..., np.ndarray],
     ):
-        """Declares an input for each port.
-
-        Args:
-            ports: whose types the inputs have.
-            names: names of the values.
-            values: returns them, from the values of all ports.
-        """
+        """Declares an input for each port."""
         super().__init__()
         self._names, self._values = names, values
         for index, port in enumerate(ports):

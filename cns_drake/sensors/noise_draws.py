@@ -11,10 +11,8 @@ def noise_generator(
     The same arguments always give the same numbers.
 
     Args:
-        seed: seed of a recording.
         sensor_name: distinguishes the noise of several sensors.
         purpose: number of the purpose, at least 0.
-        index: number of the piece.
     """
     # Keys are never negative: pieces before time zero have other streams.
     stream = purpose if index >= 0 else 2**32 - 1 - purpose

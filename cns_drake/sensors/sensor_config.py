@@ -38,10 +38,6 @@ def field_off_by_default(default: Any, **constraints: Any) -> Any:
     """Returns a field that is written only if it differs from the default.
 
     Adding such a field does not change the text of scenarios without it.
-
-    Args:
-        default: the value without effect.
-        constraints: further arguments of `pydantic.Field`.
     """
     return Field(
         default=default,
@@ -99,12 +95,9 @@ class SensorConfig(Mount, abc.ABC):
         """Adds the sensor to a Diagram; returns the port to record.
 
         Args:
-            builder: holds the SceneGraph.
             scene_graph: has the geometry that the sensor may see.
             body: the vehicle B, of a finalized plant.
             motion: has the kinematic output ports of that plant.
-            name: names the sensor.
-            seed: seed of its noise.
         """
 
     @abc.abstractmethod
@@ -112,8 +105,6 @@ class SensorConfig(Mount, abc.ABC):
         """Returns the ROS 2 message of a value of the port.
 
         Args:
-            value: measured by the sensor.
-            frame_id: name of its frame.
             stamp_ns: the time [ns].
         """
 
@@ -122,11 +113,6 @@ def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:
     """Checks that a rate of samples is possible.
 
     Stamps are whole nanoseconds, so the rate must divide a billion.
-
-    Args:
-        rate: samples per second.
-        lowest: the lowest allowed rate; the highest is 1000.
-        multiple_of: the rate must be a multiple of it.
 
     Raises:
         ValueError: it is not allowed; the message has the nearest allowed

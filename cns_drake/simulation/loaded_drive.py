@@ -156,7 +156,6 @@ def load_stage(
 
     Args:
         scenario: names the stage and the passing changes.
-        with_vehicle: whether the vehicle is there.
         trajectory: the drive, if already planned.
 
     Raises:
@@ -314,11 +313,7 @@ def _check_room(
     graph: LaneGraph,
     walkways: Sequence[Walkway],
 ) -> None:
-    """Checks that roads and sidewalks have room for the traffic.
-
-    Raises:
-        InputError: they do not.
-    """
+    """Checks that roads and sidewalks have room for the traffic."""
     room = room_for_vehicles(graph)
     if wanted.vehicles > room:
         raise InputError(

@@ -29,9 +29,6 @@ def scan_world(
     """Returns one scan of the world's models in their initial state.
 
     Args:
-        world: the world to scan.
-        X_WS: the sensor's pose in the world.
-        pattern: the beams.
         returns: the model of a real unit; None for ideal returns.
 
     Returns:
@@ -46,7 +43,6 @@ def still_scene(world: World, pattern: BeamPattern) -> RayCastingScene:
 
     Args:
         world: the world; its SceneGraph is used up.
-        pattern: any beams.
     """
     lidar, context = _stand(world, RigidTransform(), pattern)
     return lidar.EvalScene(context)
@@ -111,12 +107,7 @@ def _stand(
 
 
 def _make_still_world(world: World, lidar: Lidar) -> Diagram:
-    """Makes the Diagram of a world whose models keep their initial state.
-
-    Args:
-        world: the stage; its SceneGraph passes to the Diagram.
-        lidar: scans the world.
-    """
+    """Makes the Diagram of a world whose models keep their initial state."""
     plant = world.plant
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)

@@ -139,11 +139,7 @@ def _periods(
     cameras: Mapping[str, RgbdSensor],
     imu: Imu | None,
 ) -> dict[str, float]:
-    """Returns name of a sensor -> time between its messages [s].
-
-    Raises:
-        ValueError: a rate names no sensor, or there is no period.
-    """
+    """Returns name of a sensor -> time between its messages [s]."""
     turns = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
     if period is None and not turns:
         raise ValueError("period: a recording without a LiDAR needs one")

@@ -231,9 +231,6 @@ class SimulatedDrive(PlannedDrive):
         """Returns what a scan's sensor sees, and its pose X_WS at the stamp.
 
         The scene casts any rays, until the next scan or look moves it.
-
-        Args:
-            index: number of the scan.
         """
         scene = self._lidar.EvalScene(self._at(index))
         return scene, self.X_WBs[index] @ self.X_BS

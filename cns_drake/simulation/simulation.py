@@ -186,11 +186,7 @@ def simulate(
 def _check_output(
     folder: Path, files: tuple[Path | None, ...], overwrite: bool
 ) -> None:
-    """Checks that a recording and other files, if any, can be written.
-
-    Raises:
-        InputError: they cannot.
-    """
+    """Checks that a recording and other files, if any, can be written."""
     for file in files:
         if file is not None:
             check_writable(file)
@@ -200,13 +196,7 @@ def _check_output(
 def _make_bag(
     drive: LoadedDrive, folder: Path, *, overwrite: bool = False
 ) -> BagWriter:
-    """Makes the recording of a drive, so far without messages.
-
-    Args:
-        drive: the drive to record.
-        folder: to write.
-        overwrite: whether it may replace an existing recording.
-    """
+    """Makes the recording of a drive, so far without messages."""
     scenario, inputs = drive.scenario, drive.inputs
     described = describe_scenario(scenario)
     kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
@@ -311,15 +301,6 @@ def _advance(
     reader: Callable[[Drive], None] | None,
 ) -> float:
     """Simulates frames and writes their messages.
-
-    Args:
-        diagram: the station.
-        writer: writes its recording.
-        drive: the drive, simulated up to its last frame.
-        first: the first frame to simulate.
-        on_frame: receives the number of finished frames of the drive, after
-            each.
-        reader: see `simulate`.
 
     Returns:
         Simulated time from the first of them to the last [s].

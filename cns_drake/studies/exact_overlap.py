@@ -84,10 +84,7 @@ def exact_overlaps(
     NaN for a query without a point.
 
     Args:
-        database: the drive of the places.
         query: the drive of the queries, through the same map.
-        protocol: for the frames of queries and places.
-        track: reports progress.
 
     Raises:
         InputError: the two are of different maps.

@@ -83,14 +83,9 @@ def evaluate_fresh_cities(
     figures of all of them. Nothing is recorded, finished work is not repeated.
 
     Args:
-        maps: names of shipped maps; all that have versions if empty.
         numbers: of the versions; all if empty.
-        output: the folder for everything.
-        cluster: where the work is done.
-        protocol: that of place recognition.
         own_methods: Python files with one method each, to run besides those
             of this package.
-        on_note: receives notes on cities without drives to compare.
 
     Returns:
         The path of the report's page.
@@ -118,7 +113,6 @@ def draw_fresh_cities(
     Args:
         maps, numbers: see `evaluate_fresh_cities`.
         output: the folder of cities; created if need be.
-        cluster: where.
 
     Raises:
         InputError: there is no such version, or it could not be drawn.
@@ -249,7 +243,6 @@ def kept_names(stages: Any, names: Sequence[str]) -> Any:
 
     Args:
         stages: content of `stages.yaml`.
-        names: names of all structures.
     """
     if isinstance(stages, list):
         return [

@@ -60,7 +60,6 @@ def knob_effects(
     Args:
         earlier: a drive; the database.
         later: a drive of the same map at a later stage; the query.
-        cluster: where the work is done.
 
     Raises:
         InputError: the map's files cannot be used.

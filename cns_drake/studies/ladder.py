@@ -95,16 +95,8 @@ def climb_ladder(
     repeated.
 
     Args:
-        maps: by name or folder; all shipped ones if empty.
-        output: the folder for everything.
-        cluster: where the work is done.
-        methods: the methods to measure.
-        extent: the part of the ladder.
-        protocol: that of place recognition; its gate does not matter. Causes
-            change its queries.
         with_pairs: also cross the six causes that cost most two by two, and
             write `pairs.csv`.
-        on_note: receives notes on things that a map lacks.
 
     Returns:
         The path of `ladder.csv`, and the findings.
@@ -164,11 +156,6 @@ def rung_pairs(
 
     A rung that changes only how a query is described, or adds places, is left
     out.
-
-    Args:
-        maps: by name or folder; all shipped ones if empty.
-        extent: the part of the ladder.
-        on_note: receives notes on things that a map lacks.
 
     Raises:
         InputError: a map is unknown.
@@ -382,10 +369,7 @@ def distracting_drives(
     Args:
         query: a drive through the city whose places are not to stand among
             these; its LiDARs measure the others, too.
-        number: the number of places.
         spacing: between two places [m].
-        output: folder for redrawn cities.
-        cluster: where these are drawn.
 
     Raises:
         InputError: a shipped map cannot be used.

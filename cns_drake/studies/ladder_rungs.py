@@ -170,11 +170,7 @@ class RungDrives:
     query_changes: Mapping[str, Any] = field(default_factory=dict)
 
     def protocol(self, common: RetrievalProtocol) -> RetrievalProtocol:
-        """Returns the protocol of the rung.
-
-        Args:
-            common: that of all rungs.
-        """
+        """Returns the protocol of the rung."""
         return replace(
             common, radius=self.radius(common.radius), **self.query_changes
         )
@@ -191,12 +187,7 @@ class RungDrives:
 
 
 def plain_drives(scenario: Scenario, viewpoint: str = NEAR) -> RungDrives:
-    """Returns the drives without a change: one route, one city.
-
-    Args:
-        scenario: the drive of the query.
-        viewpoint: one of `VIEWPOINTS`.
-    """
+    """Returns the drives without a change: one route, one city."""
     name = f"{scenario.name}_database"
     if viewpoint != NEAR:
         name += f"_{viewpoint}"
@@ -209,13 +200,7 @@ def plain_drives(scenario: Scenario, viewpoint: str = NEAR) -> RungDrives:
 def changed_drives(
     plain: RungDrives, strengths: Mapping[str, Any], seed: int
 ) -> RungDrives:
-    """Returns drives with causes of change between them.
-
-    Args:
-        plain: drives without a change.
-        strengths: cause -> its strength.
-        seed: the seed of random draws.
-    """
+    """Returns drives with causes of change between them."""
     drives = plain
     # The order is fixed, since returns depend on the sensor.
     for cause, change in _CHANGES.items():
@@ -355,7 +340,6 @@ def mapped_from(
     """Returns a scenario with its LiDARs moved on the vehicle.
 
     Args:
-        scenario: the scenario.
         ahead, left: how far they move [m].
         heading_deg: how far they turn to the left [deg].
     """
@@ -439,9 +423,7 @@ def plan_pairs(
     """Returns the rungs with two causes at once, each at its strongest level.
 
     Args:
-        scenario: the drive of the query.
         causes: to be crossed two by two.
-        extent: the part of the ladder.
     """
     plain = plain_drives(scenario, extent.viewpoint)
     known, _ = _known_strengths(scenario, extent)
@@ -469,10 +451,6 @@ def plan_rungs(
     scenario: Scenario, extent: Extent
 ) -> tuple[list[Rung], list[str]]:
     """Returns the rungs of a ladder, `none` first, and notes on missing ones.
-
-    Args:
-        scenario: the drive of the query, through a stage of a map.
-        extent: the part of the ladder.
 
     Raises:
         InputError: the map's roads cannot be used.

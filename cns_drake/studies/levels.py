@@ -103,7 +103,6 @@ def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
     Args:
         files: tables like `ladder.csv`, of one or several methods. Other rungs
             than levels are ignored.
-        levels: the levels of the benchmark.
 
     Raises:
         InputError: a table cannot be read; a method lacks a level of a map, was

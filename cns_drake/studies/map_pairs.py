@@ -113,12 +113,9 @@ def make_pair(
     """Makes the city and the labelled maps of a pair, unless they are there.
 
     Args:
-        pair: which one.
         folder: for `city` and `maps`.
         files: folder of cities' files, for imports.
         spacing: way between two scans [m].
-        on_note: takes remarks.
-        track: reports progress.
 
     Returns:
         The folder of the maps.
@@ -162,12 +159,6 @@ def score_pairs(
 
     Args:
         names: of the pairs; all without one.
-        methods: baselines.
-        output: the folder of all pairs.
-        files: see `make_pair`.
-        spacing: likewise.
-        on_note: likewise.
-        track: likewise.
 
     Raises:
         InputError: a name is unknown, or a pair cannot be made.
@@ -199,7 +190,6 @@ def score_methods(
     Args:
         maps: a folder with two labelled maps.
         methods: baselines, or `TRUTH`.
-        track: reports progress.
 
     Raises:
         InputError: the folder cannot be read, or a baseline cannot run.
@@ -219,11 +209,7 @@ def score_methods(
 
 
 def study_methods(on_note: Callable[[str], None]) -> tuple[str, ...]:
-    """Returns the truth and all baselines that can run.
-
-    Args:
-        on_note: is told of one that cannot.
-    """
+    """Returns the truth and all baselines that can run."""
     names = [TRUTH, *BASELINES]
     if find_spec("py4dgeo") is None:
         on_note("m3c2 is left out: it needs the extra map-update")
@@ -241,7 +227,6 @@ def measure_maps(
     """Maps two drives, and scores methods by exact labels.
 
     Args:
-        reporter: takes the progress.
         database: the older drive, simulated or recorded.
         query: the newer one.
         methods: see `score_methods`.
@@ -275,9 +260,6 @@ def update_pairs(
 
     Args:
         pairs: the pairs.
-        output: the folder for everything.
-        cluster: where the work is done.
-        on_note: is told of a baseline that cannot run.
 
     Returns:
         The path of the table.

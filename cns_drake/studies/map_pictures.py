@@ -45,7 +45,6 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
     """Returns the jobs that draw a map.
 
     Args:
-        folder: the folder of the map.
         pictures: folder to write: `<map>_drives.png`, the drives from above;
             `<map>_stages.png`, a street in the first and the last stage, if
             the map has a `views.yaml`.

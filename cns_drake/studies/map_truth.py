@@ -174,11 +174,8 @@ def write_truth(
     `index.html` show how much of each structure is gone or new.
 
     Args:
-        a: the older drive.
-        b: the newer drive.
         output: the folder, new or empty.
         spacing: length of the way between two scans [m].
-        track: reports progress.
 
     Returns:
         Side -> label -> number of points; what became of the structures.
@@ -232,10 +229,7 @@ def label_points(
     """Returns a label for each point of a map, (N,) uint8.
 
     Args:
-        session: the map.
-        other: the other drive.
         frames: (K,) frames of the other drive that look.
-        track: reports progress.
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -256,9 +250,7 @@ def observed(
 
     Args:
         points: in the world [m].
-        drive: the drive that looks.
         frames: (K,) its frames.
-        track: reports progress.
     """
     result = np.zeros(len(points), bool)
     pattern = drive.pattern
@@ -362,7 +354,6 @@ def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
 
     Args:
         points: in the world [m].
-        scene: the surfaces.
     """
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))
@@ -397,11 +388,7 @@ def _check_instances(drive: McapDrive, path: Path) -> None:
 
 
 def _check_unchanged(folder: Path, scenario: Scenario) -> None:
-    """Refuses a recording whose world has changed since.
-
-    Raises:
-        InputError: the digest of its inputs is another one.
-    """
+    """Refuses a recording whose world has changed since."""
     metadata = read_yaml(folder / "metadata.yaml")
     try:
         data = metadata["rosbag2_bagfile_information"]["custom_data"]
@@ -422,9 +409,6 @@ def _check_same_map(a: Survey, b: Survey) -> None:
     """Refuses surveys of two folders, whose names may be the same.
 
     Worlds without a map are stages of one place, if the user says so.
-
-    Raises:
-        InputError: they are not of one map.
     """
     if (a.scenario.map is None) != (b.scenario.map is None):
         raise InputError(

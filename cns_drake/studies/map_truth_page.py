@@ -39,15 +39,7 @@ def write_page(
     table: Sequence[StructureChange],
     names: tuple[str, str],
 ) -> None:
-    """Writes the page: both maps from above, and the changed structures.
-
-    Args:
-        path: of the HTML file.
-        pair: both maps.
-        truth: labels of each.
-        table: their structures.
-        names: of both drives.
-    """
+    """Writes the page: both maps from above, and the changed structures."""
     low, step, shape = _frame(pair)
     figures = []
     for session, labels, name in zip(pair, truth, names, strict=True):

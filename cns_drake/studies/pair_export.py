@@ -79,9 +79,6 @@ def export_pairs(
         scenarios: drives to learn from.
         held_out: drives for the evaluation alone; without any, that is of the
             others.
-        output: the folder.
-        options: what of each drive.
-        cluster: where the work is done.
 
     Returns:
         The files that name the pairs.

@@ -48,9 +48,6 @@ def record_all(
     one goes on.
 
     Args:
-        scenarios: to record.
-        output: the folder of recordings.
-        cluster: where the work is done.
         overwrite: replace other recordings of these names.
 
     Raises:
@@ -74,8 +71,6 @@ def plan_recordings(
     The job has the recording's name.
 
     Args:
-        scenarios: to record.
-        output: the folder of recordings.
         overwrite: replace other recordings of these names.
         pages: name -> web page of the drive. A recording without its page
             counts as not finished.

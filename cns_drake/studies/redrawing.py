@@ -50,9 +50,7 @@ def redraw_cities(
     Args:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city.
-        seeds: the seed of each city.
         output: the folder of cities; created if need be.
-        cluster: where.
 
     Returns:
         Seed -> map folder of that city, `<output>/<map>_c<seed>`, absolute.
@@ -153,7 +151,6 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city. The map's own
             stages name structures that another draw need not have.
-        seed: the seed of the city.
 
     Returns:
         Name -> content of `roads.yaml`, which is the map's own, `city.yaml`
@@ -191,11 +188,7 @@ def to_yaml(title: str, values: dict) -> bytes:
 
 
 def _is_replaced(folder: Path) -> bool:
-    """Returns whether an older redrawn city has this name.
-
-    Raises:
-        InputError: another file or folder has the name.
-    """
+    """Returns whether an older redrawn city has this name."""
     plan = MapFolder(folder).plan
     with user_errors(folder):
         if not os.path.lexists(folder):

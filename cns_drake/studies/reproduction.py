@@ -52,17 +52,9 @@ def reproduce_maps(
     `<output>/report` the tables and figures. Finished work is not repeated.
 
     Args:
-        maps: by name or folder; all shipped ones if empty.
-        output: the folder for everything.
-        cluster: where the work is done.
-        with_pages: whether the web pages are made.
         quick: make only the report, of the same frames: drives that are not
             recorded yet are evaluated while they are simulated, and not
             recorded.
-        protocol: that of place recognition.
-        own_methods, settings: see `choose_methods`.
-        with_costs: measure the costs of methods, too.
-        on_note: receives notes on cities without drives to compare.
 
     Returns:
         The path of the report's page.
@@ -138,10 +130,6 @@ def stage_pairs(maps: Sequence[str] | None, output: Path) -> list[ComparedPair]:
     Drives that are recorded in the folder are read, others are simulated and
     not recorded. Levels count back from the last stage; at the cause `routes`,
     the same routes are driven in the last stage.
-
-    Args:
-        maps: by name or folder; all shipped ones if empty.
-        output: the folder of recordings.
 
     Raises:
         InputError: a map is unknown.
@@ -228,8 +216,6 @@ def recording_info(
     """Returns the description of a recording before it is made.
 
     Args:
-        scenario: a drive through a map.
-        output: the folder of recordings.
         is_waiting: whether the recording's job has to be done first.
     """
     assert scenario.stage is not None  # It has a map.

@@ -53,11 +53,6 @@ def measure_sizes(
     Args:
         map_name: name or folder of the map whose last drive asks.
         sizes: numbers of places of other cities.
-        output: the folder for everything.
-        cluster: where the work is done.
-        methods: to measure.
-        protocol: that of place recognition, without the gate.
-        on_note: receives notes on the work.
 
     Returns:
         The path of `size.csv`.
@@ -131,10 +126,6 @@ def size_table(map_name: str, points: Sequence[SizePoint]) -> Table:
 
     `growth` is the exponent with which the time of a query grows with the
     number of all places, from the size before.
-
-    Args:
-        map_name: name of the map.
-        points: those of all methods.
     """
     rows = []
     for method in in_table_order(one.method for one in points):

@@ -280,14 +280,10 @@ def train(
     """Trains a network.
 
     Args:
-        scans: to learn from.
         steps: number of batches.
         seed: seed of the first weights and of all batches.
         state: file that keeps the state; a training that was interrupted goes
             on from there.
-        digest: stands for the scans in the state.
-        track: reports progress.
-        on_step: called now and then with the step and the weights.
 
     Returns:
         The weights, and (steps, 2) loss and share of right best places.
@@ -422,8 +418,6 @@ def write_weights(
     """Writes a file of weights, as the method `learned` reads it.
 
     Args:
-        path: the file.
-        values: the weights.
         seen: least and greatest part of the sectors with a point in training.
         made_by: what made them, ready for JSON.
     """

@@ -152,19 +152,13 @@ def measure_years(
     Finished work is not repeated.
 
     Args:
-        maps: by name or folder; all shipped ones if empty.
         years: positive, ascending.
         seeds: of the histories, from 1 on.
         rates: event -> rate a year.
-        output: the folder for everything.
-        cluster: where the work is done.
-        methods: the methods to measure.
-        protocol: that of place recognition.
         directions: whether the database is of today, the query, or both in
             turn.
         localises: also localise the queries in the maps of the databases.
         updates: also score baselines that find the changes of the maps.
-        on_note: receives the progress.
 
     Returns:
         The path of `years.csv`, and the findings.
@@ -321,8 +315,6 @@ def map_city(
     """Returns the centroids (N, 3) of the voxel map of a drive's scans [m].
 
     Args:
-        reporter: takes the progress.
-        source: the drive.
         spacing: between two scans [m].
     """
     drive = source()

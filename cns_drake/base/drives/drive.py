@@ -203,7 +203,6 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 
     Args:
         table: as JSON: a list of objects with at least an `instance`.
-        source: where it comes from, for messages.
 
     Raises:
         InputError: if it is no such table.
@@ -258,8 +257,6 @@ def check_same_world(
     """Refuses two drives whose poses cannot be compared.
 
     Args:
-        first: a drive.
-        second: another one.
         across_maps: their maps may differ, if they share a frame.
 
     Raises:

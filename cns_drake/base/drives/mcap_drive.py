@@ -57,7 +57,6 @@ class McapDrive(Drive):
         """Opens a recording.
 
         Args:
-            path: the .mcap file, or the folder that holds it.
             lidar: name of the LiDAR; its scans are on the topic
                 /<lidar>/points.
 
@@ -165,11 +164,7 @@ class McapDrive(Drive):
             ) from error
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
-        """Returns the labels of a scan that has a topic for them.
-
-        Raises:
-            ValueError: if the labels are not those of that scan.
-        """
+        """Returns the labels of a scan that has a topic for them."""
         topic = self._labels_topic
         if topic is None:
             return None

@@ -117,7 +117,6 @@ def read_chunk(stream: BinaryIO, size: int) -> bytes:
     """Returns the records of the chunk at the stream's position.
 
     Args:
-        stream: the file.
         size: the records' length, as the file's index has it [bytes].
 
     Raises:
@@ -383,7 +382,6 @@ class McapFile:
         """Returns where a chunk has a channel's messages; see `LOCATION`.
 
         Args:
-            stream: the file.
             offset: where the record of the index begins in it [bytes].
             left: how long the index may be [bytes].
         """
@@ -436,11 +434,7 @@ class McapFile:
         return body[_MESSAGE_HEADER.size :]
 
     def _check_channels(self) -> None:
-        """Refuses messages of a channel that the summary does not name.
-
-        Raises:
-            InputError: with its number.
-        """
+        """Refuses messages of a channel that the summary does not name."""
         used = {
             number
             for chunk in self._chunk_indexes
@@ -457,11 +451,7 @@ class McapFile:
             )
 
     def _check_count(self, channel_id: int, found: int) -> None:
-        """Refuses an index that does not list all messages of a channel.
-
-        Raises:
-            ValueError: with the numbers.
-        """
+        """Refuses an index that does not list all messages of a channel."""
         if self._summary.statistics is None:
             return
         counts = self._summary.statistics.channel_message_counts

@@ -129,7 +129,6 @@ class StaticTransforms:
 
         Args:
             messages: each of type tf2_msgs/msg/TFMessage.
-            where: file and topic, for errors.
 
         Raises:
             InputError: two messages place one frame differently.
@@ -185,7 +184,6 @@ def checked_poses(
     Args:
         p: (..., 3) [m].
         quat_xyzw: (..., 4).
-        where: the file, for errors.
 
     Raises:
         InputError: a number is not finite, a position is too far away, or a

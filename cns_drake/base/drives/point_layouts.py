@@ -70,9 +70,6 @@ def to_points(message: Any) -> np.ndarray:
 def to_records(message: Any) -> np.ndarray:
     """Returns the records of a cloud that may have no coordinates.
 
-    Args:
-        message: a deserialised PointCloud2.
-
     Returns:
         (height * width,) under the message's field names.
 
@@ -97,11 +94,7 @@ def _records(message: Any, dtype: np.dtype) -> np.ndarray:
 
 
 def _check_apart(dtype: np.dtype) -> None:
-    """Refuses coordinates that share bytes.
-
-    Raises:
-        ValueError: if so.
-    """
+    """Refuses coordinates that share bytes."""
     assert dtype.fields is not None  # There are x, y and z.
     places = sorted((dtype.fields[n][1], n, dtype[n].itemsize) for n in "xyz")
     for (start, name, size), (following, other, _) in itertools.pairwise(

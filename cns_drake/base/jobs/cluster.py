@@ -44,8 +44,6 @@ class Workers(Protocol):
         """Lets a job run, when there is room.
 
         Args:
-            name: the job's name.
-            job: see `run_process`.
             priority: among jobs that wait, the one with the highest comes
                 first.
         """
@@ -277,11 +275,6 @@ def _check_answer(address: str) -> None:
 
 def work(name: str, job: bytes, topic: str) -> None:
     """Runs a job; what a worker of Dask does.
-
-    Args:
-        name: the name of the job.
-        job: see `run_process`.
-        topic: the Dask topic of the job's messages.
 
     Raises:
         JobError: see `run_process`.

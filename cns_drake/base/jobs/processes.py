@@ -116,11 +116,7 @@ def run_process(
 
 
 def _start(connection: Connection, job: bytes) -> BaseProcess:
-    """Starts the process of a job.
-
-    Raises:
-        ProcessDiedError: the process that forks has died.
-    """
+    """Starts the process of a job."""
     process = _context.Process(target=_work, args=(connection, job))
     try:
         with _starting, _environment_of_jobs():

@@ -93,11 +93,7 @@ def _by_name(jobs: Iterable[Job]) -> dict[str, Job]:
 
 
 def _urgency(jobs: Mapping[str, Job]) -> dict[str, float]:
-    """Returns name -> cost of the longest chain that begins with the job.
-
-    Raises:
-        ValueError: if jobs need each other.
-    """
+    """Returns name -> cost of the longest chain that begins with the job."""
     urgency = {name: job.cost for name, job in jobs.items()}
     for name in reversed(_ordered(jobs)):
         for need in jobs[name].needs:

@@ -77,9 +77,6 @@ class ImuSection(Mount):
     def noise(self, seed: int) -> ImuNoise:
         """Returns the errors, all zero if the IMU is ideal.
 
-        Args:
-            seed: seed of the random numbers.
-
         Raises:
             InputError: Kalibr's file cannot be used.
         """

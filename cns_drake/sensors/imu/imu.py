@@ -157,13 +157,7 @@ def add_described_imu(
     """Adds the IMU that a description describes to a diagram.
 
     Args:
-        config: the description.
-        builder: holds `motion`.
-        body: the vehicle, which carries it.
-        trajectory: prescribed motion of that body.
-        motion: the source of the bodies' motion.
         scan_rate: scans per second of the fastest LiDAR.
-        seed: seed of the errors.
 
     Returns:
         The ports `specific_force` and `angular_velocity`; and `imu_samples`
@@ -207,7 +201,6 @@ class NoisyImu(LeafSystem):
         """Declares the ports.
 
         Args:
-            noise: the errors' sizes.
             rate: samples per second [1/s].
         """
         super().__init__()

@@ -84,7 +84,6 @@ class ImuErrors:
         """Prepares the errors.
 
         Args:
-            noise: their sizes.
             rate: samples per second [1/s].
         """
         self._noise = noise

@@ -168,17 +168,9 @@ def add_described_lidar(
     """Adds the LiDAR that a description describes to a diagram.
 
     Args:
-        config: the description.
-        builder: holds `scene_graph`.
-        scene_graph: the SceneGraph to scan.
         body: P, the body that carries it, or a frame on one.
-        X_PS: pose of the sensor in P.
-        name: name of the system.
-        seed: seed of its noise.
-        weather: weather around it.
         trajectory: prescribed motion of the body. A LiDAR with motion
             distortion gets its poses from there, by a system `<name>_sweep`.
-        options: further arguments of `add_lidar`.
     """
     pattern = make_pattern(config)
     lidar = add_lidar(
@@ -339,12 +331,7 @@ def _check_arguments(
     X_PS: object,
     pattern: object,
 ) -> None:
-    """Checks the arguments of `add_lidar`.
-
-    Raises:
-        TypeError: the SceneGraph, the pose or the pattern has the wrong type.
-        ValueError: the diagram has a system of that name.
-    """
+    """Checks the arguments of `add_lidar`."""
     if not isinstance(scene_graph, SceneGraph):
         raise TypeError(
             f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "

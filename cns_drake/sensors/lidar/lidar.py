@@ -495,7 +495,6 @@ def assemble_points(
 
     Args:
         scan: (N,) `POINT_DTYPE` to fill.
-        table: a `BeamTable`.
         beams: (N,) the beams with a return.
         ranges: (N,) float32 measured along them [m].
         intensity: (N,) float32.

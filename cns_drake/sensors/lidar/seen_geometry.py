@@ -93,10 +93,8 @@ class SeenGeometry:
         """Moves moving geometry, and builds changed geometry anew.
 
         Args:
-            query_object: the SceneGraph's, in the Context.
             revision: the geometry's (`geometry_revision_port`), None if
                 unknown; all geometries are then compared.
-            motions: frames that move during the turn, with their motion.
             known: poses of frames, which replace calls of `query_object`.
             seen: the ball in which beams can meet geometry.
 

@@ -56,7 +56,6 @@ class OdometrySensor(LeafSystem):
         """Makes the sensor.
 
         Args:
-            body: P, the moving body.
             X_PB: pose of the place B on it; by default it is P itself.
         """
         super().__init__()
