@@ -1,4 +1,4 @@
-"""The commands `cns-drake train` and `cns-drake export-pairs`."""
+"""Commands with exact truth for methods: training, sets of scans, maps."""
 
 from enum import Enum
 from pathlib import Path
@@ -12,7 +12,20 @@ from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.options import Jobs, Scheduler
-from cns_drake.command_line.simulating import family_members
+from cns_drake.command_line.simulating import DriveNames, family_members
+from evaluation.command_line.map_updating import BaselineName
+from evaluation.command_line.options import (
+    MaxRange,
+    PlaceSpacing,
+    QuerySpacing,
+    SessionSpacing,
+)
+from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
+
+_Recorded = Annotated[
+    str, typer.Argument(metavar="RECORDING|NAME|SCENARIO.yaml")
+]
+_Simulated = Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")]
 
 
 class Part(str, Enum):
@@ -91,14 +104,7 @@ def train(
 
 
 def export_pairs(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="NAME",
-            help="Shipped drives or scenario files; all shipped ones by "
-            "default.",
-        ),
-    ] = None,
+    names: DriveNames = None,
     *,
     format: Annotated[
         Literal["pointnetvlad", "overlap"],
@@ -157,12 +163,7 @@ def export_pairs(
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.scenarios.shipped import recordable_drives
-        from cns_drake.studies.pair_export import (
-            ExportOptions,
-        )
-        from cns_drake.studies.pair_export import (
-            export_pairs as export,
-        )
+        from cns_drake.studies import pair_export
 
     if format == "overlap" and scans > 1:
         raise InputError("--scans: overlaps are those of single scans")
@@ -174,6 +175,138 @@ def export_pairs(
     learned = [load_scenario(name) for name in names or ()]
     if vary is not None:
         learned += family_members(vary, output, cluster)
-    options = ExportOptions(format, spacing, scans, max_range)
-    for path in export(learned, tested, output, options, cluster):
+    options = pair_export.ExportOptions(format, spacing, scans, max_range)
+    for path in pair_export.export_pairs(
+        learned, tested, output, options, cluster
+    ):
         print(path)
+
+
+def overlap(
+    database: _Simulated,
+    query: _Simulated,
+    *,
+    output: Annotated[
+        Path, typer.Option(metavar="FILE.csv", help="Table to write.")
+    ],
+    query_spacing: QuerySpacing = PAPER_PROTOCOL.query_spacing,
+    place_spacing: PlaceSpacing = PAPER_PROTOCOL.place_spacing,
+    max_range: MaxRange = PAPER_PROTOCOL.max_range,
+) -> None:
+    """Exact overlap of queries with places.
+
+    Rays are cast in the city of the first drive, its database, at the points of
+    the second drive's scans. Nothing is recorded.
+    """
+    with uninterrupted():
+        from cns_drake.base.files import make_folder
+        from cns_drake.scenarios.scenario_files import load_scenario
+        from cns_drake.simulation.simulated_drive import DriveSimulation
+        from cns_drake.studies.exact_overlap import exact_overlaps
+        from evaluation.recognition.overlap_truth import (
+            compared_frames,
+            write_overlaps,
+        )
+
+    protocol = RetrievalProtocol(
+        query_spacing=query_spacing,
+        place_spacing=place_spacing,
+        max_range=max_range,
+    )
+    # Before minutes of work.
+    make_folder(output.parent)
+    places, queries = (
+        DriveSimulation(load_scenario(name))() for name in (database, query)
+    )
+    found = exact_overlaps(places, queries, protocol, terminal.track)
+    frames = compared_frames(places, queries, protocol)
+    write_overlaps(output, *frames, found)
+    print(output)
+
+
+def map_truth(
+    a: _Recorded,
+    b: _Recorded,
+    *,
+    output: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder to write.")
+    ],
+    spacing: SessionSpacing = 1.0,
+) -> None:
+    """Maps of two drives, labelled by rays.
+
+    A is the older drive and B the newer one, of one place: recordings made by
+    cns-drake, or scenarios, which are simulated. Each point of A's map is kept,
+    gone or unobserved by B; each of B's kept, new or newly seen. The worlds of
+    both drives decide. cns-eval map-update scores labels of others.
+    """
+    with uninterrupted():
+        from cns_drake.studies.map_truth import open_survey, write_truth
+        from evaluation.map_update.sessions import Label
+
+    first, second = open_survey(a), open_survey(b)
+    counts, table = write_truth(first, second, output, spacing, terminal.track)
+    for side, found in counts.items():
+        text = ", ".join(
+            f"{count} {Label(label).name.lower().replace('_', ' ')}"
+            for label, count in sorted(found.items())
+        )
+        terminal.note(f"{side}: {text}")
+        alone = [
+            row
+            for row in table
+            if row.side == side and row.alone and not row.moves
+        ]
+        mapped = sum(row.points > 0 for row in alone)
+        right = sum(row.verdict in ("gone", "new") for row in alone)
+        terminal.note(
+            f"{side}: {len(alone)} structures are in this drive's world alone;"
+            f" {mapped} are in its map, {right} of them gone or new"
+        )
+    print(output)
+
+
+def map_pairs(
+    pairs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="PAIR", help="Test pairs; all by default."),
+    ] = None,
+    *,
+    output: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder to write.")
+    ],
+    files: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Folder of the imported cities' files."
+        ),
+    ] = None,
+    baseline: Annotated[
+        list[BaselineName] | None,
+        typer.Option(
+            help="Baseline to score; free-space and distance by default."
+        ),
+    ] = None,
+    spacing: SessionSpacing = 1.0,
+) -> None:
+    """Make and score the frozen test pairs.
+
+    Twelve pairs of maps, four of them of imported cities, by seeds that were
+    drawn before any method ran on them. Writes cities, labelled maps and
+    map_pairs.csv. What is there already stays.
+    """
+    with uninterrupted():
+        from cns_drake.studies.map_pairs import score_pairs
+
+    chosen = baseline or (BaselineName.FREE_SPACE, BaselineName.DISTANCE)
+    print(
+        score_pairs(
+            pairs or (),
+            [one.value for one in chosen],
+            output,
+            files,
+            spacing,
+            terminal.note,
+            terminal.track,
+        )
+    )

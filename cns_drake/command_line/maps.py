@@ -1,4 +1,4 @@
-"""Commands on maps: `list`, `import` and `city`."""
+"""Commands on maps: `list`, `import`, `city` and `age`."""
 
 from __future__ import annotations
 
@@ -53,6 +53,31 @@ _GAP = "  "
 _GROW = 0.3
 # Kinds of structures and of faults that a report names.
 _SHOWN = 5
+
+FirstYear = Annotated[
+    list[int],
+    typer.Option(
+        "--years",
+        metavar="YEAR ...",
+        help="Years from today, ascending, at most 200; before today where "
+        "buildings have years.",
+    ),
+]
+
+RateFactor = Annotated[
+    float,
+    typer.Option(
+        min=0.0, metavar="FACTOR", help="Factor for all yearly rates."
+    ),
+]
+RatesFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.yaml",
+        help="Rates of your own: event: rate a year, from 0 to 1; the others "
+        "keep theirs.",
+    ),
+]
 
 
 def list_drives(
@@ -409,3 +434,90 @@ def _calibrate(
     effects = knob_effects(first, last, choose_cluster(jobs, None))
     for line in effect_lines(effects):
         print(line)
+
+
+def maps_and_years(
+    words: list[str], first: list[int]
+) -> tuple[list[str], tuple[int, ...]]:
+    """Returns maps and years.
+
+    Years that follow the first come as arguments.
+
+    Raises:
+        InputError: a word begins like an option.
+    """
+    maps, years = [], list(first)
+    for word in words:
+        if word.removeprefix("-").isdecimal():
+            years.append(int(word))
+        elif word.startswith("-"):
+            raise InputError(f"{word}: no such option")
+        else:
+            maps.append(word)
+    return maps, tuple(years)
+
+
+def age(
+    source: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="MAP", help="A shipped map by name, or a map's folder."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option(help="Map folder to write; its name is the map's.")
+    ],
+    years: FirstYear,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of everything that happens.")
+    ] = 0,
+    rate: RateFactor = 1.0,
+    rates: RatesFile = None,
+    pictures: Annotated[
+        bool,
+        typer.Option(
+            "--pictures/--no-pictures",
+            help="Draw the city from the air and from three streets.",
+        ),
+    ] = True,
+) -> None:
+    """Let a city live for some years.
+
+    Every year each lot, tree and thing meets its rate: buildings are built,
+    torn down and replaced, trees die, lamps and signs move. Writes a map with
+    a stage for today and for each year, its history, the rates that came about,
+    and pictures.
+    """
+    maps, wanted = maps_and_years(source, years)
+    if len(maps) != 1:
+        raise InputError(f"give one map, not {' '.join(maps) or 'none'}")
+    with uninterrupted():
+        from cns_drake.ageing.aged_map import age_map
+        from cns_drake.ageing.aged_pictures import draw_pictures
+        from cns_drake.ageing.rates import read_rates
+        from cns_drake.scenarios.shipped import shipped_maps
+
+    folder = shipped_maps().get(maps[0], Path(maps[0]))
+    if not folder.is_dir():
+        raise InputError(
+            f"{maps[0]}: neither a shipped map ({', '.join(shipped_maps())}) "
+            "nor a folder"
+        )
+    with uncollected():
+        aged = age_map(
+            folder,
+            wanted,
+            seed,
+            read_rates(rates, rate),
+            output,
+            note,
+            finish=lambda draft, one: (
+                draw_pictures(draft, one, note) if pictures else None
+            ),
+        )
+    rows = [
+        (f"stage {stage}", f"year {year}" if year else "today")
+        for stage, year in aged.years.items()
+    ]
+    rows += [(event, str(number)) for event, number in aged.events.items()]
+    print_rows([*rows, ("written", str(output))])

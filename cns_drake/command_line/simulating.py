@@ -1,4 +1,4 @@
-"""Commands that simulate: one drive, one scan, many drives."""
+"""Commands that simulate, and those on recordings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.progress_bars import count_progress, show_progress
 from cns_drake.base.terminal import note
 from cns_drake.command_line.options import (
     LIDAR_OPTION,
@@ -34,6 +35,13 @@ Returns = Annotated[
     typer.Option(
         help="Ideal returns, or those of the unit's data sheet with noise, "
         "losses and calibrated reflectivity as intensity."
+    ),
+]
+DriveNames = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="NAME",
+        help="Shipped drives or scenario files; all shipped ones by default.",
     ),
 ]
 Fog = Annotated[
@@ -273,14 +281,7 @@ def scan(
 
 
 def generate(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="NAME",
-            help="Shipped drives or scenario files; all shipped ones by "
-            "default.",
-        ),
-    ] = None,
+    names: DriveNames = None,
     *,
     output: Output,
     frames: Frames = None,
@@ -318,3 +319,90 @@ def generate(
     record_all(scenarios, output, cluster, overwrite=overwrite)
     for scenario in scenarios:
         typer.echo(output / scenario.name)
+
+
+def export(
+    drive: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DRIVE", help="A recorded folder, or its .mcap file."
+        ),
+    ],
+    layout: Annotated[
+        Literal["cns", "kitti", "tum"],
+        typer.Option(
+            "--format",
+            help="Layout: CNS data set, KITTI odometry, or TUM (the "
+            "trajectory alone).",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            help="Folder of drives: new, empty, or of earlier exports."
+        ),
+    ],
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Name of the LiDAR, if there are several."
+        ),
+    ] = None,
+    absent_in: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STAGE",
+            help="Label points on structures that this stage of the map lacks "
+            "with SemanticKITTI's labels of moving objects (252 to 259); "
+            "with kitti.",
+        ),
+    ] = None,
+) -> None:
+    """Export a recording to a common layout."""
+    with uninterrupted():
+        from cns_drake.export.exporting import export_drive
+
+    with show_progress() as progress:
+        task = progress.add_task(drive.name, total=None, note="reading")
+        drive = export_drive(
+            drive,
+            layout,
+            output,
+            lidar=sensor,
+            absent_in=absent_in,
+            on_frame=count_progress(progress, task),
+        )
+    typer.echo(drive)
+
+
+def repair(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="Any MCAP file, whole or damaged."),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(help="The new file; <name>_repaired.mcap by default."),
+    ] = None,
+) -> None:
+    """Save what is readable of an MCAP file."""
+    with uninterrupted():
+        from cns_drake.recording.repair import repair_mcap
+
+    with show_progress() as progress:
+        task = progress.add_task(file.name, total=None, note="")
+        result = repair_mcap(
+            file,
+            output,
+            count_progress(progress, task, unit="bytes"),
+        )
+    typer.echo(
+        f"{result.output}: {result.num_messages} messages over "
+        f"{result.seconds:.2f} s recovered; "
+        + (
+            f"damaged places: {result.num_faults}, the first at "
+            f"{result.first_fault}"
+            if result.num_faults
+            else "the file was whole"
+        )
+    )

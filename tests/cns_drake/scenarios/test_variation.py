@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.command_line.trends import family_controls
+from cns_drake.command_line.studying import family_controls
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import (
     load_scenario,
