@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, read_bytes
+from cns_drake.base.files import read_bytes, write_text
 
 # Column of files of earlier versions -> what it is called now.
 _FORMER_COLUMNS = {
@@ -32,8 +32,7 @@ def write_csv(
     Raises:
         InputError: it cannot be written.
     """
-    with completing(path) as part:
-        part.write_text(csv_text(header, rows), encoding="utf-8")
+    write_text(path, csv_text(header, rows))
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from pydantic import BaseModel, ValidationError
 
+_Model = typing.TypeVar("_Model", bound="BaseModel")
 TRACEBACK_OPTION = "--traceback"
 _LONGEST = 2000
 _MISSING = re.compile(
@@ -74,6 +75,27 @@ def one_line(message: object) -> str:
     text = str(message)
     shown = "".join(c if c.isprintable() else " " for c in text[:_LONGEST])
     return shown if len(text) <= _LONGEST else f"{shown} ..."
+
+
+def validated(model: type[_Model], values: object, source: object) -> _Model:
+    """Returns values as a model of pydantic.
+
+    Args:
+        model: the class of the result.
+        values: what a file or argument holds.
+        source: the file or argument, which errors name.
+
+    Raises:
+        InputError: a field is missing, unknown or not usable.
+    """
+    from pydantic import ValidationError
+
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise InputError(
+            describe_validation_error(source, error, model)
+        ) from None
 
 
 def describe_validation_error(

@@ -183,6 +183,16 @@ def complete_part(path: Path) -> None:
         os.replace(part, path)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Writes a file that gets its name when it is complete.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    with completing(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
 def check_writable(path: Path) -> None:
     """Checks before a long run that a file can be written at its end.
 

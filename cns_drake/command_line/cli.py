@@ -4,6 +4,8 @@ Each command imports its slow modules itself, so that `--help` and `list` answer
 at once. Interrupts wait during imports.
 """
 
+from collections.abc import Callable
+
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
 from cns_drake.command_line.learning import (
@@ -32,7 +34,7 @@ from cns_drake.command_line.studying import (
 )
 
 # Command -> its example, line by line.
-_EXAMPLES = {
+_EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
     list_drives: ("list",),
     simulate: ("simulate metropolis_01 --output drives",),
     scan: (

@@ -13,10 +13,10 @@ import shutil
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import (
-    complete_part,
+    make_folder,
     part_path,
     user_errors,
-    write_part,
+    write_text,
 )
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.export.layouts import CNS, KITTI, TUM, Layout
@@ -81,7 +81,8 @@ def export_drive(
     try:
         _write_drive(drive, layout, part, on_frame)
         for path, text in outer.items():
-            _write_text(path, text)
+            make_folder(path.parent)
+            write_text(path, text)
         with user_errors(folder):
             os.replace(part, folder)
     finally:
@@ -101,13 +102,13 @@ def _claim(output: Path, format_name: str, layout: Layout) -> None:
                 f"{output}: the folder holds other files; give a new or an "
                 "empty one"
             )
-        output.mkdir(parents=True, exist_ok=True)
+    make_folder(output)
     values = {
         "writer": "cns-drake export",
         "format": format_name,
         "files": layout.files,
     }
-    _write_text(marker, to_yaml(values))
+    write_text(marker, to_yaml(values))
 
 
 def _check_marker(marker: Path, format_name: str) -> None:
@@ -162,11 +163,3 @@ def _write_drive(
                     path.parent.mkdir()
                 path.write_bytes(content)
             on_frame(frame + 1, len(drive))
-
-
-def _write_text(path: Path, text: str) -> None:
-    """Writes a file that gets its name when it is complete."""
-    with user_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    write_part(path, text)
-    complete_part(path)

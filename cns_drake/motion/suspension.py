@@ -5,14 +5,16 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 from pydrake.math import inv
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint
 
 from cns_drake.base.elementary import product, rotated
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import (
+    validated,
+)
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.trajectory import NUM_COORDINATES, BodyRide, Trajectory
@@ -59,12 +61,7 @@ def load_suspension_rates(path: Path) -> SuspensionRates:
     Raises:
         InputError: the file cannot be used.
     """
-    try:
-        return SuspensionRates.model_validate(read_yaml(path))
-    except ValidationError as error:
-        raise InputError(
-            describe_validation_error(path, error, SuspensionRates)
-        ) from None
+    return validated(SuspensionRates, read_yaml(path), path)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pydrake.geometry import FrameId, QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-from cns_drake.base.files import complete_part, write_part
+from cns_drake.base.files import write_text
 from cns_drake.pictures.drive_page import (
     DriveRecord,
     make_drive_page,
@@ -136,8 +136,7 @@ class MeshcatRecorder(LeafSystem):
             stages=self._stages,
             title=title,
         )
-        write_part(path, html)
-        complete_part(path)
+        write_text(path, html)
 
     def _publish(self, context: Context) -> EventStatus:
         if len(self.drive.X_WBs) == self._num_frames:

@@ -9,7 +9,9 @@ import zlib
 import numpy as np
 from pydrake.geometry import Meshcat
 
-from cns_drake.base.files import complete_part, user_errors, write_part
+from cns_drake.base.files import (
+    write_text,
+)
 
 # Higher levels take many times as long for a few percent.
 _LEVEL = 4
@@ -108,11 +110,7 @@ def save_meshcat_page(
 
         save_meshcat_page(meshcat, "scene.html")
     """
-    page = make_static_page(meshcat, title)
-    path = Path(path)
-    with user_errors(path):
-        write_part(path, page)
-    complete_part(path)
+    write_text(Path(path), make_static_page(meshcat, title))
 
 
 def filter_rows(data: bytes) -> bytes:

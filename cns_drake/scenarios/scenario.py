@@ -13,13 +13,14 @@ from pydantic import (
     Field,
     PrivateAttr,
     StringConstraints,
-    ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
 
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import (
+    validated,
+)
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
@@ -448,12 +449,7 @@ class Scenario(Section):
         """
         replaced = [n for field in changes for n in _REPLACED.get(field, ())]
         values = _merge(self, {**dict.fromkeys(replaced), **changes})
-        try:
-            scenario = Scenario.model_validate(values)
-        except ValidationError as error:
-            raise InputError(
-                describe_validation_error(source, error, Scenario)
-            ) from None
+        scenario = validated(Scenario, values, source)
         scenario._files = self._files
         return scenario
 

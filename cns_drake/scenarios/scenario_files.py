@@ -5,9 +5,10 @@ import os
 from pathlib import Path
 import re
 
-from pydantic import ValidationError
-
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import (
+    InputError,
+    validated,
+)
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
@@ -31,12 +32,7 @@ def make_scenario(values: dict, source: object) -> Scenario:
         values = load_scenario("metropolis_04").model_dump(exclude_none=True)
         short = make_scenario({**values, "frames": 20}, "short")
     """
-    try:
-        return Scenario.model_validate(values)
-    except ValidationError as error:
-        raise InputError(
-            describe_validation_error(source, error, Scenario)
-        ) from None
+    return validated(Scenario, values, source)
 
 
 def load_scenario(name_or_file: str | Path) -> Scenario:

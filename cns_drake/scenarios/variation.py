@@ -22,13 +22,18 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    ValidationError,
 )
 import yaml
 
 from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError, describe_validation_error
-from cns_drake.base.files import complete_part, user_errors, write_part
+from cns_drake.base.errors import (
+    InputError,
+    validated,
+)
+from cns_drake.base.files import (
+    make_folder,
+    write_text,
+)
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, draw_route
@@ -149,12 +154,7 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     values = read_yaml(path)
     if isinstance(values, dict):
         find_files(values, path)
-    try:
-        family = Family.model_validate(values)
-    except ValidationError as error:
-        raise InputError(
-            describe_validation_error(path, error, Family)
-        ) from None
+    family = validated(Family, values, path)
     base: str | Path = family.base
     if base not in shipped_drives():
         base = path.parent / base
@@ -267,17 +267,15 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
     Raises:
         InputError: if a file cannot be written.
     """
-    with user_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        here = folder.resolve()
+    make_folder(folder)
+    here = folder.resolve()
     paths = []
     for scenario in scenarios:
         path = folder / f"{scenario.name}.yaml"
         values = scenario.model_dump(mode="json", exclude_none=True)
         if Path(values.get("map", "")).is_relative_to(here.parent):
             values["map"] = os.path.relpath(values["map"], here)
-        write_part(path, yaml.safe_dump(values, sort_keys=False))
-        complete_part(path)
+        write_text(path, yaml.safe_dump(values, sort_keys=False))
         paths.append(path)
     return paths
 

@@ -10,7 +10,10 @@ from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import complete_part, part_path, user_errors
+from cns_drake.base.files import (
+    completing,
+    make_folder,
+)
 from cns_drake.base.points import encode_bin, encode_pcd, to_xyzi
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.world import World
@@ -72,10 +75,9 @@ def save_scan(scan: np.ndarray, path: Path) -> None:
             written.
     """
     check_ending(path)
-    with user_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part_path(path).write_bytes(_ENCODERS[path.suffix](scan))
-    complete_part(path)
+    make_folder(path.parent)
+    with completing(path) as part:
+        part.write_bytes(_ENCODERS[path.suffix](scan))
 
 
 def _encode_npy(scan: np.ndarray) -> bytes:

@@ -10,7 +10,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.files import check_writable, complete_part, write_part
+from cns_drake.base.files import (
+    check_writable,
+    write_text,
+)
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.version import __version__
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
@@ -163,7 +166,8 @@ def simulate(
                 page=page,
                 num_threads=num_threads,
             )
-            _save_graphviz(diagram, graphviz_file)
+            if graphviz_file is not None:
+                write_text(graphviz_file, diagram.GetGraphvizString())
             strike()
             loaded = time.perf_counter()
             simulated_s = _advance(
@@ -284,12 +288,6 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
         stage=stage,
         stages=stages,
     )
-
-
-def _save_graphviz(diagram: Diagram, file: Path | None) -> None:
-    if file is not None:
-        write_part(file, diagram.GetGraphvizString())
-        complete_part(file)
 
 
 def _advance(

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, make_folder
+from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
@@ -335,21 +335,16 @@ def _write(
 ) -> tuple[Path, str]:
     text = ladder_text(rows)
     queries = ladder_query_table(measured, protocol).to_csv()
-    _write_text(output / "queries.csv", queries)
+    write_text(output / "queries.csv", queries)
     draw_ladder(rows, output / "ladder")
     if pairs:
-        _write_text(output / "pairs.csv", pair_table(rows, pairs).to_csv())
+        write_text(output / "pairs.csv", pair_table(rows, pairs).to_csv())
         text += f"\n\n{pair_text(rows, pairs)}"
-    _write_text(output / "findings.txt", text + "\n")
+    write_text(output / "findings.txt", text + "\n")
     table = output / "ladder.csv"
     found = ladder_table([*rows, *pairs], protocol, extent.viewpoint)
-    _write_text(table, found.to_csv())
+    write_text(table, found.to_csv())
     return table, text
-
-
-def _write_text(path: Path, text: str) -> None:
-    with completing(path) as part:
-        part.write_text(text, encoding="utf-8")
 
 
 def distracting_drives(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.files import completing
+from cns_drake.base.files import write_text
 from evaluation.map_update.sessions import Label, Pair
 from evaluation.map_update.structures import StructureChange
 
@@ -95,8 +95,7 @@ worlds of both drives.</p>
 <th>points</th><th>observed</th><th>changed</th></tr>{body}</table>
 </body></html>
 """
-    with completing(path) as part:
-        part.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _frame(pair: Pair) -> tuple[np.ndarray, float, tuple[int, int]]:

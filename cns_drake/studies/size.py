@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, make_folder
+from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
@@ -116,8 +116,7 @@ def measure_sizes(
     run_jobs(jobs, cluster)
     path = output / "size.csv"
     table = size_table(folder.name, [part.read() for part in parts])
-    with completing(path) as unfinished:
-        unfinished.write_text(table.to_csv(), encoding="utf-8")
+    write_text(path, table.to_csv())
     return path
 
 

@@ -17,7 +17,11 @@ import numpy as np
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.rates import check_years
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, make_folder, user_errors
+from cns_drake.base.files import (
+    make_folder,
+    user_errors,
+    write_text,
+)
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -333,7 +337,6 @@ def _write(pairs: Sequence[AgedPair], output: Path) -> tuple[Path, str]:
         ("findings.txt", text + "\n"),
         ("years.csv", year_table(rows).to_csv()),
     ):
-        with completing(output / name) as part:
-            part.write_text(content, encoding="utf-8")
+        write_text(output / name, content)
     draw_years(rows, output / "years")
     return output / "years.csv", text

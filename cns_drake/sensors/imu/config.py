@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import (
+    InputError,
+    validated,
+)
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.sensors.imu.noise import ImuNoise
 from cns_drake.sensors.sensor_config import (
@@ -145,9 +148,4 @@ def read_kalibr(path: Path) -> KalibrImu:
     values = read_yaml(path)
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of Kalibr's fields of an IMU")
-    try:
-        return KalibrImu.model_validate(values)
-    except ValidationError as error:
-        raise InputError(
-            describe_validation_error(path, error, KalibrImu)
-        ) from None
+    return validated(KalibrImu, values, path)

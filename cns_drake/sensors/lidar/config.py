@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import (
     Field,
     PlainSerializer,
-    ValidationError,
     field_validator,
     model_validator,
 )
 
 from cns_drake.base.drives.point_layouts import LayoutName
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import (
+    validated,
+)
 from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
@@ -162,10 +163,7 @@ def make_lidar_config(preset: str) -> LidarSection:
     Raises:
         InputError: there is no such preset.
     """
-    try:
-        return LidarSection(preset=preset)
-    except ValidationError as error:
-        raise InputError(describe_validation_error("--lidar", error)) from None
+    return validated(LidarSection, {"preset": preset}, "--lidar")
 
 
 def make_pattern(config: LidarSection) -> BeamPattern:
