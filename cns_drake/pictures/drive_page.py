@@ -105,14 +105,30 @@ class DriveRecord:
     names: dict[FrameId, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class ShownStages:
+    """The stage of a drive among others, as its page shows it.
+
+    Attributes:
+        other: the stage to show the difference to, if any.
+        other_name: its name in the page.
+        stage: name of the drive's stage, if it is one of a map.
+        stages: names of all stages of that map, the earliest first.
+    """
+
+    other: World | None = None
+    other_name: str = "the other stage"
+    stage: str | None = None
+    stages: Sequence[str] = ()
+
+
+_ALONE = ShownStages()
+
+
 def make_drive_page(
     drive: DriveRecord,
     world: World,
-    *,
-    other_stage: World | None = None,
-    other_name: str = "the other stage",
-    stage: str | None = None,
-    stages: Sequence[str] = (),
+    shown: ShownStages = _ALONE,
     title: str = "cns-drake",
 ) -> str:
     """Returns a page with the city, the drive and its scans.
@@ -134,16 +150,10 @@ def make_drive_page(
     A panel has the title and a legend; buttons play the drive, let the camera
     follow the car, switch points off, and show the change: additional parts are
     then violet. Below the time line are plots of speed, IMU and stage.
-
-    Args:
-        other_stage: the stage to show the difference to.
-        other_name: its name in the page.
-        stage: name of the stage, if the world is one of a map.
-        stages: names of all stages of that map, the earliest first.
     """
     with _quiet():
         meshcat = Meshcat(MeshcatParams(host="127.0.0.1", port=0))
-    changes = _draw_city(meshcat, world, other_stage)
+    changes = _draw_city(meshcat, world, shown.other)
     if len(drive.X_WBs) > 1:
         draw_route(meshcat, "/route", drive.X_WBs)
     _animate(meshcat, drive, world)
@@ -152,26 +162,18 @@ def make_drive_page(
     return make_static_page(
         meshcat,
         title,
-        body=make_panel(title, drive, changes, other_name, stage, stages),
+        body=make_panel(title, drive, changes, shown),
         script=_read_template("drive.js"),
     )
 
 
 def make_panel(
-    title: str,
-    drive: DriveRecord,
-    changes: Set[str],
-    other_name: str,
-    stage: str | None = None,
-    stages: Sequence[str] = (),
+    title: str, drive: DriveRecord, changes: Set[str], shown: ShownStages
 ) -> str:
     """Returns the HTML of title, legend, plots and buttons.
 
     Args:
         changes: the keys of `CHANGE_RGB` that the page has.
-        other_name: the name of the other stage.
-        stage: name of the stage, if the world is one of a map.
-        stages: names of all stages of that map, the earliest first.
     """
     # Only pages need templates, whose import takes a moment.
     from jinja2 import Environment, StrictUndefined
@@ -196,13 +198,13 @@ def make_panel(
         route=_gradient([START_RGB, END_RGB]),
         colours={name: _hex(rgb) for name, rgb in CHANGE_RGB.items()},
         changes={
-            name: words.format(other=other_name)
+            name: words.format(other=shown.other_name)
             for name, words in _CHANGES.items()
             if name in changes
         },
         plots=motion_plots(drive),
-        stage=stage,
-        stages=stages,
+        stage=shown.stage,
+        stages=shown.stages,
     )
 
 

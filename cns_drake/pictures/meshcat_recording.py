@@ -12,6 +12,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from cns_drake.base.files import write_text
 from cns_drake.pictures.drive_page import (
     DriveRecord,
+    ShownStages,
     make_drive_page,
     moving_frames,
 )
@@ -55,10 +56,7 @@ class MeshcatRecorder(LeafSystem):
         X_BSs: Mapping[str, RigidTransform],
         period: float,
         num_frames: int | None = None,
-        other_stage: World | None = None,
-        other_name: str = "the other stage",
-        stage: str | None = None,
-        stages: Sequence[str] = (),
+        shown: ShownStages | None = None,
         scan_spacing: float = 15.0,
     ):
         """Declares the ports and the schedule.
@@ -67,18 +65,11 @@ class MeshcatRecorder(LeafSystem):
             X_BSs: LiDAR name -> pose of its frame S in B.
             period: time between frames [s].
             num_frames: number of frames to record, if not all.
-            other_stage: the stage to show the difference to.
-            other_name: what the page calls it.
-            stage: name of the stage, if the world is one of a map.
-            stages: names of all stages of that map, the earliest first.
             scan_spacing: distance between two shown scans [m].
         """
         super().__init__()
         self._world = world
-        self._other_stage = other_stage
-        self._other_name = other_name
-        self._stage = stage
-        self._stages = tuple(stages)
+        self._shown = shown or ShownStages()
         self._X_BSs = dict(X_BSs)
         self._scan_spacing = scan_spacing
         self._way_to_scan = 0.0
@@ -127,16 +118,8 @@ class MeshcatRecorder(LeafSystem):
         Raises:
             InputError: if the file cannot be written.
         """
-        html = make_drive_page(
-            self.drive,
-            self._world,
-            other_stage=self._other_stage,
-            other_name=self._other_name,
-            stage=self._stage,
-            stages=self._stages,
-            title=title,
-        )
-        write_text(path, html)
+        page = make_drive_page(self.drive, self._world, self._shown, title)
+        write_text(path, page)
 
     def _publish(self, context: Context) -> EventStatus:
         if len(self.drive.X_WBs) == self._num_frames:

@@ -16,6 +16,7 @@ from cns_drake.base.files import (
 )
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.version import __version__
+from cns_drake.pictures.drive_page import ShownStages
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter, take_over_frames
@@ -283,10 +284,12 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
         X_BSs=drive.X_BSs,
         period=drive.scenario.frame_period,
         num_frames=drive.num_frames,
-        other_stage=None if other is None else load_stage(other),
-        other_name=other_name,
-        stage=stage,
-        stages=stages,
+        shown=ShownStages(
+            None if other is None else load_stage(other),
+            other_name,
+            stage,
+            stages,
+        ),
     )
 
 

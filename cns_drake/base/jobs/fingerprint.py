@@ -100,48 +100,37 @@ class _Imports(NamedTuple):
     offered: Mapping[str, str]
 
 
-class _Sources:
-    """Finds and reads modules, each once."""
+def _source(module: _Module) -> Path | None:
+    """Returns the source of a module; None if there is none."""
+    place = module.root.joinpath(*module.name.split("."))
+    for path in (place / "__init__.py", Path(f"{place}.py")):
+        if path.is_file():
+            return path
+    return None
 
-    def __init__(self) -> None:
-        self._files: dict[_Module, Path | None] = {}
-        self._imports: dict[_Module, _Imports] = {}
 
-    def file(self, module: _Module) -> Path | None:
-        """Returns the source of a module; None if there is none."""
-        if module not in self._files:
-            place = module.root.joinpath(*module.name.split("."))
-            self._files[module] = None
-            for path in (place / "__init__.py", Path(f"{place}.py")):
-                if path.is_file():
-                    self._files[module] = path
-                    break
-        return self._files[module]
+def _imported(module: _Module) -> Iterator[_Module]:
+    """Yields what a module imports, if it is ours or beside it."""
+    for home, name in _imports_of(module).names:
+        own = home.partition(".")[0] in _PACKAGES
+        package = _Module(_ROOT if own else module.root, home)
+        yield package
+        inner = package._replace(name=f"{home}.{name}")
+        if name and _source(inner) is not None:
+            yield inner
+        elif name in (offered := _imports_of(package).offered):
+            yield package._replace(name=offered[name])
 
-    def imported(self, module: _Module) -> Iterator[_Module]:
-        """Yields what a module imports, if it is ours or beside it."""
-        for home, name in self._imports_of(module).names:
-            own = home.partition(".")[0] in _PACKAGES
-            package = _Module(_ROOT if own else module.root, home)
-            yield package
-            inner = package._replace(name=f"{home}.{name}")
-            if name and self.file(inner) is not None:
-                yield inner
-            elif name in (offered := self._imports_of(package).offered):
-                yield package._replace(name=offered[name])
 
-    def _imports_of(self, module: _Module) -> _Imports:
-        if module not in self._imports:
-            self._imports[module] = _Imports((), {})
-            path = self.file(module)
-            if path is not None:
-                package = module.name
-                if path.name != "__init__.py":
-                    package = package.rpartition(".")[0]
-                with user_errors(path):
-                    text = path.read_bytes()
-                self._imports[module] = _find_imports(text, package)
-        return self._imports[module]
+def _imports_of(module: _Module) -> _Imports:
+    path = _source(module)
+    if path is None:
+        return _Imports((), {})
+    package = module.name
+    if path.name != "__init__.py":
+        package = package.rpartition(".")[0]
+    with user_errors(path):
+        return _find_imports(path.read_bytes(), package)
 
 
 def _modules_in(package: str) -> Iterator[_Module]:
@@ -164,13 +153,12 @@ def _files(
     modules: Iterable[_Module], without: tuple[str, ...]
 ) -> dict[str, Path]:
     """Returns name -> path of the files that modules consist of."""
-    sources = _Sources()
     waiting = list(modules)
     done: set[_Module] = set()
     found: dict[str, Path] = {}
     while waiting:
         module = waiting.pop()
-        path = sources.file(module)
+        path = _source(module)
         if module in done or path is None or _is_in(module, without):
             continue
         done.add(module)
@@ -179,10 +167,10 @@ def _files(
                 found[file.relative_to(_ROOT).as_posix()] = file
         # Its parent packages run, too; their data do not count.
         for one in (module, *module.parents()):
-            source = sources.file(one)
+            source = _source(one)
             if source is not None:
                 found[f"{one.name}.py"] = source
-                waiting += sources.imported(one)
+                waiting += _imported(one)
     return found
 
 

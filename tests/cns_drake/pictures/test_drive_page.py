@@ -11,6 +11,7 @@ import pytest
 from cns_drake import load_scenario
 from cns_drake.pictures.drive_page import (
     DriveRecord,
+    ShownStages,
     make_drive_page,
     moving_frames,
 )
@@ -82,10 +83,7 @@ def make_page(folder, other_stage=None):
     return make_drive_page(
         drive,
         world,
-        other_stage=other_stage,
-        other_name="stage <02>",
-        stage="01",
-        stages=("01", "02"),
+        ShownStages(other_stage, "stage <02>", "01", ("01", "02")),
         title="a < b",
     )
 
@@ -156,7 +154,7 @@ def test_page_of_a_shipped_drive_is_small():
         angular_velocities_I=list(motion[:, 4:]),
     )
     page = make_drive_page(
-        drive, world, other_stage=load_world(map_folder(scenario).stage("04"))
+        drive, world, ShownStages(load_world(map_folder(scenario).stage("04")))
     )
     assert 15e6 < len(page.encode()) < 25e6
 

@@ -9,6 +9,7 @@ import pytest
 from cns_drake.pictures.drive_page import (
     DriveRecord,
     Plot,
+    ShownStages,
     make_panel,
     motion_plots,
 )
@@ -66,7 +67,7 @@ def test_units_of_motion():
 
 
 def test_plots_stand_in_the_panel():
-    html = make_panel("a", record(2), set(), "b")
+    html = make_panel("a", record(2), set(), ShownStages())
     assert 'data-unit="km/h" data-values="36.0,36.0"' in html
     assert (
         re.findall(r'<polyline points="([^"]*)"', html)[0]
@@ -76,13 +77,15 @@ def test_plots_stand_in_the_panel():
 
 
 def test_stage_is_marked_among_all():
-    html = make_panel("a", record(2), set(), "b", "02", ("01", "02", "03"))
+    shown = ShownStages(stage="02", stages=("01", "02", "03"))
+    html = make_panel("a", record(2), set(), shown)
     assert re.findall(r"<b([^>]*)>(\d\d)</b>", html) == [
         ("", "01"),
         (' class="now"', "02"),
         ("", "03"),
     ]
-    html = make_panel("a", record(2), set(), "b", "01", ("01",))
+    shown = ShownStages(stage="01", stages=("01",))
+    html = make_panel("a", record(2), set(), shown)
     assert 'class="stages"' not in html
 
 

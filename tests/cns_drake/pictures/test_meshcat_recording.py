@@ -18,6 +18,7 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.pictures.drive_page import ShownStages
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.world import load_world
@@ -159,7 +160,11 @@ def drive(folder, stage, other_stage, num_frames=NUM_FRAMES, **kwargs):
     to_pose = builder.AddSystem(MultibodyPositionToGeometryPose(world.plant))
     recorder = builder.AddSystem(
         MeshcatRecorder(
-            world, X_BSs=X_BSs, period=PERIOD, other_stage=other, **kwargs
+            world,
+            X_BSs=X_BSs,
+            period=PERIOD,
+            shown=ShownStages(other),
+            **kwargs,
         )
     )
     builder.Connect(car.GetOutputPort("position"), to_pose.get_input_port())
