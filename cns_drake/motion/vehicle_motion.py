@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -217,23 +218,15 @@ class VehicleMotion(LeafSystem):
             self._calc_position,
             prerequisites,
         )
-        for name, element, calc in (
-            ("body_poses", RigidTransform(), self._calc_poses),
-            (
-                "body_spatial_velocities",
-                SpatialVelocity(),
-                self._calc_velocities,
-            ),
-            (
-                "body_spatial_accelerations",
-                SpatialAcceleration(),
-                self._calc_accelerations,
-            ),
+        for name, element in (
+            ("body_poses", RigidTransform()),
+            ("body_spatial_velocities", SpatialVelocity()),
+            ("body_spatial_accelerations", SpatialAcceleration()),
         ):
             self.DeclareAbstractOutputPort(
                 name,
                 lambda element=element: AbstractValue.Make([element]),
-                calc,
+                functools.partial(self._calc_bodies, name),
                 prerequisites,
             )
 
@@ -296,34 +289,23 @@ class VehicleMotion(LeafSystem):
             vdot[:, joint.velocity_start()] = sign * wheel.acceleration
         return _State(q, v, vdot)
 
-    def _set_plant_context(self, context: Context) -> _State:
-        state = self._state.Eval(context)
-        self._plant.SetPositions(self._plant_context, state.q)
-        self._plant.SetVelocities(self._plant_context, state.v)
-        return state
-
     def _calc_position(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._state.Eval(context).q)
 
-    def _calc_poses(self, context: Context, output: AbstractValue) -> None:
-        self._set_plant_context(context)
-        port = self._plant.get_body_poses_output_port()
-        output.set_value(port.Eval(self._plant_context))
-
-    def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
-        self._set_plant_context(context)
-        port = self._plant.get_body_spatial_velocities_output_port()
-        output.set_value(port.Eval(self._plant_context))
-
-    def _calc_accelerations(
-        self, context: Context, output: AbstractValue
+    def _calc_bodies(
+        self, name: str, context: Context, output: AbstractValue
     ) -> None:
-        state = self._set_plant_context(context)
-        output.set_value(
-            self._plant.CalcSpatialAccelerationsFromVdot(
-                self._plant_context, state.vdot
+        plant, scratch = self._plant, self._plant_context
+        state = self._state.Eval(context)
+        plant.SetPositions(scratch, state.q)
+        plant.SetVelocities(scratch, state.v)
+        if name == "body_spatial_accelerations":
+            # The plant's port has those of its dynamics.
+            output.set_value(
+                plant.CalcSpatialAccelerationsFromVdot(scratch, state.vdot)
             )
-        )
+        else:
+            output.set_value(plant.GetOutputPort(name).Eval(scratch))
 
 
 class Sweep(NamedTuple):

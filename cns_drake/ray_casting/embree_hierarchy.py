@@ -108,10 +108,15 @@ class EmbreeHierarchy:
             self._lib.rtcRetainDevice(self._device)
         self._scenes: list[int] = []
         weakref.finalize(self, _release, self._lib, self._device, self._scenes)
+        # The `id` of a group, and of a copied surface -> its Embree scene.
         known: dict[int, _Built] = {}
         copied: dict[int, _Built] = {}
         if previous is not None:
-            known, copied = previous._built_of(), previous._copied()
+            for row, old in previous._built.items():
+                group = previous._groups[row]
+                known[id(group)] = old
+                if group.is_copy:
+                    copied[id(group.members[0][2])] = old
         self._built: dict[int, _Built] = {}
         for row, group in enumerate(groups):
             built = known.get(id(group))
@@ -165,20 +170,6 @@ class EmbreeHierarchy:
             np.array([row not in copies for row in rows], np.int64),
             np.array(rows, np.int32),
         )
-
-    def _built_of(self) -> dict[int, _Built]:
-        """Returns group's `id` -> its Embree scene."""
-        return {
-            id(self._groups[row]): built for row, built in self._built.items()
-        }
-
-    def _copied(self) -> dict[int, _Built]:
-        """Returns surface's `id` -> the Embree scene of its copies."""
-        return {
-            id(self._groups[row].members[0][2]): built
-            for row, built in self._built.items()
-            if self._groups[row].is_copy
-        }
 
     def place(self, placed: Placed) -> None:
         """Gives instances in sight their places, and disables the others.

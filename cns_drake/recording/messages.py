@@ -227,13 +227,8 @@ def make_tf(
 
 def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
     """Returns the unit quaternion of a rotation in ROS order."""
-    quaternion = R.ToQuaternion()
-    return (
-        quaternion.x(),
-        quaternion.y(),
-        quaternion.z(),
-        quaternion.w(),
-    )
+    q = R.ToQuaternion()
+    return q.x(), q.y(), q.z(), q.w()
 
 
 def make_header(frame_id: str, stamp_ns: int) -> Any:
@@ -248,7 +243,7 @@ def make_header(frame_id: str, stamp_ns: int) -> Any:
 def make_pose(X: RigidTransform) -> Any:
     """Returns a pose."""
     return message_class("geometry_msgs/msg/Pose")(
-        position=_make_point(X.translation()),
+        position=make_vector(X.translation(), "Point"),
         orientation=_make_quaternion(X.rotation()),
     )
 
@@ -258,15 +253,9 @@ def _make_quaternion(R: RotationMatrix) -> Any:
     return message_class("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w)
 
 
-def make_vector(xyz: np.ndarray) -> Any:
-    """Returns a vector of three numbers."""
-    return message_class("geometry_msgs/msg/Vector3")(
-        x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
-    )
-
-
-def _make_point(xyz: np.ndarray) -> Any:
-    return message_class("geometry_msgs/msg/Point")(
+def make_vector(xyz: np.ndarray, kind: str = "Vector3") -> Any:
+    """Returns a vector of three numbers, or a `Point`."""
+    return message_class(f"geometry_msgs/msg/{kind}")(
         x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
     )
 

@@ -125,9 +125,15 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
             if budget < 0:
                 yield Fault(position, "too much damage, the rest is not read")
                 return
-            yield from _parse(opcode, _read_content(stream, position, end))
+            start = position + RECORD_HEADER.size
+            if end - start > CHUNK_LIMIT_BYTES:
+                raise _DamageError(
+                    f"a record of {end - start} bytes is too large"
+                )
+            yield from _parse(opcode, stream.read(end - start))
         except _FAULTS as error:
-            yield Fault(position, _describe(error))
+            text = " ".join(str(error).split())
+            yield Fault(position, text or type(error).__name__)
             if end is None or not _begins_record(stream, end, size):
                 end = _next_chunk(stream, position + 1, size)
         else:
@@ -153,14 +159,6 @@ def _read_header(stream: BinaryIO, position: int, size: int) -> tuple[int, int]:
     if opcode == 0:
         raise _DamageError("there is no record")
     return opcode, end
-
-
-def _read_content(stream: BinaryIO, position: int, end: int) -> bytes:
-    start = position + RECORD_HEADER.size
-    if end - start > CHUNK_LIMIT_BYTES:
-        raise _DamageError(f"a record of {end - start} bytes is too large")
-    stream.seek(start)
-    return stream.read(end - start)
 
 
 def _begins_record(stream: BinaryIO, position: int, size: int) -> bool:
@@ -199,7 +197,12 @@ def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
     """Yields the records of interest that a record is or contains."""
     stream = RecordContent(content)
     if opcode == Opcode.CHUNK:
-        yield from _records_in_chunk(Chunk.read(stream))
+        inner = RecordContent(uncompress(Chunk.read(stream)))
+        while inner.left:
+            opcode, length = RECORD_HEADER.unpack(
+                inner.read(RECORD_HEADER.size)
+            )
+            yield from _parse_content(opcode, inner.read(length))
     elif opcode == Opcode.HEADER:
         yield Header.read(stream)
     elif opcode == Opcode.METADATA:
@@ -219,18 +222,6 @@ def _parse_content(opcode: int, content: bytes) -> Iterator[McapRecord]:
         yield Schema.read(stream)
     elif opcode == Opcode.CHANNEL:
         yield Channel.read(stream)
-
-
-def _records_in_chunk(chunk: Chunk) -> Iterator[McapRecord]:
-    stream = RecordContent(uncompress(chunk))
-    while stream.left:
-        opcode, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
-        yield from _parse_content(opcode, stream.read(length))
-
-
-def _describe(error: Exception) -> str:
-    text = " ".join(str(error).split())
-    return text or type(error).__name__
 
 
 @dataclass(frozen=True)
@@ -271,7 +262,9 @@ def repair_mcap(
         InputError: nothing can be read, or the new file exists already, or
             cannot be written.
     """
-    output = output or _default_output(path)
+    if output is None:
+        stem = path.name.removesuffix(".part").removesuffix(".mcap")
+        output = path.with_name(f"{stem}_repaired.mcap")
     with user_errors(path):
         if not path.is_file():
             raise InputError(f"{path}: no such file")
@@ -313,11 +306,6 @@ def repair_mcap(
         num_faults=copy.num_faults,
         first_fault=copy.first_fault,
     )
-
-
-def _default_output(path: Path) -> Path:
-    stem = path.name.removesuffix(".part").removesuffix(".mcap")
-    return path.with_name(f"{stem}_repaired.mcap")
 
 
 def _read(

@@ -132,20 +132,23 @@ class MeshFiles:
             InputError: the mesh is missing, cannot be read, or is too large;
                 the geometry is named.
         """
-        where = _describe(name, shape.source())
         key = mesh_shape_key(shape)
         if key in self._surfaces:
             return self._surfaces[key]
         try:
             with collected_errors():  # The error is enough.
-                surface = _check_size(
+                surface = (
                     _read_hull(shape)
                     if isinstance(shape, Convex)
                     else self._read_mesh(shape)
                 )
+            # The comparison is False for NaN.
+            if not np.abs(surface.p_GVset).max() <= LARGEST_SIZE:
+                raise ValueError(f"larger than {LARGEST_SIZE:g} m")
         except PARSER_ERRORS as error:
-            fault = " ".join(str(error).split())
-            raise InputError(f"{where}: {fault}") from error
+            source, fault = shape.source(), " ".join(str(error).split())
+            file = f"{source.path()}: " if source.is_path() else ""
+            raise InputError(f"{file}geometry '{name}': {fault}") from error
         self._surfaces[key] = surface
         return surface
 
@@ -217,18 +220,6 @@ def _source_key(source: MeshSource) -> object:
         (uri, f if isinstance(f, Path) else f.sha256().to_string())
         for uri, f in sorted(files.items())
     )
-
-
-def _describe(name: str, source: MeshSource) -> str:
-    file = f"{source.path()}: " if source.is_path() else ""
-    return f"{file}geometry '{name}'"
-
-
-def _check_size(surface: TriangleSurface) -> TriangleSurface:
-    # The comparison is False for NaN.
-    if not np.abs(surface.p_GVset).max() <= LARGEST_SIZE:
-        raise ValueError(f"larger than {LARGEST_SIZE:g} m")
-    return surface
 
 
 def _read_hull(shape: Convex) -> TriangleSurface:

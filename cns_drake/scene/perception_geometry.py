@@ -6,7 +6,7 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
+from pydrake.common.value import Value
 from pydrake.geometry import (
     Box,
     Capsule,
@@ -15,7 +15,6 @@ from pydrake.geometry import (
     Ellipsoid,
     FrameId,
     GeometryId,
-    GeometryProperties,
     HalfSpace,
     Mesh,
     MeshcatCone,
@@ -28,7 +27,6 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
     AbstractParameterIndex,
-    Context,
     OutputPort,
 )
 
@@ -124,14 +122,10 @@ def read_perception_geometry(
         InputError: see `GeometryReader.read`.
     """
     reader = GeometryReader(Role.kPerception)
-    frames = {
-        frame_id
-        for frame_id in inspector.GetAllFrameIds()
-        if not keep_frame(frame_id)
-    }
     hidden = {
         geometry_id
-        for frame_id in frames
+        for frame_id in inspector.GetAllFrameIds()
+        if not keep_frame(frame_id)
         for geometry_id in inspector.GetGeometries(frame_id, Role.kPerception)
     }
     return reader.read(inspector, hidden)
@@ -254,16 +248,10 @@ class GeometryReader:
                     f"geometry '{name}': lidar/reflectivity: {reflectivity} "
                     "is not within 0 to 1"
                 )
-        return _diffuse_rgb(properties), reflectivity
-
-
-def _diffuse_rgb(
-    properties: GeometryProperties,
-) -> tuple[float, float, float] | None:
-    if not properties.HasProperty("phong", "diffuse"):
-        return None
-    rgba = properties.GetProperty("phong", "diffuse")
-    return (rgba.r(), rgba.g(), rgba.b())
+        if not properties.HasProperty("phong", "diffuse"):
+            return None, reflectivity
+        rgba = properties.GetProperty("phong", "diffuse")
+        return (rgba.r(), rgba.g(), rgba.b()), reflectivity
 
 
 def _shape_key(shape: Shape) -> tuple:
@@ -355,11 +343,7 @@ def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
     return scene_graph.DeclareAbstractOutputPort(
         _PORT,
         lambda: Value(object()),
-        _calc_revision,
+        lambda context, output: output.set_value(next(_revisions)),
         # The only parameter that a SceneGraph has.
         {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
     )
-
-
-def _calc_revision(context: Context, output: AbstractValue) -> None:
-    output.set_value(next(_revisions))

@@ -140,7 +140,10 @@ def simulate(
     # Interrupts are raised only where `strike` is called.
     with interrupts_wait() as strike:
         # Quick checks come before all slow work.
-        _check_output(folder, (page_file, graphviz_file), overwrite)
+        for file in (page_file, graphviz_file):
+            if file is not None:
+                check_writable(file)
+        RecordingFolder(folder).check(overwrite)
         if not scenario.traffic.is_off:
             on_note(f"{scenario.name}: planning the traffic")
         drive = load_drive(scenario)
@@ -186,16 +189,6 @@ def simulate(
         wall_s=finished - loaded,
         loading_s=loaded - start,
     )
-
-
-def _check_output(
-    folder: Path, files: tuple[Path | None, ...], overwrite: bool
-) -> None:
-    """Checks that a recording and other files, if any, can be written."""
-    for file in files:
-        if file is not None:
-            check_writable(file)
-    RecordingFolder(folder).check(overwrite)
 
 
 def _make_bag(

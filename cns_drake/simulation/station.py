@@ -1,7 +1,5 @@
 """The Diagram: the one place where systems are wired."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
@@ -12,7 +10,6 @@ from pydrake.systems.framework import (
     Diagram,
     DiagramBuilder,
     LeafSystem,
-    OutputPort,
 )
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
@@ -220,25 +217,15 @@ def make_station(
         )
     for name, recorder in recorders.items():
         if recorder is not None:
-            _connect(builder, name, recorder, measured)
+            builder.AddNamedSystem(name, recorder)
+            for k in range(recorder.num_input_ports()):
+                port = recorder.get_input_port(k)
+                builder.Connect(measured[port.get_name()], port)
     for name, port in measured.items():
         builder.ExportOutput(port, name)
     diagram = builder.Build()
     diagram.set_name(scenario.name)
     return diagram
-
-
-def _connect(
-    builder: DiagramBuilder,
-    name: str,
-    recorder: McapRecorder | MeshcatRecorder,
-    measured: Mapping[str, OutputPort],
-) -> None:
-    """Adds a recorder and connects its inputs to the ports of their names."""
-    builder.AddNamedSystem(name, recorder)
-    for k in range(recorder.num_input_ports()):
-        port = recorder.get_input_port(k)
-        builder.Connect(measured[port.get_name()], port)
 
 
 class _FramePoses(LeafSystem):

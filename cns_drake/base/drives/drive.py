@@ -12,8 +12,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base.yaml_files import read_yaml
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
 # velocities are those of B in W, expressed in B [m/s, rad/s].
@@ -89,10 +88,7 @@ def read_scenario(folder: Path) -> Mapping | None:
     path = folder / "scenario.yaml"
     if not path.is_file():
         return None
-    try:
-        scenario = parse_yaml(read_bytes(path))
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
+    scenario = read_yaml(path)
     if not isinstance(scenario, dict):
         raise InputError(f"{path}: not a mapping of a scenario's fields")
     name = scenario.get("name")

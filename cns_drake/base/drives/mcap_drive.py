@@ -1,6 +1,7 @@
 """Drives recorded as MCAP by cns-drake (or by others on the same topics)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+import contextlib
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -153,15 +154,13 @@ class McapDrive(Drive):
         if not 0 <= index < len(self):
             raise IndexError(f"scan {index} of {len(self)}")
         message = self._message(self._lidar_topic, self._scans[index])
-        try:
+        stamp_ns = mcap_messages.stamp_ns(message.header)
+        with self._faults(
+            f"{self._lidar_topic}: scan {index} at {stamp_ns} ns"
+        ):
             points = to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
             return from_layout(points, self._labels(index, message))
-        except ValueError as error:
-            raise InputError(
-                f"{self._path}: {self._lidar_topic}: scan {index} at"
-                f" {mcap_messages.stamp_ns(message.header)} ns: {error}"
-            ) from error
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
         """Returns the labels of a scan that has a topic for them."""
@@ -250,7 +249,8 @@ class McapDrive(Drive):
 
         def take(position: int, data: memoryview) -> None:
             if position < num_scans:
-                header = self._cloud_header(data)
+                with self._faults(self._lidar_topic):
+                    header = mcap_messages.read_cloud_header(data)
                 stamps_ns[position] = header.stamp_ns
                 topic, frame, first = (
                     self._lidar_topic,
@@ -312,18 +312,16 @@ class McapDrive(Drive):
         return self._decode(topic, self._file.read(place))
 
     def _decode(self, topic: str, data: memoryview) -> Any:
-        try:
+        with self._faults(topic):
             return mcap_messages.decode(data, self._message_types[topic])
-        except ValueError as error:
-            raise InputError(f"{self._path}: {topic}: {error}") from error
 
-    def _cloud_header(self, data: memoryview) -> mcap_messages.CloudHeader:
+    @contextlib.contextmanager
+    def _faults(self, where: str) -> Iterator[None]:
+        """Turns a ValueError into one line that names file and place."""
         try:
-            return mcap_messages.read_cloud_header(data)
+            yield
         except ValueError as error:
-            raise InputError(
-                f"{self._path}: {self._lidar_topic}: {error}"
-            ) from error
+            raise InputError(f"{self._path}: {where}: {error}") from error
 
     def _check_frame(
         self, topic: str, stamp_ns: int, frame: str, first: str
@@ -388,12 +386,8 @@ class McapDrive(Drive):
         data = self._file.attachment(name)
         if data is None:
             return None
-        try:
+        with self._faults(f"attachment {name}"):
             return parse_json(data)
-        except ValueError as error:
-            raise InputError(
-                f"{self._path}: attachment {name}: {error}"
-            ) from error
 
 
 def holds_mcap(path: Path) -> bool:

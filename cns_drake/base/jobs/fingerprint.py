@@ -159,7 +159,9 @@ def _files(
     while waiting:
         module = waiting.pop()
         path = _source(module)
-        if module in done or path is None or _is_in(module, without):
+        if module in done or path is None:
+            continue
+        if f"{module.name}.".startswith(tuple(f"{one}." for one in without)):
             continue
         done.add(module)
         if module.root == _ROOT:
@@ -174,12 +176,6 @@ def _files(
     return found
 
 
-def _is_in(module: _Module, packages: Iterable[str]) -> bool:
-    return f"{module.name}.".startswith(
-        tuple(f"{package}." for package in packages)
-    )
-
-
 @functools.cache
 def _find_imports(text: bytes, package: str) -> _Imports:
     """Returns the imports in the source of a module of a package."""
@@ -192,7 +188,8 @@ def _find_imports(text: bytes, package: str) -> _Imports:
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
-        if isinstance(node, ast.If) and _is_for_types(node.test):
+        test = getattr(getattr(node, "test", None), "id", None)
+        if isinstance(node, ast.If) and test == "TYPE_CHECKING":
             for line in node.body:
                 for home, name in _names_of(line, package):
                     offered[name] = home
@@ -203,10 +200,6 @@ def _find_imports(text: bytes, package: str) -> _Imports:
             for block in ("body", "orelse", "finalbody", "handlers", "cases"):
                 waiting += getattr(node, block, [])
     return _Imports(tuple(names), offered)
-
-
-def _is_for_types(test: ast.expr) -> bool:
-    return isinstance(test, ast.Name) and test.id == "TYPE_CHECKING"
 
 
 def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import graphlib
 import pickle
@@ -117,31 +117,24 @@ def _ordered(jobs: Mapping[str, Job]) -> list[str]:
     return list(graphlib.TopologicalSorter(needs).static_order())
 
 
+@dataclass
 class _Run:
     """One run of jobs on workers."""
 
-    def __init__(
-        self,
-        jobs: Mapping[str, Job],
-        done: Set[str],
-        urgency: Mapping[str, float],
-        workers: Workers,
-        messages: queue.SimpleQueue,
-        shown: JobProgress,
-        slots: int | None,
-    ):
-        self._jobs = jobs
-        self._slots = slots
-        self._urgency = urgency
-        self._workers = workers
-        self._messages = messages
-        self._shown = shown
-        self._waiting = dict(jobs)
+    _jobs: Mapping[str, Job]
+    _done: set[str]
+    _urgency: Mapping[str, float]
+    _workers: Workers
+    _messages: queue.SimpleQueue
+    _shown: JobProgress
+    _slots: int | None
+
+    def __post_init__(self) -> None:
+        self._waiting = dict(self._jobs)
         # Jobs without a result.
         self._submitted: set[str] = set()
         # Jobs that have reported their start and not their end.
         self._running: set[str] = set()
-        self._done = set(done)
         self._deaths: Counter = Counter()
         self._faults: dict[str, str] = {}
 

@@ -21,6 +21,7 @@ from pydrake.systems.framework import DiagramBuilder, System
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleSweep
 from cns_drake.scene.perception_geometry import geometry_revision_port
+from cns_drake.scene.world import anchored_frames
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.config import (
     LidarSection,
@@ -126,7 +127,7 @@ def add_lidar(
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())
         if unseen is None:
             unseen = _welded_to(body)
-        options.setdefault("anchored_frames", _anchored_frames(plant))
+        options.setdefault("anchored_frames", anchored_frames(plant))
         if motion_distortion:
             options["moving_bodies"] = _moving_bodies(plant)
     else:
@@ -304,11 +305,6 @@ def _welded_to(body: RigidBody) -> list[RigidBody]:
         found[int(place.index())] = place
         rest += neighbours.get(int(place.index()), [])
     return list(found.values())
-
-
-def _anchored_frames(plant: MultibodyPlant) -> list[FrameId]:
-    """Returns the frames that can only move if the model is changed."""
-    return [_frame_of(b) for b in plant.GetBodiesWeldedTo(plant.world_body())]
 
 
 def _moving_bodies(plant: MultibodyPlant) -> dict[FrameId, int]:

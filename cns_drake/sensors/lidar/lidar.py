@@ -186,7 +186,9 @@ class Lidar(LeafSystem):
             description="ray-casting scene",
             value_producer=ValueProducer(
                 allocate=lambda: Value(SeenGeometry(sight)),
-                calc=self._calc_seen,
+                calc=lambda context, seen: self._update(
+                    context, seen.get_value()
+                ),
             ),
             prerequisites_of_calc=inputs,
         )
@@ -245,9 +247,6 @@ class Lidar(LeafSystem):
         if seen.scene is None:  # In a cloned Context.
             self._update(context, seen)
         return seen
-
-    def _calc_seen(self, context: Context, value: AbstractValue) -> None:
-        self._update(context, value.get_value())
 
     def _update(self, context: Context, seen: SeenGeometry) -> None:
         known, ball = self._known_poses(context), EVERYWHERE
@@ -365,11 +364,7 @@ class Lidar(LeafSystem):
         return hits.geometry.take(places), returns
 
     def _turn_at(self, time: float) -> tuple[int, _Turn]:
-        """Returns the number and the beams of the turn that starts at a time.
-
-        Args:
-            time: start of the turn [s].
-        """
+        """Returns number and beams of the turn that starts at a time [s]."""
         frame = round(time / self._pattern.period)
         if self._pattern.repeats:
             return frame, self._first
