@@ -184,13 +184,6 @@ def _cns_inner_files(drive: McapDrive) -> dict[str, str]:
     return files | imu_files(drive) | scenario_files(drive)
 
 
-def _cns_scan_files(
-    frame: int, stamp_ns: int, scan: np.ndarray
-) -> dict[str, bytes]:
-    del frame
-    return {f"pcd/{stamp_ns}.pcd": encode_pcd(scan)}
-
-
 def _mount(X_BC: np.ndarray) -> str:
     """Returns the pose of a sensor C on the vehicle as YAML."""
     quat_xyzw = Rotation.from_matrix(X_BC[:3, :3]).as_quat(canonical=True)
@@ -221,7 +214,9 @@ CNS = Layout(
     drive_folder=_cns_folder,
     outer_files=_cns_outer_files,
     inner_files=_cns_inner_files,
-    scan_files=_cns_scan_files,
+    scan_files=lambda _, stamp_ns, scan: {
+        f"pcd/{stamp_ns}.pcd": encode_pcd(scan)
+    },
     shared_outer_files=True,
     has_labels=False,
 )
@@ -243,14 +238,6 @@ def _kitti_name(drive: McapDrive) -> str:
     if drive.lidar_name == drive.lidar_names[0]:
         return drive.name
     return f"{drive.name}_{drive.lidar_name}"
-
-
-def _kitti_folder(drive: McapDrive) -> PurePosixPath:
-    return PurePosixPath("sequences", _kitti_number(drive))
-
-
-def _kitti_outer_files(drive: McapDrive) -> dict[str, str]:
-    return {f"poses/{_kitti_number(drive)}.txt": _kitti_poses(drive)}
 
 
 def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
@@ -322,17 +309,15 @@ KITTI = Layout(
         " Kalibr has it",
         "sequences/<NN>/scenario.yaml": "what was simulated",
     },
-    drive_folder=_kitti_folder,
-    outer_files=_kitti_outer_files,
+    drive_folder=lambda drive: PurePosixPath("sequences", _kitti_number(drive)),
+    outer_files=lambda drive: {
+        f"poses/{_kitti_number(drive)}.txt": _kitti_poses(drive)
+    },
     inner_files=_kitti_inner_files,
     scan_files=_kitti_scan_files,
     shared_outer_files=False,
     has_labels=True,
 )
-
-
-def _tum_folder(drive: McapDrive) -> PurePosixPath:
-    return PurePosixPath(checked_name(drive, drive.name))
 
 
 def _tum_inner_files(drive: McapDrive) -> dict[str, str]:
@@ -372,7 +357,7 @@ TUM = Layout(
         "<drive>/imu.yaml": "noise of the IMU, if it has noise, as Kalibr"
         " has it",
     },
-    drive_folder=_tum_folder,
+    drive_folder=lambda drive: PurePosixPath(checked_name(drive, drive.name)),
     outer_files=lambda drive: {},
     inner_files=_tum_inner_files,
     scan_files=None,

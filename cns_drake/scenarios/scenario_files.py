@@ -108,14 +108,6 @@ def _read_fields(path: Path) -> dict:
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of scenario fields")
     values.setdefault("name", drive_name(path))
-    for field in ("map", "world", "waypoints"):
-        place = values.get(field)
-        if isinstance(place, str) and place not in shipped_maps():
-            # Paths are relative to the file, not to the current folder.
-            try:
-                values[field] = str((path.parent / place).resolve())
-            except ValueError as error:
-                raise InputError(f"{path}: {field}: {error}") from error
     find_files(values, path)
     return values
 
@@ -140,17 +132,30 @@ def _find_base(
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Makes the paths in sections absolute.
+    """Makes the paths in fields absolute.
 
     Args:
         values: fields of a scenario or a family, to change.
         path: the file of these fields; paths are relative to it.
+
+    Raises:
+        InputError: a path cannot be one.
     """
+
+    def find(fields: dict, field: str) -> dict:
+        place = fields.get(field)
+        if not isinstance(place, str) or place in shipped_maps():
+            return fields
+        try:
+            return {**fields, field: str((path.parent / place).resolve())}
+        except ValueError as error:
+            raise InputError(f"{path}: {field}: {error}") from error
+
+    for field in ("map", "world", "waypoints"):
+        values |= find(values, field)
     for section, field in (("imu", "kalibr"), ("traffic", "fcd")):
-        fields = values.get(section)
-        if isinstance(fields, dict) and isinstance(fields.get(field), str):
-            place = str((path.parent / fields[field]).resolve())
-            values[section] = {**fields, field: place}
+        if isinstance(values.get(section), dict):
+            values[section] = find(values[section], field)
 
 
 def map_folder(scenario: Scenario) -> MapFolder:
@@ -183,19 +188,16 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         InputError: one of them does not exist.
     """
     source = source or scenario.source
-    for field in ("world", "waypoints"):
-        file = getattr(scenario, field)
+    for field, file in (
+        ("world", scenario.world),
+        ("waypoints", scenario.waypoints),
+        ("imu.kalibr", scenario.imu.kalibr),
+        ("traffic.fcd", scenario.traffic.fcd),
+    ):
         if file is not None and not os.path.isfile(file):
             raise InputError(f"{source}: {field}: {file}: no such file")
     if scenario.imu.kalibr is not None:
-        if not os.path.isfile(scenario.imu.kalibr):
-            raise InputError(
-                f"{source}: imu.kalibr: {scenario.imu.kalibr}: no such file"
-            )
         scenario.imu.sample_rate(scenario.fastest_rate)
-    fcd = scenario.traffic.fcd
-    if fcd is not None and not os.path.isfile(fcd):
-        raise InputError(f"{source}: traffic.fcd: {fcd}: no such file")
     has_traffic = not scenario.traffic.is_off
     if scenario.map is None:
         if has_traffic:
@@ -235,19 +237,15 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
             names only.
     """
     values = scenario.model_dump(mode="json", exclude_none=True)
-    for field in ("map", "world", "waypoints"):
-        place = values.get(field)
-        if place is None or place in shipped_maps():
-            continue
-        values[field] = Path(place).name
-        if folder is not None:
-            values[field] = os.path.relpath(place, folder.resolve())
+    for fields, field in (
+        *((values, field) for field in ("map", "world", "waypoints")),
+        (values.get("traffic", {}), "fcd"),
+    ):
+        place = fields.get(field)
+        if place is not None and place not in shipped_maps():
+            fields[field] = Path(place).name
+            if folder is not None:
+                fields[field] = os.path.relpath(place, folder.resolve())
     if scenario.imu.kalibr is not None:
         values["imu"]["kalibr"] = KALIBR_FILE
-    fcd = scenario.traffic.fcd
-    if fcd is not None:
-        values["traffic"]["fcd"] = Path(fcd).name
-        if folder is not None:
-            place = os.path.relpath(fcd, folder.resolve())
-            values["traffic"]["fcd"] = place
     return values

@@ -212,20 +212,14 @@ def vary(
             seed: base.model_copy(update={"map": str(folder)})
             for seed, folder in folders.items()
         }
-    orders = {
-        (city_seed, seed): _decay_order(
-            map_folder(city).structures, seed, removable
-        )
-        for city_seed, city in cities.items()
-        for seed in family.seeds
-    }
-    losses = {
-        (city_seed, seed): draw_losses(
-            map_folder(city).structures, family.scattered, seed, source
-        )
-        for city_seed, city in cities.items()
-        for seed in family.seeds
-    }
+    drawn = {}
+    for city_seed, city in cities.items():
+        table = map_folder(city).structures
+        for seed in family.seeds:
+            drawn[city_seed, seed] = (
+                _decay_order(table, seed, removable),
+                draw_losses(table, family.scattered, seed, source),
+            )
     members = []
     for (city_seed, city), part, seed, (route_label, route), unit in product(
         cities.items(), family.missing, family.seeds, routes, units
@@ -239,10 +233,8 @@ def vary(
         if city_seed is not None:
             labels.insert(1, f"c{city_seed}")
             title += f", in the city as seed {city_seed} draws it"
-        order = orders[city_seed, seed]
-        missing = losses[city_seed, seed].union(
-            order[: round(part * len(order))]
-        )
+        order, losses = drawn[city_seed, seed]
+        missing = losses.union(order[: round(part * len(order))])
         update: dict[str, object] = {
             "name": "_".join(labels).replace("-", "_"),
             "stage": stage,

@@ -7,7 +7,7 @@ are those of the section of a scenario, which stays the only description.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 import dataclasses
 from enum import Enum
 from typing import Any, Literal, get_args, get_origin
@@ -30,6 +30,7 @@ from pydrake.systems.framework import (
     LeafSystem,
     OutputPort,
     PortDataType,
+    System,
 )
 from pydrake.systems.lcm import (
     LcmBuses,
@@ -184,21 +185,19 @@ def ApplyLidarConfig(
         seed=config.seed,
         motion_distortion=section.motion_distortion,
     )
-    to_lcm = builder.AddNamedSystem(
-        f"{config.name}_to_lcm", PointCloudToLcm("world")
+    _publish(
+        builder,
+        config,
+        [lidar.GetOutputPort("point_cloud_W")],
+        PointCloudToLcm("world"),
+        LcmPublisherSystem.Make(
+            f"DRAKE_POINT_CLOUD_{config.name}",
+            lcmt_point_cloud,
+            _interface(config, builder, lcm_buses, lcm),
+            publish_period=lidar.pattern.period,
+            use_cpp_serializer=True,
+        ),
     )
-    builder.Connect(
-        lidar.GetOutputPort("point_cloud_W"), to_lcm.get_input_port()
-    )
-    publisher = LcmPublisherSystem.Make(
-        f"DRAKE_POINT_CLOUD_{config.name}",
-        lcmt_point_cloud,
-        _interface(config, builder, lcm_buses, lcm),
-        publish_period=lidar.pattern.period,
-        use_cpp_serializer=True,
-    )
-    builder.AddNamedSystem(f"{config.name}_publisher", publisher)
-    builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
     return lidar
 
 
@@ -246,15 +245,18 @@ def ApplyImuConfig(
     )
     ports = imu.ports()
     axes = [f"{name}_{axis}" for name in ports for axis in "xyz"]
-    _publish_signal(
+    measured = list(ports.values())
+    _publish(
         builder,
-        f"DRAKE_IMU_{config.name}",
         config,
-        ports.values(),
-        axes,
-        lambda *values: np.hstack(values),
-        rate,
-        _interface(config, builder, lcm_buses, lcm),
+        measured,
+        _SignalToLcm(measured, axes, lambda *values: np.hstack(values)),
+        LcmPublisherSystem.Make(
+            f"DRAKE_IMU_{config.name}",
+            lcmt_drake_signal,
+            _interface(config, builder, lcm_buses, lcm),
+            publish_period=1.0 / rate,
+        ),
     )
     return imu
 
@@ -296,15 +298,18 @@ def ApplyOdometryConfig(
     odometry = add_odometry(builder, frame, X_PB=X_PB, name=config.name)
     axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
     axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
-    _publish_signal(
+    measured = [odometry.GetOutputPort("odometry")]
+    _publish(
         builder,
-        f"DRAKE_ODOMETRY_{config.name}",
         config,
-        [odometry.GetOutputPort("odometry")],
-        axes,
-        _odometry_values,
-        section.rate or _RATE,
-        _interface(config, builder, lcm_buses, lcm),
+        measured,
+        _SignalToLcm(measured, axes, _odometry_values),
+        LcmPublisherSystem.Make(
+            f"DRAKE_ODOMETRY_{config.name}",
+            lcmt_drake_signal,
+            _interface(config, builder, lcm_buses, lcm),
+            publish_period=1.0 / (section.rate or _RATE),
+        ),
     )
     return odometry
 
@@ -363,28 +368,19 @@ def _odometry_values(odometry: Odometry) -> np.ndarray:
     )
 
 
-def _publish_signal(
+def _publish(
     builder: DiagramBuilder,
-    channel: str,
     config: Any,
-    ports: Iterable[OutputPort],
-    names: list[str],
-    values: Callable[..., np.ndarray],
-    rate: float,
-    lcm: DrakeLcmInterface | LcmInterfaceSystem,
+    ports: list[OutputPort],
+    to_lcm: System,
+    publisher: LcmPublisherSystem,
 ) -> None:
-    """Adds the systems that publish ports as one signal."""
-    ports = list(ports)
-    signal = builder.AddNamedSystem(
-        f"{config.name}_to_lcm", _SignalToLcm(ports, names, values)
-    )
+    """Adds systems that make a message of ports, and publish it."""
+    builder.AddNamedSystem(f"{config.name}_to_lcm", to_lcm)
     for index, port in enumerate(ports):
-        builder.Connect(port, signal.get_input_port(index))
-    publisher = LcmPublisherSystem.Make(
-        channel, lcmt_drake_signal, lcm, publish_period=1.0 / rate
-    )
+        builder.Connect(port, to_lcm.get_input_port(index))
     builder.AddNamedSystem(f"{config.name}_publisher", publisher)
-    builder.Connect(signal.get_output_port(), publisher.get_input_port())
+    builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
 
 
 class _SignalToLcm(LeafSystem):

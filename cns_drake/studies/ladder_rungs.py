@@ -6,7 +6,7 @@ Conditions and sensor of the later visit change the drive of the query, but
 never its route. Turned, tilted and partly hidden sensors see the same drive.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import itertools
 import math
@@ -64,6 +64,12 @@ CAUSES = (
 )
 # Only on request: a unit that looks ahead alone is a question of its own.
 EXTRAS = ("narrow_sensor",)
+# The order in which causes change drives: returns depend on the sensor.
+_ORDER = (
+    *("sensor", "narrow_sensor", "returns", "weather", *_TRANSIENT, "traffic"),
+    *("construction", "ride", *_QUERY_CHANGES, "driver", "viewpoint"),
+    *("lateral", "size"),
+)
 # Stands between the names of two causes at once.
 PAIRED = "+"
 # Causes that take no part in `all`, nor in pairs.
@@ -202,10 +208,9 @@ def changed_drives(
 ) -> RungDrives:
     """Returns drives with causes of change between them."""
     drives = plain
-    # The order is fixed, since returns depend on the sensor.
-    for cause, change in _CHANGES.items():
+    for cause in _ORDER:
         if cause in strengths:
-            drives = change(drives, strengths[cause], seed)
+            drives = _changed(drives, cause, strengths[cause], seed)
     return drives
 
 
@@ -216,122 +221,75 @@ def in_words(cause: str, strength: Any) -> str:
     return _WORDS[cause].format(strength)
 
 
-def _construction(drives: RungDrives, stage: str, _: int) -> RungDrives:
-    return _mapped(drives, stage=stage)
-
-
-def _transient(name: str) -> Callable[[RungDrives, float, int], RungDrives]:
-    def change(drives: RungDrives, value: float, seed: int) -> RungDrives:
-        query = drives.query.with_transient(**{name: value, "seed": seed})
-        return replace(drives, query=query)
-
-    return change
-
-
-def _traffic(drives: RungDrives, number: int | str, seed: int) -> RungDrives:
-    traffic = TrafficConfig(queues=True, seed=seed)
-    if number != QUEUES:
-        traffic = _vehicles(int(number), seed)
-    return _with_query(drives, traffic=traffic)
+def _changed(
+    drives: RungDrives, cause: str, strength: Any, seed: int
+) -> RungDrives:
+    """Returns drives with one more cause of change between them."""
+    query, database = drives.query, drives.database
+    if cause in ("sensor", "narrow_sensor"):
+        query = query.with_lidar_preset(strength)
+    elif cause in ("returns", "weather"):
+        weather = None
+        if cause == "weather":
+            weather = WeatherConfig(visibility=strength)
+        query = query.with_returns("calibrated", weather)
+        query = query.model_copy(update={"seed": seed})
+    elif cause in _TRANSIENT:
+        query = query.with_transient(**{cause: strength, "seed": seed})
+    elif cause == "traffic":
+        traffic = TrafficConfig(queues=True, seed=seed)
+        if strength != QUEUES:
+            traffic = _vehicles(int(strength), seed)
+        query = query.model_copy(update={"traffic": traffic})
+    elif cause == "construction":
+        database = database.model_copy(update={"stage": strength})
+    elif cause == "ride":
+        ride = RideConfig(roughness=strength, seed=seed)
+        database = database.model_copy(update={"ride": ride})
+    elif cause == "driver":
+        database = _driven(database, strength, seed)
+    elif cause == "viewpoint":
+        database = _seen_from(database, *strength)
+    elif cause == "lateral":
+        database = _seen_from(database, strength, 0.0)
+        return replace(drives, database=database, lateral=strength)
+    elif cause == "size":
+        return replace(drives, num_distractors=strength)
+    else:
+        option = {_QUERY_CHANGES[cause]: strength, "seed": seed}
+        return replace(drives, query_changes={**drives.query_changes, **option})
+    return replace(drives, query=query, database=database)
 
 
 def _vehicles(number: int, seed: int) -> TrafficConfig:
     return TrafficConfig(vehicles=number, walkers=number, seed=seed)
 
 
-def _driver(drives: RungDrives, strength: str, seed: int) -> RungDrives:
-    wander = DriverConfig(
-        wander=REAL_DRIVER.wander,
-        wander_length=REAL_DRIVER.wander_length,
-        seed=seed,
-    )
+def _driven(drive: Scenario, strength: str, seed: int) -> Scenario:
+    """Returns a drive by another driver."""
+    driver: dict[str, Any] = {
+        "wander": REAL_DRIVER.wander,
+        "wander_length": REAL_DRIVER.wander_length,
+        "seed": seed,
+    }
     update: dict[str, Any] = {}
-    if strength != "wander" and drives.database.waypoints is None:
-        update["lane_changes"] = REAL_DRIVER.lane_changes
-    changed = drives
+    if strength != "wander" and drive.waypoints is None:
+        driver["lane_changes"] = REAL_DRIVER.lane_changes
     if strength in ("all", "reversed"):
-        folder = map_folder(drives.database)
-        room = room_for_vehicles(load_ways(folder).graph)
+        room = room_for_vehicles(load_ways(map_folder(drive)).graph)
         number = min(_FOLLOWED, int(_FOLLOWED_ROOM * room))
-        changed = _mapped(drives, traffic=_vehicles(number, seed))
-        update["follows"] = True
-    changed = _mapped(changed, driver=wander.model_copy(update=update))
+        update["traffic"] = _vehicles(number, seed)
+        driver["follows"] = True
+    update["driver"] = DriverConfig(**driver)
+    changed = drive.model_copy(update=update)
     if strength == "reversed":
-        return _viewpoint(changed, VIEWPOINTS["reversed"], seed)
+        return _seen_from(changed, *VIEWPOINTS["reversed"])
     return changed
 
 
-def _query_change(
-    option: str,
-) -> Callable[[RungDrives, Any, int], RungDrives]:
-    def change(drives: RungDrives, value: Any, seed: int) -> RungDrives:
-        changes = {**drives.query_changes, option: value, "seed": seed}
-        return replace(drives, query_changes=changes)
-
-    return change
-
-
-def _weather(drives: RungDrives, visibility: float, seed: int) -> RungDrives:
-    weather = WeatherConfig(visibility=visibility)
-    query = drives.query.with_returns("calibrated", weather)
-    return _with_query(replace(drives, query=query), seed=seed)
-
-
-def _returns(drives: RungDrives, _: str, seed: int) -> RungDrives:
-    query = drives.query.with_returns("calibrated")
-    return _with_query(replace(drives, query=query), seed=seed)
-
-
-def _ride(drives: RungDrives, roughness: Any, seed: int) -> RungDrives:
-    return _mapped(drives, ride=RideConfig(roughness=roughness, seed=seed))
-
-
-def _sensor(drives: RungDrives, preset: str, _: int) -> RungDrives:
-    return replace(drives, query=drives.query.with_lidar_preset(preset))
-
-
-def _viewpoint(
-    drives: RungDrives, offset: tuple[float, float], _: int
-) -> RungDrives:
-    left, heading_deg = offset
-    plain_left = VIEWPOINTS[NEAR][0]
-    moved = mapped_from(drives.database, 0.0, left - plain_left, heading_deg)
-    return replace(drives, database=moved)
-
-
-def _lateral(drives: RungDrives, left: float, seed: int) -> RungDrives:
-    return replace(_viewpoint(drives, (left, 0.0), seed), lateral=left)
-
-
-def _size(drives: RungDrives, number: int, _: int) -> RungDrives:
-    return replace(drives, num_distractors=number)
-
-
-_CHANGES: Mapping[str, Callable[[RungDrives, Any, int], RungDrives]] = {
-    "sensor": _sensor,
-    "narrow_sensor": _sensor,
-    "returns": _returns,
-    "weather": _weather,
-    **{name: _transient(name) for name in _TRANSIENT},
-    "traffic": _traffic,
-    "construction": _construction,
-    "ride": _ride,
-    **{
-        cause: _query_change(option) for cause, option in _QUERY_CHANGES.items()
-    },
-    "driver": _driver,
-    "viewpoint": _viewpoint,
-    "lateral": _lateral,
-    "size": _size,
-}
-
-
-def _mapped(drives: RungDrives, **update: Any) -> RungDrives:
-    return replace(drives, database=drives.database.model_copy(update=update))
-
-
-def _with_query(drives: RungDrives, **update: Any) -> RungDrives:
-    return replace(drives, query=drives.query.model_copy(update=update))
+def _seen_from(drive: Scenario, left: float, heading_deg: float) -> Scenario:
+    """Returns a drive with its LiDARs moved from where plain drives have it."""
+    return mapped_from(drive, 0.0, left - VIEWPOINTS[NEAR][0], heading_deg)
 
 
 def mapped_from(
@@ -343,22 +301,14 @@ def mapped_from(
         ahead, left: how far they move [m].
         heading_deg: how far they turn to the left [deg].
     """
-    lidars = {
-        name: config.model_copy(
-            update={
-                "xyz": (
-                    config.xyz[0] + ahead,
-                    config.xyz[1] + left,
-                    config.xyz[2],
-                ),
-                "rpy_deg": (
-                    *config.rpy_deg[:2],
-                    config.rpy_deg[2] + heading_deg,
-                ),
-            }
-        )
-        for name, config in scenario.lidars.items()
-    }
+    lidars = {}
+    for name, config in scenario.lidars.items():
+        (x, y, z), (roll, pitch, yaw) = config.xyz, config.rpy_deg
+        update = {
+            "xyz": (x + ahead, y + left, z),
+            "rpy_deg": (roll, pitch, yaw + heading_deg),
+        }
+        lidars[name] = config.model_copy(update=update)
     return scenario.model_copy(update={"lidars": lidars})
 
 

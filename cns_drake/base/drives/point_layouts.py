@@ -193,29 +193,30 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
     """
     if layout == "cns":
         return points
-    if layout == "ouster":
-        made = _start(points, _OUSTER)
-        made["intensity"] = points["intensity"]
-        made["t"] = points["t"]
-        made["reflectivity"] = _to_byte(points["intensity"])
-        made["ring"] = points["ring"]
-        made["range"] = np.rint(_MM_PER_M * _distance(points))
-        return made
-    if layout == "velodyne":
-        made = _start(points, _VELODYNE)
-        made["intensity"] = points["intensity"]
-        made["ring"] = points["ring"]
-        made["time"] = points["t"] / _NS_PER_S
-        return made
-    made = _start(points, _AUTOWARE)
+    names = ("x", "y", "z", "intensity", "ring", "t")
+    columns: dict[str, Any] = {name: points[name] for name in names}
     x, y, z = (points[axis].astype(float) for axis in "xyz")
-    made["intensity"] = _to_byte(points["intensity"])
-    made["return_type"] = _SINGLE_STRONGEST
-    made["channel"] = points["ring"]
-    made["azimuth"] = np.arctan2(y, x) % (2.0 * np.pi)
-    made["elevation"] = np.arctan2(z, np.hypot(x, y))
-    made["distance"] = _distance(points)
-    made["time_stamp"] = points["t"]
+    distance = np.sqrt(x * x + y * y + z * z)
+    brightness = np.rint(255.0 * np.clip(points["intensity"], 0.0, 1.0))
+    if layout == "ouster":
+        dtype = _OUSTER
+        columns["reflectivity"] = brightness
+        columns["range"] = np.rint(_MM_PER_M * distance)
+    elif layout == "velodyne":
+        dtype = _VELODYNE
+        columns["time"] = columns.pop("t") / _NS_PER_S
+    else:
+        dtype = _AUTOWARE
+        columns["intensity"] = brightness
+        columns["return_type"] = _SINGLE_STRONGEST
+        columns["channel"] = columns.pop("ring")
+        columns["azimuth"] = np.arctan2(y, x) % (2.0 * np.pi)
+        columns["elevation"] = np.arctan2(z, np.hypot(x, y))
+        columns["distance"] = distance
+        columns["time_stamp"] = columns.pop("t")
+    made = np.zeros(len(points), dtype)
+    for name, column in columns.items():
+        made[name] = column
     return made
 
 
@@ -270,20 +271,3 @@ def from_layout(
     for name, column in columns.items():
         made[name] = column
     return made
-
-
-def _start(points: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    """Returns as many points with the same coordinates, else zeros."""
-    made = np.zeros(len(points), dtype)
-    for axis in "xyz":
-        made[axis] = points[axis]
-    return made
-
-
-def _to_byte(intensity: np.ndarray) -> np.ndarray:
-    return np.rint(255.0 * np.clip(intensity, 0.0, 1.0))
-
-
-def _distance(points: np.ndarray) -> np.ndarray:
-    x, y, z = (points[axis].astype(float) for axis in "xyz")
-    return np.sqrt(x * x + y * y + z * z)
