@@ -1,7 +1,7 @@
 """ROS 2 messages of moving objects: detections, boxes, velocities."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,38 +48,30 @@ _OTHER_RGB = (0.2, 0.6, 0.95)
 _OPACITY = 0.45
 
 
-class RecordedObjects(Protocol):
-    """The recorded values of N vehicles and walkers.
+class RecordedObjects(NamedTuple):
+    """The vehicles and walkers that are there at a time: N of them.
 
-    Ids in points and tables (N,), classes, middles (N, 3) [m] and
-    orientations (N, 4) of boxes in the map, their length, width, height
-    (N, 3) [m], velocities (N, 3) [m/s], yaw rates (N,) [rad/s], and whether
-    each is labelled as moving (N,).
+    Attributes:
+        instance: (N,) uint16 ids in points and tables.
+        names: N names of their structures.
+        semantic_classes: N keys of `CLASS_IDS`.
+        p_WO: (N, 3) middles of their boxes [m].
+        quat_xyzw: (N, 4) orientations of their boxes.
+        sizes: (N, 3) length, width, height of their boxes [m].
+        v_WO: (N, 3) velocities [m/s].
+        yaw_rate: (N,) [rad/s].
+        is_moving: (N,) whether each is labelled as moving.
     """
 
-    @property
-    def instance(self) -> np.ndarray: ...
-
-    @property
-    def semantic_classes(self) -> tuple[str, ...]: ...
-
-    @property
-    def p_WO(self) -> np.ndarray: ...
-
-    @property
-    def quat_xyzw(self) -> np.ndarray: ...
-
-    @property
-    def sizes(self) -> np.ndarray: ...
-
-    @property
-    def v_WO(self) -> np.ndarray: ...
-
-    @property
-    def yaw_rate(self) -> np.ndarray: ...
-
-    @property
-    def is_moving(self) -> np.ndarray: ...
+    instance: np.ndarray
+    names: tuple[str, ...]
+    semantic_classes: tuple[str, ...]
+    p_WO: np.ndarray
+    quat_xyzw: np.ndarray
+    sizes: np.ndarray
+    v_WO: np.ndarray
+    yaw_rate: np.ndarray
+    is_moving: np.ndarray
 
 
 class MessageTemplate:

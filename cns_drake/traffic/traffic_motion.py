@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base.elementary import cos, product, sin
 from cns_drake.ray_casting.moving_groups import KnownPoses
+from cns_drake.recording.object_messages import RecordedObjects
 from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
@@ -120,32 +121,6 @@ class LimbTable:
         return X_WLs
 
 
-class TrafficObjects(NamedTuple):
-    """The vehicles and walkers that are there at a time: N of them.
-
-    Attributes:
-        instance: (N,) uint16 ids in points and tables.
-        names: N names of their structures.
-        semantic_classes: N keys of `CLASS_IDS`.
-        p_WO: (N, 3) middles of their boxes [m].
-        quat_xyzw: (N, 4) orientations of their boxes.
-        sizes: (N, 3) length, width, height of their boxes [m].
-        v_WO: (N, 3) velocities [m/s].
-        yaw_rate: (N,) [rad/s].
-        is_moving: (N,) whether each is faster than `MOVING_SPEED`.
-    """
-
-    instance: np.ndarray
-    names: tuple[str, ...]
-    semantic_classes: tuple[str, ...]
-    p_WO: np.ndarray
-    quat_xyzw: np.ndarray
-    sizes: np.ndarray
-    v_WO: np.ndarray
-    yaw_rate: np.ndarray
-    is_moving: np.ndarray
-
-
 class TrafficBody(NamedTuple):
     """A vehicle or a walker.
 
@@ -183,7 +158,7 @@ class TrafficMotion(LeafSystem):
     over all limbs of V_WL, expressed in the world: they take a limb to its
     place a turn later, for a LiDAR that keeps turning meanwhile.
     `moving_instances` is abstract, the (N,) instance ids of bodies faster than
-    `MOVING_SPEED`; `objects` the `TrafficObjects`. All depend only on time.
+    `MOVING_SPEED`; `objects` the `RecordedObjects`. All depend only on time.
     """
 
     def __init__(
@@ -281,7 +256,7 @@ class TrafficMotion(LeafSystem):
         bodies = [self._bodies[k] for k in here]
         p_WO = states.p_WB + states.up_W * self._sizes[:, 2:] / 2
         output.set_value(
-            TrafficObjects(
+            RecordedObjects(
                 self._instances[here],
                 tuple(body.name for body in bodies),
                 tuple(body.semantic_class for body in bodies),

@@ -249,25 +249,16 @@ class McapDrive(Drive):
 
         def take(position: int, data: memoryview) -> None:
             if position < num_scans:
-                with self._faults(self._lidar_topic):
-                    header = mcap_messages.read_cloud_header(data)
-                stamps_ns[position] = header.stamp_ns
-                topic, frame, first = (
-                    self._lidar_topic,
-                    header.frame_id,
-                    lidar_frame,
-                )
-                stamp_ns = header.stamp_ns
+                topic, first = self._lidar_topic, lidar_frame
+                with self._faults(topic):
+                    stamp_ns, frame = mcap_messages.read_cloud_header(data)
+                stamps_ns[position] = stamp_ns
             else:
                 message = self._decode(_ODOMETRY_TOPIC, data)
                 row = mcap_messages.odometry_row(message)
                 odometry[position - num_scans] = row
-                topic, frame, first = (
-                    _ODOMETRY_TOPIC,
-                    _vehicle_frames(message),
-                    vehicle_frames,
-                )
-                stamp_ns = row[0]
+                topic, first = _ODOMETRY_TOPIC, vehicle_frames
+                stamp_ns, frame = row[0], _vehicle_frames(message)
             self._check_frame(topic, stamp_ns, frame, first)
 
         self._file.visit(np.concatenate([self._scans, places]), take)

@@ -1,7 +1,6 @@
 """Decodes messages of a recording, and refuses oversized or contrary ones."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 import struct
 from typing import Any
 
@@ -26,19 +25,6 @@ _LONGEST_NAME = 1 << 10
 _ENCAPSULATION_BYTES = 4
 
 
-@dataclass(frozen=True)
-class CloudHeader:
-    """The header of a point cloud.
-
-    Attributes:
-        stamp_ns: when it was taken [ns].
-        frame_id: the frame of its points.
-    """
-
-    stamp_ns: int
-    frame_id: str
-
-
 def decode(data: bytes | memoryview, message_type: str) -> Any:
     """Returns the message of serialised bytes.
 
@@ -60,8 +46,8 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
         ) from error
 
 
-def read_cloud_header(data: bytes | memoryview) -> CloudHeader:
-    """Reads the header of a serialised PointCloud2 and nothing else.
+def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
+    """Reads stamp [ns] and frame of a PointCloud2, and nothing else.
 
     Raises:
         ValueError: if it is cut off, or claims more than makes sense.
@@ -81,7 +67,7 @@ def read_cloud_header(data: bytes | memoryview) -> CloudHeader:
     if num_fields > _MOST_FIELDS:
         raise ValueError(f"a point cloud of {num_fields} fields")
     frame_id = text.rstrip(b"\0").decode("utf-8", "backslashreplace")
-    return CloudHeader(sec * 1_000_000_000 + nanosec, frame_id)
+    return sec * 1_000_000_000 + nanosec, frame_id
 
 
 def stamp_ns(header: Any) -> int:

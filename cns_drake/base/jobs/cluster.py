@@ -12,7 +12,7 @@ import logging
 import multiprocessing
 import os
 import threading
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 import uuid
 
 from cns_drake.base.errors import InputError
@@ -35,21 +35,6 @@ Listener = Callable[..., None]
 _ANSWER_TIMEOUT = 10.0
 # Dask's name for the key of all jobs.
 _KIND = "job"
-
-
-class Workers(Protocol):
-    """Runs jobs side by side, and reports them to a `Listener`."""
-
-    def submit(self, name: str, job: bytes, priority: float) -> None:
-        """Lets a job run, when there is room.
-
-        Args:
-            priority: among jobs that wait, the one with the highest comes
-                first.
-        """
-
-    def stop(self) -> None:
-        """Ends all jobs; the message "ended" means a job's files are closed."""
 
 
 @dataclass(frozen=True)
@@ -124,10 +109,17 @@ class LocalWorkers:
         self._stopped = threading.Event()
 
     def submit(self, name: str, job: bytes, priority: float) -> None:
-        del priority  # There is a thread for each job that is submitted.
+        """Lets a job run, when there is room.
+
+        Args:
+            priority: among jobs that wait, the one with the highest comes
+                first; here there is a thread for each.
+        """
+        del priority
         self._threads.submit(self._run, name, job)
 
     def stop(self) -> None:
+        """Ends all jobs; the message "ended" means a job's files are closed."""
         self._stopped.set()
 
     def _run(self, name: str, job: bytes) -> None:
@@ -159,7 +151,7 @@ def local_workers(
 
 
 class DaskWorkers:
-    """Has jobs run by the workers of a scheduler; see `Workers`."""
+    """Has jobs run by the workers of a scheduler; see `LocalWorkers`."""
 
     def __init__(self, client: Client, listener: Listener):
         self._client = client
@@ -220,6 +212,9 @@ class DaskWorkers:
         if isinstance(error, KilledWorker):
             return InputError("every worker that ran it died")
         return error
+
+
+Workers = LocalWorkers | DaskWorkers
 
 
 class LostSchedulerError(InputError):
