@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.elementary import cos, product, rotated, sin
@@ -298,16 +297,6 @@ class Trajectory:
             return R_WF, jet.p
         ride = ride_motion(self._ride.at(t))
         return product(R_WF, ride.R), jet.p + rotated(R_WF, ride.p)
-
-    def spatial_velocity(self, t: float) -> SpatialVelocity:
-        """Returns V_WB, expressed in the world [rad/s, m/s]."""
-        motion = self.body_motion(t)
-        return SpatialVelocity(motion.w[0], motion.v[0])
-
-    def spatial_acceleration(self, t: float) -> SpatialAcceleration:
-        """Returns A_WB, expressed in the world [rad/s^2, m/s^2]."""
-        motion = self.body_motion(t)
-        return SpatialAcceleration(motion.alpha[0], motion.a[0])
 
 
 def pose_at(moments: Moments, row: int = 0) -> RigidTransform:

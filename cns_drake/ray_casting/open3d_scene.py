@@ -1,6 +1,6 @@
 """Groups of geometry as Open3D scenes, for platforms without Embree's wheel.
 
-About a third as fast as `embree_scene`, and curved shapes are polyhedra:
+About a third as fast as `embree_hierarchy`, and curved shapes are polyhedra:
 Open3D has triangles only.
 """
 

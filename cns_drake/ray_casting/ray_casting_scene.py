@@ -35,7 +35,7 @@ from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 
 if TYPE_CHECKING:
-    from cns_drake.ray_casting.embree_scene import EmbreeScene
+    from cns_drake.ray_casting.embree_hierarchy import EmbreeScene
     from cns_drake.ray_casting.open3d_scene import Open3dScene
 
 # The package whose wheel holds Embree's C library.
@@ -364,7 +364,7 @@ def _make_scene(
     previous: EmbreeScene | Open3dScene | None,
 ) -> EmbreeScene | Open3dScene:
     if _has_embree():
-        from cns_drake.ray_casting.embree_scene import EmbreeScene
+        from cns_drake.ray_casting.embree_hierarchy import EmbreeScene
 
         assert previous is None or isinstance(previous, EmbreeScene)
         return EmbreeScene(groups, num_threads, previous)

@@ -96,6 +96,11 @@ class Lidar(LeafSystem):
     scan, which in a world of thousands of geometries takes longer than the
     scan.
 
+    Attributes:
+        parent_frame_id: the frame P that carries the LiDAR.
+        X_PS: the pose of the LiDAR in P.
+        pattern: the beams of a turn.
+
     Example:
         from cns_drake import Lidar, make_beam_pattern
 
@@ -148,9 +153,9 @@ class Lidar(LeafSystem):
                 "Role.kPerception, Role.kIllustration or Role.kProximity of "
                 "pydrake.geometry"
             )
-        self._parent_frame_id = parent_frame_id
-        self._X_PS = X_PS
-        self._pattern = pattern
+        self.parent_frame_id = parent_frame_id
+        self.X_PS = X_PS
+        self.pattern = pattern
         self._measurement = measurement
         self._returns = returns
         sight = Sight(
@@ -221,21 +226,6 @@ class Lidar(LeafSystem):
             prerequisites_of_calc=inputs,
         )
 
-    @property
-    def pattern(self) -> BeamPattern:
-        """The beams of a turn."""
-        return self._pattern
-
-    @property
-    def parent_frame_id(self) -> FrameId:
-        """The frame P that carries the LiDAR."""
-        return self._parent_frame_id
-
-    @property
-    def X_PS(self) -> RigidTransform:
-        """The pose of the LiDAR in the frame that carries it."""
-        return self._X_PS
-
     def EvalScene(self, context: Context) -> RayCastingScene:
         """Returns what the LiDAR sees in a Context, to cast other rays on."""
         scene = self._eval_seen(context).scene
@@ -267,7 +257,7 @@ class Lidar(LeafSystem):
     def _calc_ball(self, context: Context) -> Ball:
         """Returns the ball in which beams can meet geometry."""
         model = self._returns or self._measurement
-        reach = model.reach(self._pattern.max_range)
+        reach = model.reach(self.pattern.max_range)
         p_WSset, _ = self._calc_poses(context)
         middle, way = p_WSset[0], 0.0
         if len(p_WSset) > 1:
@@ -281,7 +271,7 @@ class Lidar(LeafSystem):
         if self._velocities is None:
             return {}
         V_WBs = self._velocities.Eval(context)
-        duration = self._pattern.period
+        duration = self.pattern.period
         motions = {
             frame_id: Motion(
                 V_WBs[body].rotational(),
@@ -339,7 +329,7 @@ class Lidar(LeafSystem):
             reported = self._returns.measure(
                 seen.scene,
                 seen.materials(is_wet=self._returns.is_wet),
-                self._pattern,
+                self.pattern,
                 turn.calibrated(self._returns),
                 p_WSset,
                 R_WSset,
@@ -350,14 +340,14 @@ class Lidar(LeafSystem):
         hits = seen.scene.cast_rays(
             p_WSset,
             turn.d_Sset_cast,
-            self._measurement.reach(self._pattern.max_range),
+            self._measurement.reach(self.pattern.max_range),
             R_WSset=R_WSset,
             times=times,
         )
         returns = self._measurement.measure(
             hits.ranges.take(turn.table.place),
-            self._pattern.min_range,
-            self._pattern.max_range,
+            self.pattern.min_range,
+            self.pattern.max_range,
             frame,
         )
         places = turn.table.place.take(returns.beams)
@@ -365,27 +355,27 @@ class Lidar(LeafSystem):
 
     def _turn_at(self, time: float) -> tuple[int, _Turn]:
         """Returns number and beams of the turn that starts at a time [s]."""
-        frame = round(time / self._pattern.period)
-        if self._pattern.repeats:
+        frame = round(time / self.pattern.period)
+        if self.pattern.repeats:
             return frame, self._first
         # Two threads may ask for different turns.
         turn = self._latest
         if turn.frame != frame:
-            turn = self._latest = _Turn(frame, self._pattern.beams(frame))
+            turn = self._latest = _Turn(frame, self.pattern.beams(frame))
         return frame, turn
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
         """Returns positions and orientations of S: one, or each column's."""
         sweep = _value(self._sweep, context)
         if sweep is not None:
-            sweep = sweep.of_frame(self._X_PS)
+            sweep = sweep.of_frame(self.X_PS)
             return sweep.p_WPset, sweep.R_WPset
         query_object = self._geometry_query.Eval(context)
         X_WP = self._known_poses(context).find(
-            self._parent_frame_id, query_object.GetPoseInWorld
+            self.parent_frame_id, query_object.GetPoseInWorld
         )
-        X_WS = X_WP @ self._X_PS
-        motion = self._calc_motions(context).get(self._parent_frame_id)
+        X_WS = X_WP @ self.X_PS
+        motion = self._calc_motions(context).get(self.parent_frame_id)
         if motion is not None:
             R_WW0, way_P = motion.at(self._times)
             p_PS_W = X_WS.translation() - X_WP.translation()

@@ -7,6 +7,8 @@ from helpers.drives import (
     helix_points,
     lane_path,
     smoothed_radius,
+    spatial_acceleration,
+    spatial_velocity,
     wavy_points,
 )
 import numpy as np
@@ -86,10 +88,10 @@ def test_a_steady_bend_is_a_circle(radius, slope):
         atol=1e-8,
     )
     # Aliases of the circle (see `smoothed_radius`) grow with each derivative.
-    V_WB = trajectory.spatial_velocity(t)
+    V_WB = spatial_velocity(trajectory, t)
     np.testing.assert_allclose(V_WB.rotational(), w * rate * up, atol=1e-6)
     np.testing.assert_allclose(V_WB.translational(), speed * forward, atol=1e-7)
-    A_WB = trajectory.spatial_acceleration(t)
+    A_WB = spatial_acceleration(trajectory, t)
     np.testing.assert_allclose(A_WB.rotational(), np.zeros(3), atol=1e-5)
     np.testing.assert_allclose(
         A_WB.translational(), -lateral * outward, atol=1e-6

@@ -1,6 +1,11 @@
 """The twelve drives: legal, smooth, in their lanes, and where they meet."""
 
-from helpers.drives import SPACING, shipped_drive
+from helpers.drives import (
+    SPACING,
+    shipped_drive,
+    spatial_acceleration,
+    spatial_velocity,
+)
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -51,8 +56,8 @@ def test_it_starts_and_ends_at_rest(drives, name):
             trajectory.pose(t).translation(), path.points[point], atol=1e-9
         )
         for twist in (
-            trajectory.spatial_velocity(t),
-            trajectory.spatial_acceleration(t),
+            spatial_velocity(trajectory, t),
+            spatial_acceleration(trajectory, t),
         ):
             np.testing.assert_allclose(
                 twist.get_coeffs(), np.zeros(6), atol=1e-9

@@ -1,5 +1,6 @@
 """Noise, losses and motion distortion of LiDARs on a driving vehicle."""
 
+from helpers.drives import spatial_velocity
 from helpers.small_map import scenario_values
 import numpy as np
 from pydrake.math import RigidTransform
@@ -86,7 +87,7 @@ def bend(small_map):
 
 def test_the_vehicle_is_turning(bend):
     _, trajectory, _ = bend
-    V_WB = trajectory.spatial_velocity(BEND_FRAME * FRAME_PERIOD)
+    V_WB = spatial_velocity(trajectory, BEND_FRAME * FRAME_PERIOD)
     assert np.linalg.norm(V_WB.translational()) > 4.0
     assert abs(V_WB.rotational()[2]) > 0.2
 
