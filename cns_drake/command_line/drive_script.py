@@ -97,7 +97,7 @@ def run_drive(
         change = {"imu": {"rate": imu_rate}}
         scenario = scenario.with_fields(change, "--imu-rate")
     if frames is not None:
-        scenario = scenario.model_copy(update={"frames": frames})
+        scenario = scenario.replaced(frames=frames)
     with show_progress() as progress:
         task = progress.add_task(scenario.name, total=None, note="loading")
         on_frame = count_progress(progress, task)

@@ -273,7 +273,7 @@ def scan(
     for text in loaded.notes:
         note(text)
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
-    config = config.model_copy(update={"returns": chosen or "ideal"})
+    config = config.replaced(returns=chosen or "ideal")
     model = make_returns(config, weather or WeatherConfig(), "lidar", seed)
     points = scan_world(loaded, X_WS, pattern, model)
     save_scan(points, output)
@@ -315,7 +315,7 @@ def generate(
     if vary is not None:
         scenarios += family_members(vary, output, cluster)
     if frames is not None:
-        scenarios = [s.model_copy(update={"frames": frames}) for s in scenarios]
+        scenarios = [s.replaced(frames=frames) for s in scenarios]
     record_all(scenarios, output, cluster, overwrite=overwrite)
     for scenario in scenarios:
         typer.echo(output / scenario.name)

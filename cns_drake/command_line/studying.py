@@ -535,5 +535,5 @@ def family_controls(
         if kind not in kinds:
             kinds.append(kind)
         name = f"{query_drive.name}_unchanged_{kinds.index(kind) + 1}"
-        controls[member.name] = drive.model_copy(update={"name": name})
+        controls[member.name] = drive.replaced(name=name)
     return controls

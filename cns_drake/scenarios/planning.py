@@ -182,11 +182,11 @@ def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
     drive without some structures it is the same stage with them.
     """
     if scenario.without:
-        whole = scenario.model_copy(update={"without": ()})
+        whole = scenario.replaced(without=())
         return whole, "the whole city"
     stages = list(map_folder(scenario).stages())
     others = [stage for stage in stages if stage != scenario.stage]
     if scenario.stage is None or not others:
         return None, ""
     stage = others[-1] if stages[-1] in others else others[0]
-    return scenario.model_copy(update={"stage": stage}), f"stage {stage}"
+    return scenario.replaced(stage=stage), f"stage {stage}"

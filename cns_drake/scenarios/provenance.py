@@ -109,14 +109,14 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     }
     if scenario.imu.kalibr is not None:
         update = {"kalibr": KALIBR_FILE}
-        places["imu"] = scenario.imu.model_copy(update=update)
+        places["imu"] = scenario.imu.replaced(**update)
     if scenario.traffic.fcd is not None:
         update = {"fcd": Path(scenario.traffic.fcd).name}
-        places["traffic"] = scenario.traffic.model_copy(update=update)
+        places["traffic"] = scenario.traffic.replaced(**update)
     return fingerprint(
         {
             # LiDARs become text, since their order matters.
-            "scenario": scenario.model_copy(update=places).model_dump_json(),
+            "scenario": scenario.replaced(**places).model_dump_json(),
             "inputs": inputs,
             "code": recording_code(),
         }

@@ -422,13 +422,8 @@ class Scenario(Section):
         else:
             ideal_fields = ("range_noise", "dropout", "faint_dropout")
             update = {"returns": returns, **dict.fromkeys(ideal_fields, 0.0)}
-        lidars = {
-            name: config.model_copy(update=update)
-            for name, config in self.lidars.items()
-        }
-        return self.model_copy(
-            update={"lidars": lidars, "weather": weather or self.weather}
-        )
+        lidars = {n: one.replaced(**update) for n, one in self.lidars.items()}
+        return self.replaced(lidars=lidars, weather=weather or self.weather)
 
     def with_fields(
         self, changes: Mapping[str, Any], source: object
@@ -459,10 +454,10 @@ class Scenario(Section):
         Args:
             number: number of vehicles, and of walkers.
         """
-        traffic = TrafficConfig(
-            vehicles=number, walkers=number, seed=self.traffic.seed
+        seed = self.traffic.seed
+        return self.replaced(
+            traffic=TrafficConfig(vehicles=number, walkers=number, seed=seed)
         )
-        return self.model_copy(update={"traffic": traffic})
 
     def with_transient(self, **changes: float | str) -> Scenario:
         """Returns the scenario with some switches of `transient` set.
@@ -484,8 +479,8 @@ class Scenario(Section):
             update["lane_changes"] = 0.0
         chosen = DriverConfig()
         if driver == "real":
-            chosen = REAL_DRIVER.model_copy(update=update)
-        return self.model_copy(update={"driver": chosen})
+            chosen = REAL_DRIVER.replaced(**update)
+        return self.replaced(driver=chosen)
 
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with the unit of every LiDAR replaced.
@@ -495,11 +490,10 @@ class Scenario(Section):
         Raises:
             InputError: there is no such preset.
         """
-        lidars = {
-            name: config.with_preset(preset)
-            for name, config in self.lidars.items()
-        }
-        return self.model_copy(update={"lidars": lidars})
+        units = self.lidars.items()
+        return self.replaced(
+            lidars={name: one.with_preset(preset) for name, one in units}
+        )
 
 
 def _merge(

@@ -182,9 +182,7 @@ def vary(
             "with a map"
         )
     sections = {"ride": family.ride, "imu": family.imu}
-    base = base.model_copy(
-        update={name: value for name, value in sections.items() if value}
-    )
+    base = base.replaced(**{n: one for n, one in sections.items() if one})
     check_files(base, source)
     last = max(map_folder(base).stages())
     stage = family.stage or last
@@ -209,7 +207,7 @@ def vary(
             raise ValueError("a family with city_seeds needs `redraw`")
         folders = redraw(map_folder(base).path, stage, family.city_seeds)
         cities = {
-            seed: base.model_copy(update={"map": str(folder)})
+            seed: base.replaced(map=str(folder))
             for seed, folder in folders.items()
         }
     drawn = {}
@@ -235,16 +233,15 @@ def vary(
             title += f", in the city as seed {city_seed} draws it"
         order, losses = drawn[city_seed, seed]
         missing = losses.union(order[: round(part * len(order))])
-        update: dict[str, object] = {
-            "name": "_".join(labels).replace("-", "_"),
-            "stage": stage,
-            "without": tuple(sorted(missing)),
-            "title": title,
-            "lidars": lidars,
-        }
+        member = city.replaced(
+            name="_".join(labels).replace("-", "_"),
+            stage=stage,
+            without=tuple(sorted(missing)),
+            title=title,
+            lidars=lidars,
+        )
         if route is not None:
-            update |= {"route": route, "waypoints": None}
-        member = city.model_copy(update=update)
+            member = member.replaced(route=route, waypoints=None)
         check_files(member, source)
         members.append(member)
     return members
@@ -319,7 +316,7 @@ def _difference(
     """Returns the structures of a stage that another one lacks."""
     names = []
     for one in (stage, other):
-        scenario = base.model_copy(update={"stage": one})
+        scenario = base.replaced(stage=one)
         check_files(scenario, source)
         names.append(structures_in(load_world(world_file(scenario))))
     difference = names[0] - names[1]

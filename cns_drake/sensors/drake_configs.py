@@ -235,7 +235,7 @@ def ApplyImuConfig(
     section = _section(config, ImuSection)
     plant = plant or builder.GetSubsystemByName("plant")
     rate = section.sample_rate(_RATE)
-    ideal = section.model_copy(update={"rate": None}).is_ideal
+    ideal = section.replaced(rate=None).is_ideal
     imu = add_imu(
         builder,
         *_place(config, plant),

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.tree import RigidBody
     from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+    from typing_extensions import Self
 
     from cns_drake.recording.rosbag2_metadata import Topic
 
@@ -32,6 +33,10 @@ class Section(BaseModel):
     """A section of a scenario file: known fields, finite values, immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def replaced(self, **fields: Any) -> Self:
+        """Returns a copy with other values of some fields, unchecked."""
+        return self.model_copy(update=fields)
 
 
 def field_off_by_default(default: Any, **constraints: Any) -> Any:

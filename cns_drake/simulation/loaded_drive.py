@@ -99,7 +99,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
         count_frames(scenario, trajectory)  # An error comes at once.
     world, traffic, trajectory = load_stage_and_traffic(scenario, trajectory)
     num_frames = count_frames(scenario, trajectory)
-    scenario = scenario.model_copy(update={"frames": num_frames})
+    scenario = scenario.replaced(frames=num_frames)
     changed = watch.changed()
     if changed is not None:
         raise InputError(f"{changed}: changed while it was being read")
@@ -108,7 +108,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
         trajectory.duration, scenario.frame_period
     )
     lines = [
-        recording_fingerprint(scenario.model_copy(update=update), inputs)
+        recording_fingerprint(scenario.replaced(**update), inputs)
         for update in ({}, {"frames": None})[: 1 + whole]
     ]
     return LoadedDrive(

@@ -7,7 +7,7 @@ cause of change between the two at a time. Nothing is recorded.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 import itertools
 import math
 from pathlib import Path
@@ -118,14 +118,12 @@ def climb_ladder(
         most = max(rung.drives.num_distractors for rung in rungs)
         if most:
             on_note(f"{drive.name}: looking for {most} places elsewhere")
-        plan.add_distractors(
-            distracting_drives(
-                plain_drives(drive).database,
-                most,
-                protocol.place_spacing,
-                output / "cities",
-                cluster,
-            )
+        plan.distractors = distracting_drives(
+            plain_drives(drive).database,
+            most,
+            protocol.place_spacing,
+            output / "cities",
+            cluster,
         )
         plans[drive.name] = plan
         planned += [(drive, rung) for rung in rungs]
@@ -220,33 +218,30 @@ def query_drives(maps: Iterable[str]) -> list[Scenario]:
     return list(drives.values())
 
 
+@dataclass
 class RungPlan:
-    """The jobs of one map."""
+    """The jobs of one map.
 
-    def __init__(
-        self,
-        query_scenario: Scenario,
-        viewpoint: str,
-        methods: tuple[MethodChoice, ...],
-        protocol: RetrievalProtocol,
-        files: StudyFiles,
-    ):
-        self.jobs: dict[str, Job] = {}
-        self._query = query_scenario
-        self._plain = plain_drives(query_scenario, viewpoint)
-        self._viewpoint = viewpoint
-        self._methods = methods
-        self._protocol = protocol
-        self._files = files
-        self._distractors: list[Scenario] = []
+    Attributes:
+        jobs: by name.
+        distractors: drives with places of other cities.
+    """
 
-    def add_distractors(self, drives: Sequence[Scenario]) -> None:
-        self._distractors = list(drives)
+    _query: Scenario
+    _viewpoint: str
+    _methods: tuple[MethodChoice, ...]
+    _protocol: RetrievalProtocol
+    _files: StudyFiles
+    jobs: dict[str, Job] = field(default_factory=dict)
+    distractors: Sequence[Scenario] = ()
+
+    def __post_init__(self) -> None:
+        self._plain = plain_drives(self._query, self._viewpoint)
 
     def add_rung(self, rung: Rung) -> Part:
         """Adds the jobs of a rung; returns the part that they write."""
         needs: list[str] = []
-        others = self._distractors if rung.drives.num_distractors else ()
+        others = self.distractors if rung.drives.num_distractors else ()
         name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
         if self._viewpoint != NEAR:
             name += f" {self._viewpoint}"
@@ -373,7 +368,7 @@ def distracting_drives(
     for drive in _drives(query, output, cluster):
         if number <= 0:
             break
-        drive = drive.model_copy(update={"lidars": query.lidars})
+        drive = drive.replaced(lidars=query.lidars)
         drives.append(drive)
         number -= _num_places(drive, spacing)
     return drives
@@ -422,10 +417,5 @@ def _drives(
 def _elsewhere(
     scenario: Scenario, place: str | None, stage: str, ending: str
 ) -> Scenario:
-    return scenario.model_copy(
-        update={
-            "name": f"{scenario.name}_in_{ending}",
-            "map": place,
-            "stage": stage,
-        }
-    )
+    name = f"{scenario.name}_in_{ending}"
+    return scenario.replaced(name=name, map=place, stage=stage)

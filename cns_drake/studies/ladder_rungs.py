@@ -197,7 +197,7 @@ def plain_drives(scenario: Scenario, viewpoint: str = NEAR) -> RungDrives:
     name = f"{scenario.name}_database"
     if viewpoint != NEAR:
         name += f"_{viewpoint}"
-    database = scenario.model_copy(update={"name": name})
+    database = scenario.replaced(name=name)
     left, heading_deg = VIEWPOINTS[viewpoint]
     moved = mapped_from(database, _AHEAD, left, heading_deg)
     return RungDrives(moved, scenario)
@@ -233,19 +233,19 @@ def _changed(
         if cause == "weather":
             weather = WeatherConfig(visibility=strength)
         query = query.with_returns("calibrated", weather)
-        query = query.model_copy(update={"seed": seed})
+        query = query.replaced(seed=seed)
     elif cause in _TRANSIENT:
         query = query.with_transient(**{cause: strength, "seed": seed})
     elif cause == "traffic":
         traffic = TrafficConfig(queues=True, seed=seed)
         if strength != QUEUES:
             traffic = _vehicles(int(strength), seed)
-        query = query.model_copy(update={"traffic": traffic})
+        query = query.replaced(traffic=traffic)
     elif cause == "construction":
-        database = database.model_copy(update={"stage": strength})
+        database = database.replaced(stage=strength)
     elif cause == "ride":
         ride = RideConfig(roughness=strength, seed=seed)
-        database = database.model_copy(update={"ride": ride})
+        database = database.replaced(ride=ride)
     elif cause == "driver":
         database = _driven(database, strength, seed)
     elif cause == "viewpoint":
@@ -281,7 +281,7 @@ def _driven(drive: Scenario, strength: str, seed: int) -> Scenario:
         update["traffic"] = _vehicles(number, seed)
         driver["follows"] = True
     update["driver"] = DriverConfig(**driver)
-    changed = drive.model_copy(update=update)
+    changed = drive.replaced(**update)
     if strength == "reversed":
         return _seen_from(changed, *VIEWPOINTS["reversed"])
     return changed
@@ -308,8 +308,8 @@ def mapped_from(
             "xyz": (x + ahead, y + left, z),
             "rpy_deg": (roll, pitch, yaw + heading_deg),
         }
-        lidars[name] = config.model_copy(update=update)
-    return scenario.model_copy(update={"lidars": lidars})
+        lidars[name] = config.replaced(**update)
+    return scenario.replaced(lidars=lidars)
 
 
 @dataclass(frozen=True)
@@ -443,7 +443,7 @@ def _rung(
         drive = getattr(drives, role)
         if drive != getattr(plain, role):
             name = f"{drive.name}_{ending}"
-            renamed = drive.model_copy(update={"name": name})
+            renamed = drive.replaced(name=name)
             drives = replace(drives, **{role: renamed})
     return Rung(cause, level, seed, text, drives)
 

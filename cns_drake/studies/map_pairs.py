@@ -139,7 +139,7 @@ def make_pair(
     # An imported city has another way at each stage.
     others = sorted(city.glob("other_*.yaml")) or drives
     surveys = [
-        simulate_survey(load_scenario(file).model_copy(update={"stage": stage}))
+        simulate_survey(load_scenario(file).replaced(stage=stage))
         for file, stage in ((drives[0], stages[0]), (others[-1], stages[-1]))
     ]
     write_truth(surveys[0], surveys[1], maps, spacing, track)

@@ -79,19 +79,12 @@ def reproduce_maps(
             [*drives, *controls], output, pages=pages if with_pages else {}
         )
     waiting = {job.name for job in jobs}
-    recordings = [
-        recording_info(scenario, output, is_waiting=scenario.name in waiting)
-        for scenario in (*drives, *controls)
-    ]
-    if quick:
-        recordings = [
-            recording
-            if is_recorded(scenario, output)
-            else replace(recording, made_by=DriveSimulation(scenario))
-            for scenario, recording in zip(
-                (*drives, *controls), recordings, strict=True
-            )
-        ]
+    recordings = []
+    for scenario in (*drives, *controls):
+        info = recording_info(scenario, output, scenario.name in waiting)
+        if quick and not is_recorded(scenario, output):
+            info = replace(info, made_by=DriveSimulation(scenario))
+        recordings.append(info)
     # The order is that of `cns-eval report`.
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
@@ -197,13 +190,10 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     """
     last = max(drives, key=lambda drive: drive.stage or "")
     return [
-        drive.model_copy(
-            update={
-                "name": f"{drive.name}_stage_{last.stage}",
-                "stage": last.stage,
-                "title": f"Control: the route of {drive.name} "
-                f"in stage {last.stage}",
-            }
+        drive.replaced(
+            name=f"{drive.name}_stage_{last.stage}",
+            stage=last.stage,
+            title=f"Control: the route of {drive.name} in stage {last.stage}",
         )
         for drive in drives
         if drive is not last

@@ -92,23 +92,19 @@ class DrawnCity:
         source = MapFolder(shipped_maps()[self.map_name])
         base = load_scenario(source.recordable_drives()[0])
         network = load_road_network(MapFolder(folder).roads)
-        base = base.model_copy(
-            update={
-                "map": str(folder),
-                "stage": _STAGES[-1],
-                "route": draw_route(network, _LENGTH, rng),
-                "waypoints": None,
-                "aside": 0.0,
-            }
+        base = base.replaced(
+            map=str(folder),
+            stage=_STAGES[-1],
+            route=draw_route(network, _LENGTH, rng),
+            waypoints=None,
+            aside=0.0,
         )
         return [self._drive(base, number) for number in range(self.num_drives)]
 
     def _drive(self, base: Scenario, number: int) -> Scenario:
         # Without one kind of change all others stay the same draws.
         rng = self._rng(2 + number)
-        drive = base.model_copy(
-            update={"name": f"{self.map_name}_{self.number}_{number}"}
-        )
+        drive = base.replaced(name=f"{self.map_name}_{self.number}_{number}")
         aside = float(rng.uniform(-1.0, 1.0))
         if rng.random() < 0.35:
             aside = float(rng.uniform(-2.0, 6.0))

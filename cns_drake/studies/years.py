@@ -235,21 +235,14 @@ def measure_years(
             for k, year in enumerate(wanted):
                 aged = {"map": str(folder), "stage": f"{k + 2:02d}"}
                 ending = f"y{year}_s{seed}"
-                then = drive.model_copy(
-                    update={**aged, "name": f"{drive.name}_{ending}"}
+                then, before = (
+                    one.replaced(**aged, name=f"{one.name}_{ending}")
+                    for one in (drive, plain.database)
                 )
                 mapped = _map_job(then, files, jobs)
                 pairs = {
                     FORWARD: replace(plain, query=then),
-                    BACKWARD: replace(
-                        plain,
-                        database=plain.database.model_copy(
-                            update={
-                                **aged,
-                                "name": f"{plain.database.name}_{ending}",
-                            }
-                        ),
-                    ),
+                    BACKWARD: replace(plain, database=before),
                 }
                 for direction in directions:
                     rung = Rung(direction, year, seed, "", pairs[direction])

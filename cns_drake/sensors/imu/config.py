@@ -113,7 +113,7 @@ class ImuSection(Mount):
             return None
         rate = float(self.sample_rate(scan_rate))
         update = {"rostopic": "/imu/data", "update_rate": rate}
-        return kalibr.model_copy(update=update).model_dump()
+        return kalibr.replaced(**update).model_dump()
 
     def _read_kalibr(self) -> KalibrImu | None:
         return None if self.kalibr is None else read_kalibr(Path(self.kalibr))

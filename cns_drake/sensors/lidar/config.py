@@ -151,10 +151,8 @@ class LidarSection(Mount):
             InputError: there is no such preset.
         """
         unit = make_lidar_config(preset)
-        unit_fields = ("preset", "columns", "min_range", "max_range")
-        return self.model_copy(
-            update={field: getattr(unit, field) for field in unit_fields}
-        )
+        names = ("preset", "columns", "min_range", "max_range")
+        return self.replaced(**{name: getattr(unit, name) for name in names})
 
 
 def make_lidar_config(preset: str) -> LidarSection:
