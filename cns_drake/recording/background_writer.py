@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 import queue
 import threading
-from types import TracebackType
 from typing import Any
 
 # Number of messages that may wait, each with the small ones before it: two
@@ -47,12 +46,7 @@ class BackgroundWriter:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        exception_type: type[BaseException] | None,
-        exception: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, exception_type: type | None, *_: object) -> None:
         self._dropping = exception_type is not None
         self._messages.put(self._held)
         self._messages.put(None)

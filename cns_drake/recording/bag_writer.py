@@ -15,7 +15,6 @@ import io
 import json
 import os
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
 from mcap.records import Channel, Message
@@ -202,12 +201,7 @@ class BagWriter:
         self._is_open = True
         return self
 
-    def __exit__(
-        self,
-        exception_type: type[BaseException] | None,
-        exception: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, exception_type: type | None, *_: object) -> None:
         """Completes the recording, or closes it as a part.
 
         Raises:

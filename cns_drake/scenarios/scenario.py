@@ -331,25 +331,15 @@ class Scenario(Section):
             raise ValueError(f"'{taken.pop()}' is the name of another frame")
         return lidars
 
-    @field_validator("imu")
+    @field_validator("imu", "odometry")
     @classmethod
-    def _check_imu_rate(
-        cls, imu: ImuSection, info: ValidationInfo
-    ) -> ImuSection:
-        if imu.rate is not None and "lidars" in info.data:
-            check_rate(imu.rate, _fastest(info.data["lidars"]))
-        return imu
-
-    @field_validator("odometry")
-    @classmethod
-    def _check_odometry_rate(
-        cls, odometry: OdometrySection, info: ValidationInfo
-    ) -> OdometrySection:
-        if odometry.rate is not None and "lidars" in info.data:
-            # Every scan needs its own pose.
+    def _check_sample_rate(cls, section: Any, info: ValidationInfo) -> Any:
+        if section.rate is not None and "lidars" in info.data:
             fastest = _fastest(info.data["lidars"])
-            check_rate(odometry.rate, fastest, multiple_of=fastest)
-        return odometry
+            # Every scan needs its own pose.
+            step = fastest if info.field_name == "odometry" else 1
+            check_rate(section.rate, fastest, multiple_of=step)
+        return section
 
     @model_validator(mode="after")
     def _check_further_sensors(self) -> Scenario:

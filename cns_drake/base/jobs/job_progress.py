@@ -7,7 +7,7 @@ import contextlib
 from dataclasses import dataclass
 import datetime
 import time
-from types import TracebackType
+from typing import Any
 
 from rich.console import Console, RenderableType
 from rich.progress import TaskID
@@ -134,13 +134,8 @@ class JobProgress:
         self.refresh()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._stack.__exit__(kind, error, trace)
+    def __exit__(self, *error: Any) -> None:
+        self._stack.__exit__(*error)
 
     def __rich__(self) -> RenderableType:
         """Returns the display."""
