@@ -410,5 +410,5 @@ def test_one_frame_makes_a_page(folder, tmp_path):
 def test_page_that_cannot_be_written_is_named(folder, tmp_path):
     recorder = drive(folder, "stage_01", None, num_frames=1)
     path = tmp_path / "none" / "page.html"
-    with pytest.raises(InputError, match=r"page\.html\.part: No such file"):
+    with pytest.raises(InputError, match=r"page\.html: No such file"):
         recorder.save(path)
