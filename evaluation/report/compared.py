@@ -135,8 +135,11 @@ def draw_maps(rows: Sequence[MapRow], stem: Path) -> None:
         stem: path to write, without ending.
     """
     values = {
-        "points": ("miou", "miou"),
-        "structures": ("right_structures", "called_structures"),
+        "mean IoU of points [%]": ("miou", "miou"),
+        "structures called gone or new [%]": (
+            "right_structures",
+            "called_structures",
+        ),
     }
 
     def share(title: str, row: MapRow) -> tuple[float, str]:
@@ -149,7 +152,6 @@ def draw_maps(rows: Sequence[MapRow], stem: Path) -> None:
     draw_compared(
         dict.fromkeys(values, rows),
         share,
-        "mean IoU of points, and right part of structures; numbers: mean IoU, "
-        "and part called gone or new [%]",
+        "mean IoU; right structures",
         stem,
     )

@@ -855,6 +855,8 @@ NOT_RUN = {
     "test_example_diagrams runs it, too",
     ".venv/bin/cns-drake map-truth suburbia": "drives through a shipped city, "
     "for minutes",
+    ".venv/bin/cns-drake map-truth aged": "needs a city that has aged, and "
+    "minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake import neukolln": "needs the file that is not shipped",
     "/** A batch of rays": "C++ of a design",
     "lidars: typing.Mapping": "lines of an example of Drake's",
