@@ -6,11 +6,13 @@ from pathlib import Path
 import shutil
 
 from helpers import documents, studies
+from helpers.eval_program import run_program
 from helpers.small_map import write_town
 import numpy as np
 import pytest
 import shapely
 
+from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.planning import plan_drive
@@ -35,6 +37,7 @@ from cns_drake.studies.ladder_rungs import (
     plan_rungs,
 )
 from cns_drake.studies.map_pairs import update_pairs
+from cns_drake.studies.reproduction import stage_pairs
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.overlaps import find_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -471,3 +474,38 @@ def test_maps_of_rungs_are_scored(town, tmp_path, monkeypatch):
     content = path.read_bytes()
     update_pairs(pairs, tmp_path, Cluster(1), notes.append)
     assert path.read_bytes() == content
+
+
+def test_stages_of_a_map_are_pairs(town, tmp_path):
+    pairs = stage_pairs([str(town)], tmp_path)
+    found = [(p.rung.cause, p.rung.level, p.rung.database) for p in pairs]
+    first = next(p.rung.database for p in pairs if p.rung.cause == "stages")
+    assert found == [
+        ("routes", 1, f"{first}_stage_04"),
+        ("stages", 1, first),
+    ]
+    assert {p.rung.query for p in pairs} == {pairs[0].rung.query}
+    stages = [[one.scenario.stage for one in p.sources] for p in pairs]
+    assert stages == [["04", "04"], ["01", "04"]]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("reproduce", "--set", "a=1"), "leave out --set and --pages"),
+        (("ladder", "--pairs"), "leave out --levels and --pairs"),
+        (("ladder", "--method", "own.py"), "leave out --method"),
+    ],
+)
+def test_tasks_refuse_what_they_do_not_take(
+    town, tmp_path, capsys, words, text
+):
+    command, *options = words
+    status, _, err = run_program(
+        capsys,
+        "cns-drake",
+        main,
+        *(command, town, "--task", "map", "--output", tmp_path, *options),
+    )
+    assert status == 2
+    assert f"--task map: {text}" in err
