@@ -14,8 +14,6 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.facades.assembly import Rgb
-from cns_drake.city.furniture.pavilions import FENCES
-from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
 from cns_drake.city.geometry.polygons import placed, polygons_of
 from cns_drake.city.geometry.structures import (
     MeshShape,
@@ -33,6 +31,7 @@ from cns_drake.city.growth.stage_structures import (
     largest_rectangle,
     lot_objects,
 )
+from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.transient.putting_up import scaffold
 
 # What is built today, by its relative share among what fits.
@@ -224,11 +223,11 @@ def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
             (x0, (y0 + y1) / 2, -math.pi / 2, y1 - y0),
         )
     ):
-        fence = FENCES["site_fence"].build(rng, length=length)
+        fence = OBJECTS["site_fence"].build(rng, length=length)
         moved = Plot(plot.area, place(plot, x, y), plot.yaw + turn, plot.z)
         things.append(moved.thing(f"{name}_fence_{k}", "fence", fence))
     empty = plot.thing(name, "building", Model((), {}, lot.buffer(-0.8)))
-    digger = SITE_EQUIPMENT["excavator"]
+    digger = OBJECTS["excavator"]
     middle = place(plot, *lot.centroid.coords[0])
     turned = Plot(plot.area, middle, float(rng.uniform(-3.1, 3.1)), plot.z)
     model = digger.build(rng)

@@ -7,8 +7,6 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.furniture.pavilions import FENCES
-from cns_drake.city.furniture.site_equipment import SITE_EQUIPMENT
 from cns_drake.city.geometry.polygons import placed
 from cns_drake.city.geometry.structures import (
     Builder,
@@ -19,6 +17,7 @@ from cns_drake.city.geometry.structures import (
     block,
     post,
 )
+from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.transient.scene_editing import Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
@@ -263,7 +262,7 @@ class _Site:
             (x + length / 2, middle, np.pi / 2, across),
         )
         for k, (at, y, turn, run) in enumerate(sides):
-            model = FENCES["site_fence"].build(self._rng, length=run)
+            model = OBJECTS["site_fence"].build(self._rng, length=run)
             self._add(f"fence_{k}", "fence", model, at, y, turn, run)
         self._add_machines(every, middle)
         stones = self._stretch.rectangle(x, length, -_KERB_WIDTH, 0.0)
@@ -284,7 +283,7 @@ class _Site:
             ]
             x = self._x + float(self._rng.uniform(-0.4, 0.4)) * self._length
             turn = float(self._rng.uniform(-0.15, 0.15))
-            builder: Builder = SITE_EQUIPMENT[name]
+            builder: Builder = OBJECTS[name]
             model = builder.build(self._rng)
             if name == "brick_pallets":
                 turn += np.pi / 2  # Its row runs along y.

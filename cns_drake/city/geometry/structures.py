@@ -222,32 +222,6 @@ def block(
     )
 
 
-def one_mesh(
-    name: str,
-    colours: Sequence[tuple[float, float, float]],
-    semantic_class: str = "other-object",
-    **stretch: tuple[float, float],
-) -> Builder:
-    """Returns a builder of objects of one mesh.
-
-    Args:
-        name: name of the mesh.
-        colours: to choose from.
-        semantic_class: class of the objects.
-        stretch: x, y or z -> range of the scale along this axis.
-    """
-
-    def build(rng: np.random.Generator) -> Model:
-        scale = [1.0, 1.0, 1.0]
-        for axis, (low, high) in stretch.items():
-            scale["xyz".index(axis)] = round(float(rng.uniform(low, high)), 3)
-        count = len(colours)
-        rgb = colours[int(rng.integers(count)) if count > 1 else 0]
-        return assemble(Part("body", MeshShape(name, triple(scale)), rgb=rgb))
-
-    return Builder(semantic_class, build)
-
-
 def triple(values: Iterable[float]) -> tuple[float, float, float]:
     """Returns three numbers, from an array for instance, as Python floats."""
     x, y, z = values

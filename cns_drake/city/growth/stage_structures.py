@@ -15,7 +15,6 @@ from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.buildings import ARCHETYPES, sample
-from cns_drake.city.furniture.site_equipment import CRANES
 from cns_drake.city.geometry.polygons import Occupancy
 from cns_drake.city.geometry.structures import (
     BoxShape,
@@ -122,7 +121,7 @@ def building_site(model: Model, height: float, name: str, seed: int) -> Model:
     frame = sample(_FRAME, box(x0, y0, x1, y1), height, rng, f"{name}_site")
     if crane_xy is None:
         return Model(frame.parts, frame.meshes, model.footprint)
-    crane = CRANES["tower_crane"].build(
+    crane = OBJECTS["tower_crane"].build(
         rng, height=height + _CRANE_RISE, reach=_CRANE_REACH
     )
     return Model(

@@ -4,21 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cns_drake.city.furniture.described_objects import DESCRIBED
+from cns_drake.city.furniture.fences import FENCES
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.furniture.pavilions import (
-    FENCES,
-    MONUMENTS,
-    PAVILIONS,
-    PLAYGROUND,
-)
-from cns_drake.city.furniture.site_equipment import CRANES, SITE_EQUIPMENT
-from cns_drake.city.furniture.street_furniture import (
-    STREET_FURNITURE,
-    STREET_LIGHTS,
-    TRAFFIC_SIGNALS,
-)
 from cns_drake.city.geometry.structures import Builder
-from cns_drake.city.plants.vegetation import SHRUBS, TREES
+from cns_drake.city.plants.vegetation import TREES
 
 
 def pick(weights: Mapping[str, float], rng: np.random.Generator) -> str:
@@ -28,17 +18,6 @@ def pick(weights: Mapping[str, float], rng: np.random.Generator) -> str:
     return names[int(rng.choice(len(names), p=p / p.sum()))]
 
 
-OBJECTS: dict[str, Builder] = {
-    **TREES,
-    **SHRUBS,
-    **FENCES,
-    **STREET_LIGHTS,
-    **TRAFFIC_SIGNALS,
-    **STREET_FURNITURE,
-    **PAVILIONS,
-    **MONUMENTS,
-    **PLAYGROUND,
-    **PARKED_CARS,
-    **SITE_EQUIPMENT,
-    **CRANES,
-}
+OBJECTS: dict[str, Builder] = {**TREES, **FENCES, **PARKED_CARS}
+for _objects in DESCRIBED.values():
+    OBJECTS |= _objects

@@ -1,1 +1,1 @@
-"""Trees, shrubs and hedges."""
+"""Trees."""

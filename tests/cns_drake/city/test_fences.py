@@ -2,7 +2,7 @@ from helpers.mesh_checks import first_hit, is_closed, solids, surface_points
 import numpy as np
 import pytest
 
-from cns_drake.city.furniture.pavilions import RUN_KINDS
+from cns_drake.city.furniture.fences import RUN_KINDS
 from cns_drake.city.geometry.mesh import object_mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS

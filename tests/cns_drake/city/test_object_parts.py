@@ -18,6 +18,7 @@ from cns_drake.city.geometry.structures import (
     post,
     rotation,
 )
+from cns_drake.city.placement.objects import OBJECTS
 
 
 def test_post_spans_from_the_root_to_its_height():
@@ -78,3 +79,18 @@ def test_footprint_holds_round_shapes_and_scaled_turned_meshes():
         points = surface_points(part, meshes, rng, 500)
         assert footprint.covers(MultiPoint(points[:, :2]))
     assert not footprint.contains(Point(2.2, 0.2))
+
+
+def test_an_unknown_parameter_of_an_object_is_refused():
+    with pytest.raises(TypeError, match="no parameter colour"):
+        OBJECTS["obelisk"].build(np.random.default_rng(0), colour=1)
+
+
+def test_a_given_parameter_leaves_the_other_draws_alone():
+    drawn, given = (
+        OBJECTS["shrub"].build(np.random.default_rng(3), **parameters).parts[0]
+        for parameters in ({}, {"height": 0.5})
+    )
+    assert given.shape.scale[2] == 0.5 != drawn.shape.scale[2]
+    assert (given.shape.mesh, given.rpy) == (drawn.shape.mesh, drawn.rpy)
+    assert given.rgb == drawn.rgb

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from shapely.geometry import MultiPoint
 
-from cns_drake.city.furniture.pavilions import RUN_KINDS
+from cns_drake.city.furniture.fences import RUN_KINDS
 from cns_drake.city.geometry.mesh import FOLDER, Mesh, object_mesh
 from cns_drake.city.geometry.structures import MeshShape, part_mesh
 from cns_drake.city.placement.objects import OBJECTS

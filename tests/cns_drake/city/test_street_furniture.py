@@ -2,12 +2,12 @@ from helpers.mesh_checks import is_closed, solids, surface_points
 import numpy as np
 import pytest
 
-from cns_drake.city.furniture.street_furniture import STREET_FURNITURE
+from cns_drake.city.furniture.described_objects import DESCRIBED
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 
 SOLID = [
-    *STREET_FURNITURE,
+    *DESCRIBED["street_furniture"],
     "kiosk",
     "advertising_pillar",
     "phone_box",

@@ -1,0 +1,105 @@
+"""Fences, walls and hedges: runs of panels."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.city.facades.assembly import Rgb, pick
+from cns_drake.city.geometry.structures import (
+    ROOT_DEPTH,
+    Builder,
+    MeshShape,
+    Model,
+    Part,
+    assemble,
+    block,
+)
+
+_LONGEST = 8
+
+
+@dataclass(frozen=True)
+class RunKind:
+    """A kind of fence, from `fences.yaml`.
+
+    Attributes:
+        panel: nominal length of a panel [m].
+        height: nominal height [m].
+        colours: to choose from.
+        end_post: x size, y from, y to, z to of the post that ends the run
+            [m], or None.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+    """
+
+    panel: float
+    height: float
+    colours: tuple[Rgb, ...]
+    end_post: tuple[float, float, float, float] | None = None
+    semantic_class: str = "fence"
+
+
+# By the stems of their meshes' names.
+RUN_KINDS = {
+    name: RunKind(**values)
+    for name, values in parse_yaml(
+        Path(__file__).with_name("fences.yaml").read_bytes()
+    ).items()
+}
+
+
+def run(
+    name: str,
+    rng: np.random.Generator,
+    *,
+    length: float = 10.0,
+    height: float | None = None,
+) -> Model:
+    """Returns a run of panels.
+
+    Args:
+        name: a key of `RUN_KINDS`.
+        rng: draws the colour.
+        length: length of the run [m]; positive.
+        height: [m], positive; the nominal one if not given.
+
+    Raises:
+        ValueError: the length or the height is not positive.
+    """
+    kind = RUN_KINDS[name]
+    height = kind.height if height is None else height
+    if not (length > 0 and height > 0):
+        raise ValueError(
+            f"{name}: length {length}, height {height}: not positive"
+        )
+    red, green, blue = pick(rng, kind.colours)
+    rgb = (red, green, blue)
+    tall = round(height / kind.height, 4)
+    total = max(1, round(length / kind.panel))
+    stretch = round(length / (total * kind.panel), 4)
+    parts: list[Part] = []
+    done = 0
+    while done < total:
+        count = _LONGEST
+        while count > total - done:
+            count //= 2
+        shape = MeshShape(f"{name}_x{count}", (stretch, 1.0, tall))
+        x = done * kind.panel * stretch - length / 2
+        part = f"run_{len(parts):02d}"
+        parts.append(Part(part, shape, (x, 0.0, 0.0), rgb=rgb))
+        done += count
+    if kind.end_post:
+        x, y0, y1, top = kind.end_post
+        top *= tall
+        size = (x, y1 - y0, top + ROOT_DEPTH)
+        at = (length / 2 - x / 2, (y0 + y1) / 2, (top - ROOT_DEPTH) / 2)
+        parts.append(block("end", size, at, rgb=rgb))
+    return assemble(*parts)
+
+
+FENCES = {
+    name: Builder(kind.semantic_class, partial(run, name))
+    for name, kind in RUN_KINDS.items()
+}
