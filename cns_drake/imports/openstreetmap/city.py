@@ -47,31 +47,9 @@ from cns_drake.imports.openstreetmap.streets import (
     street_places,
     street_surfaces,
 )
-from cns_drake.imports.openstreetmap.tags import length, tag_value
+from cns_drake.imports.openstreetmap.tags import TABLES, length, tag_value
 from cns_drake.imports.options import ImportFaults
 
-# Key and value -> object; an empty value stands for any.
-_OBJECTS = (
-    ("highway", "street_lamp", "lamp_post"),
-    ("highway", "bus_stop", "bus_shelter"),
-    ("highway", "traffic_signals", "traffic_light_post"),
-    ("highway", "stop", "sign_stop"),
-    ("highway", "give_way", "sign_triangular"),
-    ("highway", "traffic_sign", "sign_round"),
-    ("amenity", "bench", "bench"),
-    ("amenity", "waste_basket", "litter_bin"),
-    ("amenity", "waste_disposal", "recycling_bins"),
-    ("amenity", "recycling", "recycling_bins"),
-    ("amenity", "post_box", "post_box"),
-    ("amenity", "bicycle_parking", "bicycle_rack"),
-    ("amenity", "telephone", "phone_box"),
-    ("emergency", "fire_hydrant", "hydrant"),
-    ("barrier", "bollard", "bollard"),
-    ("man_made", "street_cabinet", "cabinet"),
-    ("advertising", "column", "advertising_pillar"),
-    ("vending", "parking_tickets", "ticket_machine"),
-    ("traffic_sign", "", "sign_round"),
-)
 _TREE_DISTANCE = 8.0  # [m]
 # Sizes of barriers and trees [m].
 _TALLEST = 150.0
@@ -87,12 +65,12 @@ def object_of(tags: Tags) -> str | None:
     """Returns the object of a node; None without one."""
     found = [
         name
-        for key, value, name in _OBJECTS
+        for key, value, name in TABLES["objects"]
         if has_tag(tags, key) and value in ("", tags[key])
     ]
     if not found:
         return None
-    name = found[0]
+    name: str = found[0]
     if tags.get("fire_hydrant:type", "pillar") != "pillar":
         return None
     if tags.get("lamp_mount", tags.get("support", "pole")) not in (

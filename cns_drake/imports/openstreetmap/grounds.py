@@ -26,14 +26,12 @@ from cns_drake.imports.openstreetmap.reading import (
     Tags,
     has_tag,
 )
-from cns_drake.imports.openstreetmap.tags import area_kind
+from cns_drake.imports.openstreetmap.tags import TABLES, area_kind
 from cns_drake.imports.options import ImportFaults
 
 _SAND: Rgb = (0.76, 0.68, 0.51)
 _GRAVEL: Rgb = (0.50, 0.47, 0.43)
-_ROCK: Rgb = (0.55, 0.54, 0.52)
 _TARTAN: Rgb = (0.60, 0.34, 0.28)
-_STONES: Rgb = (0.62, 0.59, 0.55)
 _LEVEL = -0.05  # [m]
 
 
@@ -46,40 +44,13 @@ class _Look(NamedTuple):
     z: float
 
 
-_WATER = _Look("WaterBody", "other-ground", WATER, -0.045)
-_SQUARE = _Look("Square", "other-ground", _STONES, -0.03)
-# Key, values and look; smaller things are a little above larger ones.
-_LOOKS = (
-    ("natural", "water", _WATER),
-    ("landuse", "basin reservoir", _WATER),
-    ("leisure", "swimming_pool", _WATER._replace(z=-0.025)),
-    (
-        "natural",
-        "sand beach shoal",
-        _Look("Sand", "other-ground", _SAND, -0.04),
-    ),
-    (
-        "natural",
-        "bare_rock shingle scree stone",
-        _Look("Rock", "other-ground", _ROCK, -0.04),
-    ),
-    (
-        "landuse",
-        "railway construction brownfield",
-        _Look("Gravel", "other-ground", _GRAVEL, -0.055),
-    ),
-    (
-        "leisure",
-        "playground",
-        _Look("Playground", "other-ground", _SAND, -0.035),
-    ),
-    ("highway", "pedestrian footway path platform", _SQUARE),
-    ("place", "square", _SQUARE),
-    ("railway", "platform", _SQUARE),
-    ("public_transport", "platform", _SQUARE),
-    ("man_made", "pier", _SQUARE),
-    ("amenity", "marketplace", _SQUARE),
-)
+def _look_of(entry: list) -> _Look:
+    kind, semantic_class, (red, green, blue), z = entry
+    return _Look(kind, semantic_class, (red, green, blue), z)
+
+
+_LOOKS = [(_look_of(entry["look"]), entry) for entry in TABLES["grounds"]]
+_WATER = _LOOKS[0][0]
 _PITCH = _Look("Pitch", "other-ground", _TARTAN, -0.035)
 _OF_GRASS = ("grass", "artificial_turf", "natural_grass")
 _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
@@ -144,8 +115,12 @@ def _look(tags: Tags) -> _Look | None:
         if tags.get("parking") in _NO_GROUND:
             return None
         return _Look("Parking", "parking", None, -0.03)
-    for key, values, look in _LOOKS:
-        if tags.get(key) in values.split():
+    for look, entry in _LOOKS:
+        if any(
+            tags.get(key) in values.split()
+            for key, values in entry.items()
+            if key != "look"
+        ):
             return look
     return _plain_look(tags)
 

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
 from cns_drake.city.geometry.polygons import hull_of
+from cns_drake.imports.openstreetmap.tags import TABLES
 from cns_drake.imports.options import ImportFaults
 
 Tags = Mapping[str, str]
@@ -25,60 +26,8 @@ _FLATTENING = 1.0 / 298.257223563
 _NO_AREA = 1e-12
 _OPEN = "whose outline does not close"
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
-# Tags that give the kind of a thing, the more specific first
-# (https://wiki.openstreetmap.org/wiki/Map_features).
-_KIND_KEYS = (
-    "building",
-    "building:part",
-    "highway",
-    "railway",
-    "aeroway",
-    "aerialway",
-    "waterway",
-    "barrier",
-    "natural",
-    "landuse",
-    "leisure",
-    "amenity",
-    "man_made",
-    "historic",
-    "tourism",
-    "shop",
-    "office",
-    "craft",
-    "healthcare",
-    "emergency",
-    "power",
-    "telecom",
-    "public_transport",
-    "advertising",
-    "traffic_sign",
-    "traffic_calming",
-    "entrance",
-    "indoor",
-    "military",
-    "geological",
-    "playground",
-    "sport",
-    "route",
-    "boundary",
-    "place",
-    "area:highway",
-)
-# Prefixes of keys of former things, and of former or future things.
-_GONE = ("demolished", "destroyed", "historic", "razed", "removed", "was")
-_LIFECYCLE = (
-    "abandoned",
-    "construction",
-    "demolished",
-    "destroyed",
-    "disused",
-    "historic",
-    "planned",
-    "proposed",
-    "razed",
-    "removed",
-    "was",
+_KIND_KEYS, _GONE, _LIFECYCLE = (
+    tuple(TABLES[key].split()) for key in ("kinds", "gone", "lifecycle")
 )
 
 

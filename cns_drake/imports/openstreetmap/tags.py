@@ -7,29 +7,14 @@ https://wiki.openstreetmap.org/wiki/Key:lanes,
 https://wiki.openstreetmap.org/wiki/Key:maxspeed"""
 
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 import re
 from typing import NamedTuple
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.imports.options import ImportFaults
 
-# Units in metres; without one a length is in metres.
-_UNITS = {
-    "": 1.0,
-    "m": 1.0,
-    "metre": 1.0,
-    "metres": 1.0,
-    "meter": 1.0,
-    "meters": 1.0,
-    "cm": 0.01,
-    "km": 1000.0,
-    "mi": 1609.344,
-    "ft": 0.3048,
-    "foot": 0.3048,
-    "feet": 0.3048,
-    "'": 0.3048,
-    "in": 0.0254,
-    '"': 0.0254,
-}
+TABLES = parse_yaml(Path(__file__).with_name("tags.yaml").read_bytes())
 _NUMBER = r"(\d+(?:[.,]\d+)?|[.,]\d+)"
 _LENGTH = re.compile(rf"{_NUMBER}\s*([a-z]*|'|\")")
 _FEET_AND_INCHES = re.compile(
@@ -43,60 +28,14 @@ STOREY = 3.0  # [m]
 LANE = 3.0  # [m]
 # Least width for two cars to pass each other [m].
 _TWO_CARS = 5.0
-# Levels of buildings without tags for height or levels.
-_USUAL_LEVELS = {
-    "garage": 1,
-    "garages": 1,
-    "shed": 1,
-    "hut": 1,
-    "roof": 1,
-    "carport": 1,
-    "kiosk": 1,
-    "service": 1,
-    "house": 2,
-    "detached": 2,
-    "terrace": 2,
-    "church": 4,
-    "apartments": 5,
-}
+# Levels of a building of no known kind.
 _LEVELS = 3
-# Width of streets without tags for width or lanes [m].
-_STREETS = {
-    "motorway": 12.0,
-    "trunk": 12.0,
-    "primary": 11.0,
-    "secondary": 10.0,
-    "tertiary": 8.0,
-    "unclassified": 6.5,
-    "residential": 6.5,
-    "living_street": 5.5,
-    "service": 4.5,
-    "track": 3.5,
-}
-_PATHS = {
-    "pedestrian": 6.0,
-    "footway": 2.0,
-    "path": 2.0,
-    "cycleway": 2.5,
-    "steps": 2.0,
-}
 # Larger than any building or street: the tallest tower has 828 m.
 _TALLEST = 850.0  # [m]
 _LOWEST = 0.1  # [m]
 _MOST_LEVELS = 170
 _WIDEST = 60.0  # [m]
 _LANES_OF_STREET = 16
-# Values of `building` for buildings that are not there, and keys for it.
-_ABSENT = {
-    "demolished": "demolished",
-    "destroyed": "demolished",
-    "razed": "demolished",
-    "removed": "demolished",
-    "collapsed": "demolished",
-    "proposed": "proposed",
-    "planned": "proposed",
-    "construction": "unfinished",
-}
 # Least width of a lane that carries any vehicle, the width that drivers use,
 # and the width of street for each lane where the file gives no number [m].
 _LEAST, _USED, _USUAL = 2.75, 3.25, 3.5
@@ -105,30 +44,8 @@ _KM_H = 1.0 / 3.6
 _MILES_H = 0.44704
 _FASTEST = 60.0  # [m/s]
 _WALKING_PACE = 7.0 * _KM_H
-# Limits of streets without a tag for it, and of the values that name a rule of
-# a country, such as `DE:urban` [km/h].
-_BY_CLASS = {
-    "motorway": 120.0,
-    "trunk": 80.0,
-    "primary": 50.0,
-    "secondary": 50.0,
-    "tertiary": 50.0,
-    "unclassified": 50.0,
-    "residential": 30.0,
-    "living_street": 7.0,
-    "service": 20.0,
-}
+# Limit of links, such as ramps [km/h].
 _LINKS = 50.0
-_BY_RULE = {
-    "motorway": 120.0,
-    "trunk": 80.0,
-    "rural": 90.0,
-    "urban": 50.0,
-    "zone30": 30.0,
-    "zone:30": 30.0,
-    "living_street": 7.0,
-    "bicycle_road": 30.0,
-}
 _SPEED = re.compile(r"(\d{1,3})(?:\s*(km/h|kmh|kph|mph))?")
 
 
@@ -168,9 +85,9 @@ def _length(text: str) -> float | None:
         feet, inches = (float(one.replace(",", ".")) for one in both.groups())
         return 0.3048 * (feet + inches / 12.0)
     match = _LENGTH.fullmatch(text)
-    if match is None or match[2] not in _UNITS:
+    if match is None or match[2] not in TABLES["units"]:
         return None
-    return float(match[1].replace(",", ".")) * _UNITS[match[2]]
+    return float(match[1].replace(",", ".")) * float(TABLES["units"][match[2]])
 
 
 def _greatest(values: list[float | None]) -> float | None:
@@ -245,7 +162,7 @@ def heights(
     )
     if high is None:
         if levels is None:
-            levels = _USUAL_LEVELS.get(tags.get("building", ""), _LEVELS)
+            levels = TABLES["levels"].get(tags.get("building", ""), _LEVELS)
         high = STOREY * levels + (roof or STOREY * (roof_levels or 0.0))
     low = metres("min_height")
     if low is None:
@@ -263,10 +180,11 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
     if not ("building" in tags or "building:part" in tags):
         return "demolished"
     kinds = [tags.get("building", ""), tags.get("building:part", "")]
-    kinds += [key for key in _ABSENT if tags.get(key) == "yes"]
+    reasons: dict[str, str] = TABLES["absent"]
+    kinds += [key for key in reasons if tags.get(key) == "yes"]
     for kind in kinds:
-        if kind in _ABSENT:
-            return _ABSENT[kind]
+        if kind in reasons:
+            return reasons[kind]
     layer = tags.get("layer", "")
     if (
         tags.get("location") in ("underground", "underwater")
@@ -292,7 +210,8 @@ def street_width(
         where: see `tag_value`.
     """
     kind = tags.get("highway", "").removesuffix("_link")
-    if kind not in _STREETS:
+    usual: float | None = TABLES["streets"].get(kind)
+    if usual is None:
         return None
     width = tag_value(tags, "width", length, _WIDEST, where)
     if width:
@@ -300,7 +219,6 @@ def street_width(
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, where)
     if lanes:
         return LANE * lanes + 0.5
-    usual = _STREETS[kind]
     is_one_way = not all(driven_ways(tags))
     return max(0.6 * usual, 3.5) if is_one_way else usual
 
@@ -352,7 +270,7 @@ def is_marked(tags: Mapping[str, str]) -> bool:
 
 def path_width(tags: Mapping[str, str]) -> float | None:
     """Returns the width of a way for people [m]; None for other ways."""
-    usual = _PATHS.get(tags.get("highway", ""))
+    usual: float | None = TABLES["paths"].get(tags.get("highway", ""))
     if usual is None:
         return None
     return tag_value(tags, "width", length, _WIDEST, None) or usual
@@ -382,21 +300,9 @@ def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
         return "Parking", "parking"
     if tags.get("highway") == "pedestrian" or tags.get("place") == "square":
         return "Square", "other-ground"
-    if (
-        tags.get("landuse")
-        in (
-            "grass",
-            "forest",
-            "meadow",
-            "farmland",
-            "flowerbed",
-            "cemetery",
-            "village_green",
-            "orchard",
-            "allotments",
-        )
-        or tags.get("leisure") in ("park", "garden", "pitch", "playground")
-        or tags.get("natural") in ("grassland", "scrub", "wood", "heath")
+    if any(
+        tags.get(key) in values.split()
+        for key, values in TABLES["green"].items()
     ):
         return "LandUse", "terrain"
     return None
@@ -480,7 +386,7 @@ def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
         if found is not None:
             return found
     kind = tags.get("highway", "")
-    return _KM_H * _BY_CLASS.get(kind, _LINKS)
+    return _KM_H * float(TABLES["limits"].get(kind, _LINKS))
 
 
 def _speed(text: str) -> float | None:
@@ -494,7 +400,7 @@ def _speed(text: str) -> float | None:
             speeds.append(int(found[1]) * unit)
         elif part.strip() == "walk":
             speeds.append(_WALKING_PACE)
-        elif rule in _BY_RULE:
-            speeds.append(_BY_RULE[rule] * _KM_H)
+        elif rule in TABLES["rules"]:
+            speeds.append(TABLES["rules"][rule] * _KM_H)
     valid = [one for one in speeds if 0.0 < one <= _FASTEST]
     return min(valid, default=None)
