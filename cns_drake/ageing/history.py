@@ -268,9 +268,6 @@ class City:
     def _structure(self, name: str) -> Structure:
         return self.standing.get(name) or self._world.structure(name)
 
-    def _ground_height(self, area: BaseGeometry, default: float) -> float:
-        return self._world.ground.lowest(area, default)
-
     # What there is today.
 
     def _lots_of_buildings(self) -> Iterator[_Lot]:

@@ -1,7 +1,7 @@
 """The building stock: parametric buildings, and landmarks.
 
-`archetypes.yaml` describes the sizes and colours of each archetype. Its class,
-of the same name, draws the other parameters and builds it; `sample` does both:
+`archetypes.yaml` describes sizes, colours and parameters of each archetype. Its
+class, of the same name, builds it; `sample` draws the parameters and builds:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -13,8 +13,8 @@ import re
 
 import numpy as np
 from shapely.geometry import Polygon
-import yaml
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.buildings import (  # noqa: F401
     family_houses,
     flats,
@@ -37,8 +37,8 @@ __all__ = ["ARCHETYPES", "sample"]
 # Name -> description.
 ARCHETYPES = {
     name: Archetype(name=name, **values)
-    for name, values in yaml.safe_load(
-        Path(__file__).with_name("archetypes.yaml").read_text(encoding="utf-8")
+    for name, values in parse_yaml(
+        Path(__file__).with_name("archetypes.yaml").read_bytes()
     ).items()
     if name != "palettes"
 }

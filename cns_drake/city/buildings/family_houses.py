@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cns_drake.city.facades import bays, details, house_walls, massing, wings
-from cns_drake.city.facades.assembly import Assembly, Building, Dice, Site
+from cns_drake.city.facades.assembly import Assembly, Building, Site
 from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney
 from cns_drake.city.facades.walls import Band
@@ -128,27 +128,6 @@ class DetachedHouse(Building):
     back) or `cross` (both). The garage stands on the right, the front wing
     on the left, unless `mirrored`.
     """
-
-    def draw(self, d: Dice) -> None:
-        self.plan = d.pick(("box", "ell", "tee", "cross", "ell"))
-        self.mirrored = d.chance(0.5)
-        self.roof = d.pick(("gable", "gable", "hip", "gambrel"))
-        self.pitch_deg = d.uniform(28.0, 45.0)
-        self.wing_width = d.uniform(0.36, 0.46)
-        self.low_wing = d.chance(0.35)
-        self.deck = d.uniform(0.2, 0.6, 2)
-        self.window_pitch = d.uniform(2.6, 3.4)
-        self.window_width = d.uniform(0.95, 1.3, 2)
-        self.casing = d.pick(("frame", "sill", "sill", "shutters"))
-        self.porch = d.pick(("shed", "gable", "full", "flat"))
-        self.porch_reach = d.uniform(1.5, 2.2, 2)
-        self.garage = d.pick(("flat", "gable", "shed", "none"))
-        self.garage_width = d.uniform(3.2, 5.8, 1)
-        self.chimney = d.pick(("ridge", "breast", "ridge", "none"))
-        self.chimney_at = d.uniform(0.2, 0.8)
-        self.dormers = d.whole(0, 3)
-        self.dormer = d.pick(("gable", "shed"))
-        self.bay_window = d.chance(0.4)
 
     def build(self) -> None:
         """Builds the house on a rectangle, its porch in front."""
@@ -317,33 +296,7 @@ _BUNGALOW_MARGIN = 0.75
 
 
 class Bungalow(Building):
-    """The bungalow: one long low storey, a carport or a garage under its roof.
-
-    Attributes:
-        plan: `long`, `ell` (a wing to the front) or `court` (two of
-            them).
-        parking: `garage` in the front wing, `carport` beside the house
-            or `none`.
-        mirrored: whether the front wing stands on the right.
-        wing_width: width of a front wing, as a part of the house's.
-        reach: how far the front wings stand out.
-        picture: width of the large window beside the door.
-    """
-
-    def draw(self, d: Dice) -> None:
-        self.plan = d.pick(("long", "ell", "ell", "court"))
-        self.parking = d.pick(("garage", "carport", "none"))
-        self.mirrored = d.chance(0.5)
-        self.roof = d.pick(("gable", "hip", "hip"))
-        self.wing_width = d.uniform(0.3, 0.4)
-        self.reach = d.uniform(2.0, 4.0, 2)
-        self.floor = d.uniform(0.1, 0.35, 2)
-        self.window_pitch = d.uniform(2.6, 3.6)
-        self.window_width = d.uniform(1.2, 1.7, 2)
-        self.picture = d.uniform(2.2, 3.4, 2)
-        self.casing = d.pick(("frame", "sill", "shutters"))
-        self.veranda = d.chance(0.5)
-        self.chimney_at = d.uniform(0.25, 0.75)
+    """The bungalow: one long low storey, a carport or a garage."""
 
     def build(self) -> None:
         """Builds the bungalow along the front of a rectangle."""
@@ -475,30 +428,7 @@ _SEMI_DETACHED_MARGIN = 0.5
 
 
 class SemiDetached(Building):
-    """The pair of semi-detached houses: mirrored halves under one roof.
-
-    Attributes:
-        pitch_deg: wanted slope of the roof.
-        bay: `gabled` (through all storeys, under a gable of its own),
-            `canted` or `none`.
-        garages: shape of their roofs, one on either side, or `none`.
-    """
-
-    def draw(self, d: Dice) -> None:
-        self.roof = d.pick(("gable", "hip"))
-        self.pitch_deg = d.uniform(30.0, 45.0)
-        self.floor = d.uniform(0.15, 0.45, 2)
-        self.window_pitch = d.uniform(2.4, 3.2)
-        self.window_width = d.uniform(1.0, 1.4, 2)
-        self.casing = d.pick(("frame", "sill", "sill", "shutters"))
-        self.bay = d.pick(("gabled", "canted", "gabled", "none"))
-        self.bay_width = d.uniform(2.6, 3.2, 2)
-        self.bay_reach = d.uniform(0.6, 1.0, 2)
-        self.doors_inside = d.chance(0.5)
-        self.porch_reach = d.uniform(1.1, 1.5, 2)
-        self.garages = d.pick(("none", "flat", "shed", "hip"))
-        self.garage_width = d.uniform(2.9, 3.4, 2)
-        self.chimneys = d.pick(("middle", "ends"))
+    """The pair of semi-detached houses: mirrored halves under one roof."""
 
     def build(self) -> None:
         """Builds the pair on a rectangle."""

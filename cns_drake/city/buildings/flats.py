@@ -15,7 +15,7 @@ from cns_drake.city.facades import (
     tiers,
     wings,
 )
-from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.facades.walls import Band, Facade, Layout, Relief
@@ -26,27 +26,6 @@ from cns_drake.city.geometry.structures import MeshShape
 
 class CourtBlock(Building):
     """The court block: ranges around a court under a mansard with dormers."""
-
-    def draw(self, d: Dice) -> None:
-        range_depth = d.uniform(10.0, 12.5)
-        # The court has walls too.
-        run = 1.3 * d.site.open_length
-        self.shape = "U" if d.width > 30.0 and d.chance(0.7) else "L"
-        self.mirrored = d.chance(0.5)
-        self.wing = round(min(range_depth, 0.34 * d.width), 1)
-        self.back = round(min(range_depth + 0.8, 0.5 * d.depth), 1)
-        self.ground_height = d.uniform(3.8, 4.4, 2)
-        self.storey_height = d.uniform(3.0, 3.4)
-        self.pitch = max(d.uniform(2.4, 3.2), run / 52)
-        self.window_width = d.uniform(0.95, 1.25, 2)
-        self.recess = d.uniform(0.15, 0.28, 2)
-        self.oriel_every = d.whole(2, 5)
-        self.oriel_reach = d.uniform(0.7, 1.0, 2)
-        self.mansard_height = d.uniform(3.6, 4.8, 1)
-        self.mansard_inset = d.uniform(1.6, 2.2, 2)
-        self.dormer_pitch = max(d.uniform(4.5, 6.5), run / 26)
-        self.chimneys = d.whole(3, 7)
-        self.gate_height = d.uniform(3.2, 3.6, 2)
 
     def build(self) -> None:
         """Builds the block on a rectangle, its court open to the back."""
@@ -162,35 +141,7 @@ _FRONT_M, _BACK_M = 1.5, 0.5
 
 
 class WalkUp(Building):
-    """The walk-up: brick flats around a stair, bay fronts, a raised entrance.
-
-    Attributes:
-        section: wanted length of front for each stair.
-        bay_reach: how far the bays of the front stand out; 0 for none.
-        arched: whether the windows of the ground floor are arched.
-    """
-
-    def draw(self, d: Dice) -> None:
-        depth = d.depth - _FRONT_M - _BACK_M
-        blind = bool({1, 3} & d.site.blind_edges)
-        hipped = not blind and depth < 16.0 and d.chance(0.4)
-        rise = 0.3 * min(depth, d.width) if hipped else 0.0
-        if d.height - rise < 7.0:
-            rise = 0.0
-        self.roof = "hip" if rise > 0 else "flat"
-        self.rise = round(rise, 2)
-        self.floor = d.uniform(0.5, 1.1, 2)
-        self.storey = d.uniform(2.8, 3.1)
-        self.section = d.uniform(11.0, 15.0)
-        self.bay_reach = d.pick((0.0, 0.4, 0.6))
-        self.pitch = max(d.uniform(2.1, 2.8), (d.width + depth) / 17)
-        self.window_width = d.uniform(1.0, 1.5, 2)
-        self.recess = d.uniform(0.14, 0.26, 2)
-        self.arched = d.chance(0.3)
-        self.ledge = d.pick((0.0, 0.08))
-        self.hood = d.pick((0.0, 0.08))
-        self.cornice = d.uniform(0.15, 0.45, 2)
-        self.roof_items = d.some_of("stair_house vents tank skylight", 1, 5)
+    """The walk-up: brick flats around a stair, behind a raised entrance."""
 
     def build(self) -> None:
         """Builds the flats on a rectangle."""
@@ -333,26 +284,7 @@ _FLOOR = 0.3
 
 
 class GardenFlats(Building):
-    """Flats in a garden: staggered houses under gables, stacks of verandas.
-
-    Attributes:
-        pitch_deg: wanted slope of the roofs.
-        section: wanted length of front for each house of the group.
-        stagger: distance by which every other house stands back.
-        crossed: whether every other house turns its gable to the front.
-    """
-
-    def draw(self, d: Dice) -> None:
-        self.roof = d.pick(("gable", "gable", "hip"))
-        self.pitch_deg = d.uniform(22.0, 34.0)
-        self.section = d.uniform(11.0, 15.0)
-        self.stagger = round(d.uniform(0.0, 0.16) * d.depth, 2)
-        self.crossed = d.chance(0.5)
-        self.window_pitch = max(d.uniform(2.6, 3.4), d.width / 12)
-        self.window_width = d.uniform(1.1, 1.6, 2)
-        self.veranda_width = d.uniform(2.8, 4.0, 2)
-        self.veranda_reach = d.uniform(1.4, 1.9, 2)
-        self.casing = d.pick(("frame", "sill")) if d.width < 20.0 else "sill"
+    """Flats in a garden: staggered houses under gables, stacks of verandas."""
 
     def build(self) -> None:
         """Builds the group along the front of a rectangle."""

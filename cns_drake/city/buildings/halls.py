@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs, wings
-from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import (
@@ -23,27 +23,7 @@ _RECESS = 0.15
 
 
 class Barn(Building):
-    """The barn or boat house: timber boards, wide doors, a lean-to.
-
-    Attributes:
-        wall: height of the walls, as a part of the ridge's.
-        deck: room in front, a jetty of a boat house; 0 for a barn.
-        aisle: width of the lean-to on one side; 0 for none.
-        batten: distance between battens.
-    """
-
-    def draw(self, d: Dice) -> None:
-        width = min(d.width, d.depth)
-        aisle = d.uniform(0.2, 0.28) * width
-        self.roof = d.pick(("gambrel", "gable", "gable", "barrel"))
-        self.wall = d.uniform(0.42, 0.58)
-        self.deck = d.pick((0.0, 0.0, 2.0)) if d.depth > 10.0 else 0.0
-        self.door_width = d.uniform(2.6, 4.4, 2)
-        self.door_height = d.uniform(2.4, 3.4, 2)
-        self.aisle = round(aisle, 2) if d.chance(0.6) and width > 9 else 0.0
-        self.aisle_left = d.chance(0.5)
-        self.batten = d.uniform(1.0, 1.6)
-        self.ventilators = d.whole(0, 3)
+    """The barn or boat house: timber boards, wide doors, a lean-to."""
 
     def build(self) -> None:
         """Builds the barn along the longer side of a rectangle."""
@@ -189,31 +169,7 @@ _SPORTS_HALL_MARGIN = 0.6
 
 
 class SportsHall(Building):
-    """The sports hall: a wide roof on outer frames, a low front, high windows.
-
-    Attributes:
-        roof: `barrel`, `gable`, `shed` or `butterfly` (two sheds that
-            fall to the middle).
-        wall: height of the walls, as a part of the ridge's.
-        bay: distance between the frames.
-        annex: depth of the low front; 0 for none.
-        glazed: whether the gables are glazed.
-    """
-
-    def draw(self, d: Dice) -> None:
-        depth = d.depth
-        self.roof = d.pick(("barrel", "gable", "shed", "butterfly"))
-        self.wall = d.uniform(0.58, 0.7)
-        self.bay = max(d.uniform(5.0, 7.5), (d.width + depth) / 18)
-        self.frame_reach = d.uniform(0.35, 0.6, 2)
-        self.annex = (
-            round(min(d.uniform(5.0, 8.0), 0.3 * depth), 2)
-            if d.chance(0.8)
-            else 0.0
-        )
-        self.annex_height = round(min(d.uniform(3.4, 4.2), 0.5 * d.height), 2)
-        self.glazed = d.chance(0.6)
-        self.roof_items = d.some_of("air_handler vents ac_unit", 1, 4)
+    """The sports hall: a wide roof on frames, a low front, high windows."""
 
     def build(self) -> None:
         """Builds the hall on a rectangle, its entrance in front."""
@@ -342,22 +298,6 @@ class WaterfrontHall(Building):
 
     `roof` is `gable`, `barrel` or `sawtooth`; the ridge is at `height`.
     """
-
-    def draw(self, d: Dice) -> None:
-        roof = d.pick(("gable", "barrel", "sawtooth"))
-        dock = d.uniform(2.5, 4.0, 1)
-        depth = d.depth - dock
-        self.roof = roof
-        self.eaves = round(d.height * d.uniform(0.6, 0.7), 1)
-        self.spans = max(1, round(depth / d.uniform(16.0, 22.0)))
-        self.pitch = max(d.uniform(4.5, 6.0), (d.width + depth) / 15)
-        self.pier_width = d.uniform(0.6, 0.9, 2)
-        self.pier_reach = d.uniform(0.2, 0.34, 2)
-        self.window_depth = d.uniform(0.2, 0.35, 2)
-        self.door_every = d.whole(2, 4)
-        self.dock_depth = dock
-        self.dock_height = d.uniform(0.9, 1.2, 2)
-        self.ventilators = d.whole(3, 7)
 
     def build(self) -> None:
         """Builds the hall on a rectangle, its dock at the front."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cns_drake.city.facades import bays, details, house_walls, massing, roofs
-from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Patch
@@ -14,25 +14,7 @@ _FRONT_M, _BACK_M = 0.4, 0.1
 
 
 class ShopStrip(Building):
-    """The strip of shops: low flat-roofed units side by side, each its own.
-
-    Attributes:
-        ground: height of the shops without their parapets.
-        upper: part of the units with an upper floor, where height
-            allows.
-        canopy: whether one canopy runs along all shops, else awnings.
-        steps: difference between parapets.
-    """
-
-    def draw(self, d: Dice) -> None:
-        ground = round(min(d.uniform(3.6, 4.2), d.height - 0.5), 2)
-        self.unit_width = d.uniform(5.5, 9.0)
-        self.ground = ground
-        self.upper = d.uniform(0.2, 0.7)
-        self.canopy = d.chance(0.45)
-        self.canopy_reach = d.uniform(0.9, 1.3, 2)
-        self.steps = d.uniform(0.3, 0.6, 2)
-        self.roof_items = d.some_of("ac_unit ac_unit vents skylight", 1, 5)
+    """The strip of shops: low flat-roofed units side by side, each its own."""
 
     def build(self) -> None:
         """Builds the strip along the front of a rectangle."""
@@ -114,26 +96,7 @@ _COUNTER = 1.05
 
 
 class KioskRow(Building):
-    """The row of kiosks: small stalls with counters behind a common arcade.
-
-    Attributes:
-        stall: wanted width of a stall.
-        gap: distance between groups of stalls.
-        group: stalls built wall to wall.
-        arcade: reach of a roof on posts in front; 0 for awnings.
-        tower: whether one stall carries a lantern.
-    """
-
-    def draw(self, d: Dice) -> None:
-        depth = d.depth
-        arcade = d.uniform(1.6, 2.4, 2)
-        self.stall = d.uniform(2.8, 4.2)
-        self.depth = round(min(d.uniform(2.8, 4.2), depth - 3.0), 2)
-        self.gap = d.uniform(0.8, 1.8, 2)
-        self.group = d.whole(1, 4)
-        self.roof = d.pick(("hip", "gable", "barrel", "shed"))
-        self.arcade = arcade if d.chance(0.5) else 0.0
-        self.tower = d.height > 4.6 and d.chance(0.6)
+    """The row of kiosks: small stalls with counters behind a common arcade."""
 
     def build(self) -> None:
         """Builds the row along the front of a rectangle."""
@@ -226,35 +189,7 @@ _RECESS = 0.25
 
 
 class Supermarket(Building):
-    """The supermarket: a low hall, a glazed front under a canopy, a dock.
-
-    Attributes:
-        entrance: `tower` (a box), `gable` or `vault` above the doors.
-        entrance_at: its place along the front, a part of it.
-        canopy: reach of the canopy along the front.
-        pitch: distance between the pilasters.
-        dock_depth: depth of the dock beside the hall; 0 for none.
-        shelters: roofs for trolleys, in front.
-    """
-
-    def draw(self, d: Dice) -> None:
-        width = d.width
-        entrance = min(d.uniform(7.0, 11.0), 0.4 * width)
-        self.eaves = round(min(d.uniform(5.0, 6.5), 0.75 * d.height), 2)
-        self.entrance = d.pick(("tower", "gable", "vault"))
-        self.entrance_at = d.uniform(0.25, 0.75)
-        self.entrance_width = round(entrance, 1)
-        self.canopy = d.uniform(2.2, 3.2, 2)
-        self.pitch = max(d.uniform(5.0, 7.0), width / 9)
-        self.dock_left = d.chance(0.5)
-        self.dock_depth = 4.5 if width > 32.0 and d.chance(0.8) else 0.0
-        self.shelters = d.whole(0, 3)
-        self.roof_items = d.some_of(
-            "air_handler air_handler cooling_tower skylight skylight skylight "
-            "ac_unit vents",
-            4,
-            9,
-        )
+    """The supermarket: a low hall, a glazed front under a canopy, a dock."""
 
     def build(self) -> None:
         """Builds the hall on a rectangle, its entrance in front."""

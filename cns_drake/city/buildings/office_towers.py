@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building, Dice, Site
+from cns_drake.city.facades.assembly import Building, Site
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import (
     Band,
@@ -20,33 +20,7 @@ from cns_drake.city.geometry.structures import MeshShape
 
 
 class BandedTower(Building):
-    """The banded office tower: round corners, bands of glass, gardens between.
-
-    Attributes:
-        corners: which corners of the rectangle are round.
-        stacks: number of stacks of storeys, with an open floor between
-            two.
-        taper: distance by which every other stack is smaller.
-        spandrel: height of the bands between the glass.
-        ledge: how far a sunshade above the glass sticks out.
-        fins: distance between upright fins; 0 for none.
-    """
-
-    def draw(self, d: Dice) -> None:
-        side = massing.shortest_side(d.site.outline)
-        self.radius = round(d.uniform(0.18, 0.42) * side, 2)
-        self.corners = d.pick(((0, 1, 2, 3), (0, 2), (0, 1), (1,)))
-        self.stacks = int(np.clip(round(d.height / d.uniform(24, 40)), 1, 3))
-        self.taper = d.uniform(0.03, 0.08) * side
-        self.lobby = d.uniform(5.0, 7.5, 2)
-        self.storey = d.uniform(3.5, 4.0)
-        self.spandrel = d.uniform(0.9, 1.3, 2)
-        self.ledge = d.pick((0.15, 0.5, 0.8))
-        self.recess = d.uniform(0.2, 0.4, 2)
-        self.fins = d.pick((0.0, 5.0, 7.0))
-        self.roof_items = d.some_of(
-            "lift_house cooling_tower air_handler ac_unit mast", 2, 6
-        )
+    """The banded office tower: round corners, bands of glass, gardens."""
 
     def build(self) -> None:
         """Builds the tower on a rectangle."""
@@ -187,38 +161,7 @@ class _Stack:
 
 
 class GridTower(Building):
-    """The gridded office tower: deep frames, plant floors, offset slabs.
-
-    Attributes:
-        plan: `box`, `offset` (two slabs that slide past each other) or
-            `notched`.
-        shift: how far slabs slide, or size of notches, as a part of the
-            depth.
-        pier, beam: what the frames leave of wall beside and below
-            windows.
-        double: whether each frame spans two storeys.
-        waist: where a plant floor interrupts the grid, as a part of the
-            height; 0 for none.
-        crown: height of the screen around the roof.
-    """
-
-    def draw(self, d: Dice) -> None:
-        self.plan = d.pick(("box", "offset", "notched"))
-        self.shift = d.uniform(0.1, 0.18)
-        self.lobby = d.uniform(5.5, 8.0, 2)
-        self.storey = d.uniform(3.5, 4.0)
-        self.pitch = max(d.uniform(3.4, 5.0), d.site.open_length / 28)
-        self.pier = d.uniform(0.5, 0.9, 2)
-        self.beam = d.uniform(0.5, 0.9, 2)
-        self.recess = d.uniform(0.4, 0.8, 2)
-        self.double = d.chance(0.4)
-        self.waist = d.uniform(0.45, 0.65) if d.height > 55.0 else 0.0
-        self.crown = d.uniform(2.4, 4.5, 2)
-        self.roof_items = d.some_of(
-            "lift_house cooling_tower air_handler cooling_tower mast ac_unit",
-            3,
-            7,
-        )
+    """The gridded office tower: deep frames, plant floors, offset slabs."""
 
     @property
     def margin(self) -> float:
@@ -317,36 +260,7 @@ _LIFT_M = 2.0
 
 
 class UnfinishedTower(Building):
-    """The tower under construction: core, concrete frame, scaffolds, cladding.
-
-    Attributes:
-        storeys: slabs above the ground.
-        group: storeys that are placed as one.
-        core: extent of the core, as parts of the plan.
-        clad: storeys whose walls are finished.
-        scaffolds: edges with a scaffold.
-        scaffold_top: storeys it covers.
-        nets: part of the scaffold's bays behind a net.
-        props: whether the top slab is still propped.
-        hoist: whether a hoist climbs the back.
-    """
-
-    def draw(self, d: Dice) -> None:
-        rise = d.height - d.uniform(3.5, 5.5)
-        storeys = max(3, round(rise / d.uniform(3.4, 4.0)))
-        group = -(-storeys // 8)
-        storeys = group * max(2, round(storeys / group))
-        self.storeys = storeys
-        self.storey = round(rise / storeys, 3)
-        self.pitch = d.uniform(6.0, 8.0)
-        self.core = (d.uniform(0.28, 0.4), d.uniform(0.28, 0.4))
-        self.group = group
-        self.clad = group * d.whole(0, max(1, storeys // group // 2))
-        self.scaffolds = d.pick(((0,), (0, 1), (0, 3), (1, 3)))
-        self.scaffold_top = min(d.whole(storeys // 2, storeys), 8)
-        self.nets = d.uniform(0.2, 0.7)
-        self.props = d.chance(0.7)
-        self.hoist = d.chance(0.6)
+    """The tower under construction: core, frame, scaffolds, cladding."""
 
     def build(self) -> None:
         """Builds the tower on a rectangle."""

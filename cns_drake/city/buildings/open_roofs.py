@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs
-from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.details import add_railing
 from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import equip_roof
@@ -18,28 +18,7 @@ _RECESS = 0.18
 
 
 class GasStation(Building):
-    """The gas station: pumps under a canopy, a shop, a car wash, a price sign.
-
-    Attributes:
-        fascia: height of the canopy's edge.
-        sloped: whether the canopy is a pair of raised wings.
-        lanes, pumps: rows of pumps, and pumps in each row.
-        wash: whether a car wash stands beside the shop.
-        mirrored: whether the car wash and the sign are on the left.
-    """
-
-    def draw(self, d: Dice) -> None:
-        width, depth = d.width, d.depth
-        self.canopy_top = round(min(d.height, d.uniform(5.0, 5.8)), 2)
-        self.fascia = d.uniform(0.6, 1.0, 2)
-        self.sloped = d.chance(0.35)
-        self.lanes = 2 if depth > 24.0 else 1
-        self.pumps = int(np.clip((width - 8.0) / 6.5, 1, 4))
-        self.shop_depth = round(min(d.uniform(6.0, 9.0), 0.36 * depth), 2)
-        self.shop_height = d.uniform(3.6, 4.3, 2)
-        self.wash = width > 26.0 and d.chance(0.7)
-        self.mirrored = d.chance(0.5)
-        self.roof_items = d.some_of("ac_unit vents ac_unit", 1, 4)
+    """The gas station: pumps under a canopy, a shop, a car wash and prices."""
 
     def build(self) -> None:
         """Builds the station on a rectangle, its forecourt in front."""
@@ -166,29 +145,7 @@ _EAVES_M = 0.6
 
 
 class ParkPavilion(Building):
-    """The park pavilion: a bandstand, a shelter with tables, or a tea house.
-
-    Attributes:
-        form: `bandstand` (open, round), `tea_house` (glazed, round) or
-            `shelter` (open, long).
-        eaves: height of the posts above the deck.
-        bell: whether the roof is bent like a bell.
-    """
-
-    def draw(self, d: Dice) -> None:
-        ratio = d.width / d.depth
-        long = not 0.67 < ratio < 1.5
-        floor = d.uniform(0.3, 0.9, 2)
-        self.form = (
-            "shelter"
-            if long
-            else d.pick(("bandstand", "bandstand", "tea_house", "shelter"))
-        )
-        self.sides = d.pick((6, 8, 8))
-        self.floor = floor
-        self.eaves = round(max(2.2, 0.5 * (d.height - floor)), 2)
-        self.lantern = d.height > 5.0 and d.chance(0.5)
-        self.bell = d.chance(0.5)
+    """The park pavilion: a bandstand, a shelter with tables, or a tea house."""
 
     def build(self) -> None:
         """Builds the pavilion in the middle of a rectangle."""

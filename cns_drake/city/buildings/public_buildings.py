@@ -3,7 +3,7 @@
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
-from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade
@@ -15,42 +15,7 @@ _RECESS = 0.16
 
 
 class School(Building):
-    """The school: classroom wings, a glazed entrance, a gymnasium.
-
-    Attributes:
-        depth: depth of the classroom wing.
-        wing: whether there is a wing behind.
-        mirrored: whether gymnasium and wing stand on the left.
-        gym: width of the gymnasium; 0 for none.
-        pitch: width of a classroom's window group.
-        entrance: width of the glazed hall.
-    """
-
-    def draw(self, d: Dice) -> None:
-        width, depth = d.width, d.depth
-        deep = min(d.uniform(9.0, 12.0), depth - 4.5)
-        rise = round(d.uniform(0.26, 0.36) * deep, 2)
-        roof = d.pick(("hip", "flat", "flat"))
-        body = d.height - (rise if roof == "hip" else 2.4)
-        if body < 3.6:
-            roof, body = "flat", d.height - 1.0
-        gym = 0.0
-        if width > 34.0 and depth > 16.0:
-            gym = round(d.uniform(0.3, 0.38) * width, 1)
-        self.roof = roof
-        self.rise = rise
-        self.storeys = int(np.clip(round(body / 3.5), 1, 4))
-        self.depth = round(deep, 1)
-        self.wing = depth > 22.0 and d.chance(0.8)
-        self.mirrored = d.chance(0.5)
-        self.gym = min(gym, 28.0)
-        self.gym_roof = d.pick(("barrel", "shed", "flat"))
-        self.pitch = max(d.uniform(3.2, 4.4), width / 15)
-        self.mullions = d.whole(1, 3)
-        self.entrance = d.uniform(4.5, 6.5, 1)
-        self.roof_items = d.some_of(
-            "air_handler vents skylight skylight vents", 2, 6
-        )
+    """The school: classroom wings, a glazed entrance, a gymnasium."""
 
     def build(self) -> None:
         """Builds the school on a rectangle, its entrance in front."""
@@ -178,32 +143,7 @@ _THICK = 0.2
 
 
 class Chapel(Building):
-    """The chapel: a nave under a steep roof, a tower or a bell cote, a porch.
-
-    Attributes:
-        belfry: `front` (a tower in the middle of the front), `side` (a
-            tower beside the nave) or `cote` (a bell gable on the roof).
-        tower: side of the tower.
-        nave: width of the nave, as a part of the site's.
-        bay: distance between the side windows.
-        porch: whether the door has a porch (with a cote or a side
-            tower).
-        annex: whether a vestry stands beside the choir.
-    """
-
-    def draw(self, d: Dice) -> None:
-        width = min(d.width, d.depth, 18.0)
-        small = d.height < 13.0
-        self.belfry = "cote" if small else d.pick(("front", "side", "front"))
-        self.spire = d.pick(("needle", "broach", "cap"))
-        self.tower = round(d.uniform(0.24, 0.3) * width + 0.6, 2)
-        self.nave = d.uniform(0.62, 0.72)
-        self.pitch_deg = d.uniform(44.0, 54.0)
-        self.bay = d.uniform(2.8, 3.8)
-        self.buttresses = d.chance(0.5)
-        self.porch = d.chance(0.7)
-        self.annex = d.chance(0.6)
-        self.mirrored = d.chance(0.5)
+    """The chapel: a nave under a steep roof, a tower or a cote, a porch."""
 
     def build(self) -> None:
         """Builds the chapel along the longer side of a rectangle.

@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building, Dice, Site
+from cns_drake.city.facades.assembly import Building, Site
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade, Relief
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
@@ -20,19 +20,6 @@ _ROOF_ITEMS = ("tank", "tank", "mast", "vents", "stair_house", "dish")
 
 class SlabTower(Building):
     """The concrete slab: loggias, a stair tower, pilotis, a low pavilion."""
-
-    def draw(self, d: Dice) -> None:
-        self.ground_height = d.uniform(4.2, 5.2, 2)
-        self.storey_height = d.uniform(2.9, 3.2)
-        self.depth = round(min(d.depth, d.uniform(13.0, 17.0)), 1)
-        self.at_back = d.chance(0.5)
-        self.stair_width = d.uniform(4.0, 6.0, 1)
-        self.stair_left = d.chance(0.5)
-        self.pitch = max(d.uniform(3.4, 5.0), d.width / 11)
-        self.loggia_depth = d.uniform(1.2, 1.7, 2)
-        self.rail = d.uniform(0.9, 1.1, 2)
-        self.window_recess = d.uniform(0.15, 0.3, 2)
-        self.pavilion_height = d.uniform(4.0, 5.5, 1)
 
     def build(self) -> None:
         """Builds the slab along x on a rectangle."""
@@ -124,35 +111,7 @@ _FRONT_M = 1.7
 
 
 class BalconyFlats(Building):
-    """The white slab of flats: stacks of balconies, staggered sections.
-
-    Attributes:
-        sections: parts of the slab, each with its own stair.
-        stagger: distance by which every other section stands back.
-        step: storeys by which every other section is lower.
-        balconies: `stacks` (one above the other), `ribbons` (all along
-            the front) or `checks` (every other one left out).
-        stair: `slit` (a strip of glass) or `tower` (stands out in
-            front).
-    """
-
-    def draw(self, d: Dice) -> None:
-        room = d.depth - _FRONT_M - 0.3
-        stagger = d.pick((0.0, 0.0, 1.5, 2.4)) if room > 12.0 else 0.0
-        self.sections = int(np.clip(round(d.width / 18.0), 1, 3))
-        self.stagger = stagger
-        self.step = d.whole(0, 2)
-        self.depth = round(min(room - stagger, d.uniform(11.0, 14.0)), 1)
-        self.storey = d.uniform(2.8, 3.1)
-        self.pitch = max(d.uniform(2.8, 3.6), d.width / 16)
-        self.window_width = d.uniform(1.3, 2.0, 2)
-        self.recess = d.uniform(0.12, 0.22, 2)
-        self.balcony_width = d.uniform(2.8, 3.8, 2)
-        self.balcony_reach = d.uniform(1.1, 1.5, 2)
-        self.balconies = d.pick(("stacks", "ribbons", "checks"))
-        self.rail = d.uniform(0.9, 1.1, 2)
-        self.stair = d.pick(("slit", "tower"))
-        self.roof_items = d.some_of("stair_house tank mast vents dish", 1, 6)
+    """The white slab of flats: stacks of balconies, staggered sections."""
 
     def build(self) -> None:
         """Builds the slab along the front of a rectangle."""
@@ -340,32 +299,7 @@ def _runs(
 
 
 class GalleryFlats(Building):
-    """The bar of flats: open galleries in front of the doors, loggias behind.
-
-    Attributes:
-        gallery_front: whether the galleries look to the street, else
-            the loggias do.
-        depth: depth of the bar between galleries and loggias.
-        pitch: width of a flat.
-        panels: part of the galleries' bays with a screen.
-    """
-
-    def draw(self, d: Dice) -> None:
-        gallery = d.uniform(1.4, 1.8, 2)
-        room = d.depth - gallery
-        self.gallery_front = d.chance(0.5)
-        self.depth = round(min(room, d.uniform(10.0, 13.0)), 2)
-        self.gallery = gallery
-        self.storey = d.uniform(2.8, 3.0)
-        self.pitch = max(d.uniform(4.8, 6.4), d.width / 12)
-        self.loggia = d.uniform(1.1, 1.5, 2)
-        self.rail = d.uniform(0.95, 1.1, 2)
-        self.recess = d.uniform(0.12, 0.2, 2)
-        self.stair_left = d.chance(0.5)
-        self.stair_width = d.uniform(3.2, 4.2, 2)
-        self.panels = d.uniform(0.15, 0.5)
-        self.ground = d.uniform(3.0, 3.6, 2)
-        self.roof_items = d.some_of("vents tank mast dish", 2, 5)
+    """The bar of flats: galleries before the doors, loggias behind."""
 
     def build(self) -> None:
         """Builds the bar along x on a rectangle."""

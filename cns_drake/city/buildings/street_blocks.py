@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade, Relief
 from cns_drake.city.geometry.mesh import Mesh
@@ -16,37 +16,6 @@ _MOST_FLIGHTS = 8
 
 class BrickBlock(Building):
     """The old brick block: punched windows, fire stairs, a water tower."""
-
-    def draw(self, d: Dice) -> None:
-        storey = d.uniform(3.1, 3.7)
-        free = [
-            k
-            for k in range(1, len(d.site.outline))
-            if k not in d.site.blind_edges
-        ]
-        items = ["stair_house", "vents", "ac_unit", "skylight"]
-        if d.chance(0.6):
-            items.insert(0, "water_tower")
-        style = d.whole(0, 4)
-        self.ground_height = d.uniform(4.0, 4.8, 2)
-        self.storey_height = storey
-        self.pitch = max(d.uniform(2.3, 3.4), d.site.open_length / 46)
-        self.window_width = d.uniform(1.0, 1.6, 2)
-        self.sill = d.uniform(0.75, 0.95, 2)
-        self.head = d.uniform(2.4, 2.7, 2)
-        self.recess = d.uniform(0.18, 0.35, 2)
-        self.mullions = 1 if style == 0 else 0
-        self.transom = 1.65 if style == 1 else None
-        self.ledge = 0.12 if style == 2 else 0.0
-        self.hood = 0.12 if style == 3 else 0.0
-        self.sill_course = 0.1 if style < 2 else 0.0
-        self.corbels = d.chance(0.4)
-        self.pilasters = d.chance(0.5)
-        self.cornice_reach = d.uniform(0.5, 1.0, 2)
-        self.parapet = d.uniform(0.7, 1.3, 2)
-        self.stairs_edge = d.pick(free) if free else None
-        self.stairs_at = d.uniform(0.3, 0.7)
-        self.roof_items = tuple(items)
 
     def build(self) -> None:
         """Builds the block on any outline."""
@@ -133,23 +102,6 @@ class CornerBuilding(Building):
     `corner` is the rounded corner of the rectangle (0: front left,
     1: front right) and `radius` its radius.
     """
-
-    def draw(self, d: Dice) -> None:
-        side = min(d.width, d.depth)
-        self.corner = d.pick(d.site.free_corners or [0, 1])
-        self.radius = round(d.uniform(0.3, 0.42) * min(side, 24.0), 1)
-        self.ground_height = d.uniform(4.6, 5.4, 2)
-        self.first_height = d.uniform(4.2, 4.8, 2)
-        self.storey_height = d.uniform(3.3, 3.8)
-        self.pitch = max(d.uniform(2.5, 3.2), d.site.open_length / 36)
-        self.window_width = d.uniform(1.1, 1.5, 2)
-        self.recess = d.uniform(0.22, 0.4, 2)
-        self.hood = 0.1 * d.chance(0.4)
-        self.pilasters = d.chance(0.6)
-        self.balcony = d.chance(0.7)
-        self.dome = d.pick(("dome", "cone", "lantern"))
-        self.dome_height = round(d.uniform(0.17, 0.24) * d.height, 1)
-        self.cornice_reach = d.uniform(0.5, 0.9, 2)
 
     def build(self) -> None:
         """Builds the house on a rectangle."""
@@ -289,24 +241,6 @@ class Office(Building):
     `grooves` (piers from the first floor to the top).
     """
 
-    def draw(self, d: Dice) -> None:
-        run = d.site.open_length
-        tall = d.height > 18.0
-        self.ground_height = d.uniform(4.4, 5.4, 2)
-        self.storey_height = d.uniform(3.4, 3.9)
-        self.style = d.pick(("ribbon", "frame", "grooves"))
-        self.pitch = max(d.uniform(3.0, 4.4), run / 42)
-        self.recess = d.uniform(0.25, 0.5, 2)
-        self.sill = d.uniform(0.75, 1.05, 2)
-        self.pier_reach = d.uniform(0.15, 0.32, 2)
-        self.penthouse_height = d.uniform(3.4, 4.4, 1) * tall
-        self.penthouse_inset = d.uniform(2.2, 4.0, 1)
-        self.parapet = d.uniform(0.6, 1.2, 2)
-        self.awnings = d.uniform(0.0, 0.7)
-        self.roof_items = d.some_of(
-            "air_handler lift_house ac_unit ac_unit vents dish", 3, 7
-        )
-
     def build(self) -> None:
         """Builds the office on any outline."""
         outline, blind = self.site.outline, self.site.blind_edges
@@ -384,31 +318,7 @@ def _add_penthouse(p: Office, outline: np.ndarray, roof: float) -> float:
 
 
 class CornerStore(Building):
-    """The corner store: a cut-off corner with the door, flats above the shop.
-
-    Attributes:
-        corner: 0 front left, 1 front right.
-        cut: length taken off each edge at the corner.
-        raised: rise of the parapet above the corner.
-        awnings: part of the shop windows with an awning.
-    """
-
-    def draw(self, d: Dice) -> None:
-        x0, y0, x1, y1 = d.site.bounds
-        raised = d.uniform(0.3, 0.9, 2)
-        ground = min(d.uniform(3.5, 4.1), d.height - raised - 0.7)
-        self.corner = d.pick(d.site.free_corners or [0, 1])
-        self.cut = round(min(d.uniform(2.0, 3.0), 0.3 * d.depth), 2)
-        self.ground = round(ground, 2)
-        self.storey = d.uniform(2.9, 3.3)
-        self.pitch = max(d.uniform(2.2, 3.0), (x1 - x0 + y1 - y0) / 20)
-        self.window_width = d.uniform(1.0, 1.5, 2)
-        self.recess = d.uniform(0.12, 0.25, 2)
-        self.ledge = d.pick((0.0, 0.1))
-        self.raised = raised
-        self.cornice = d.uniform(0.15, 0.4, 2)
-        self.awnings = d.uniform(0.2, 0.9)
-        self.roof_items = d.some_of("stair_house ac_unit vents", 1, 4)
+    """The corner store: a door across the corner, flats above the shop."""
 
     def build(self) -> None:
         """Builds the store on a rectangle."""

@@ -243,23 +243,6 @@ _HOTEL_ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
 class Hotel(Building):
     """The hotel: balconies along rounded walls, a forecourt, a rooftop bar."""
 
-    def draw(self, d: Dice) -> None:
-        depth = d.depth - _FORECOURT_M
-        pitch = max(d.uniform(3.6, 4.6), d.width / 11)
-        self.ground_height = d.uniform(5.0, 6.2, 2)
-        self.storey_height = d.uniform(3.1, 3.4)
-        self.round_ends = bool(d.chance(0.5) and d.width > 1.5 * depth)
-        self.corner = round(d.uniform(0.2, 0.35) * min(depth, d.width), 1)
-        self.pitch = pitch
-        self.side_pitch = max(2.7, (d.width + 2 * depth) / 34)
-        self.recess = d.uniform(0.2, 0.35, 2)
-        self.balcony_reach = d.uniform(1.1, 1.45, 2)
-        self.balcony_width = round(d.uniform(0.6, 0.95) * pitch, 2)
-        self.rail = d.uniform(0.95, 1.1, 2)
-        self.bar_height = d.uniform(4.0, 5.0, 1)
-        self.bar_inset = d.uniform(1.8, 3.0, 1)
-        self.sign_left = d.chance(0.5)
-
     def build(self) -> None:
         """Builds the hotel on a rectangle, behind a forecourt."""
         x0, y0, x1, y1 = self.site.bounds

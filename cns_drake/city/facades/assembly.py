@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades import massing
+from cns_drake.city.formulas import FUNCTIONS, value_of
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes, object_mesh
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
 
@@ -135,6 +136,7 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
         colours: part -> colours to draw from, or a part of the same colour.
         choices: colours that are drawn while it is built.
         materials: the parts that its pieces are gathered in.
+        parameters: name -> formula, in the order of the draws.
     """
 
     name: str
@@ -146,6 +148,7 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
     colours: dict[str, tuple[Rgb, ...] | str] = {}
     choices: dict[str, tuple[Rgb, ...]] = {}
     materials: tuple[str, ...] = ()
+    parameters: dict[str, Any] = {}
 
 
 # Plinths and pilasters may stand this far outside the footprint; above
@@ -315,8 +318,7 @@ class Building(Assembly, abc.ABC):
     """A building of an archetype: it draws its parameters, then builds itself.
 
     Functions that add something to a building take it as `p`: they find in it
-    its parameters, and gather in it what they make. Subclasses explain those of
-    their parameters that a name cannot; lengths are in metres.
+    its parameters, and gather in it what they make.
 
     Attributes:
         kind: its archetype.
@@ -348,9 +350,18 @@ class Building(Assembly, abc.ABC):
         self.glass_rgb = self.colours.setdefault("glass", self.glass_rgb)
         self.paint(**{part: self.colours[part] for part in kind.materials})
 
-    @abc.abstractmethod
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """The parameters are those of the archetype's description."""
+
     def draw(self, d: Dice) -> None:
-        """Draws the parameters but the colours."""
+        """Draws the parameters but the colours, as described by default."""
+        draws = (d.uniform, d.whole, d.chance, d.pick, d.some_of)
+        names = {**FUNCTIONS, "d": d, **{f.__name__: f for f in draws}}
+        for name, formula in self.kind.parameters.items():
+            names[name] = value_of(formula, names)
+            setattr(self, name, names[name])
 
     @abc.abstractmethod
     def build(self) -> None:

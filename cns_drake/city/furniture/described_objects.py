@@ -1,15 +1,15 @@
 """Objects that `objects.yaml` describes: parts, placed by formulas."""
 
 from collections.abc import Iterator, Mapping
-from functools import cache, partial
+from functools import partial
 import math
 from pathlib import Path
-from types import CodeType
 from typing import Any
 
 import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.city.formulas import FUNCTIONS, value_of
 from cns_drake.city.geometry.structures import (
     ROOT_DEPTH,
     Builder,
@@ -32,21 +32,6 @@ _PLAIN = frozenset({"name", "mesh", "repeat", "if", "draw", "parts"})
 _Names = dict[str, Any]
 
 
-@cache
-def _compiled(formula: str) -> CodeType:
-    return compile(formula.strip(), "objects.yaml", "eval")
-
-
-def _value(given: Any, names: _Names) -> Any:
-    """Returns the value of a formula, of each in a list, or a plain value."""
-    if isinstance(given, list):
-        return [_value(one, names) for one in given]
-    if isinstance(given, str):
-        # The formulas are the package's own, as those of an xacro file are.
-        return eval(_compiled(given), names)
-    return given
-
-
 def _functions(rng: np.random.Generator) -> _Names:
     """Returns what formulas know besides an object's own numbers."""
 
@@ -58,9 +43,10 @@ def _functions(rng: np.random.Generator) -> _Names:
         return np.round(np.multiply(rgb, tint), 3).tolist()
 
     return {
-        "__builtins__": {},
-        **{f.__name__: f for f in (max, round, math.cos, math.sin)},
+        **FUNCTIONS,
         **_COLOURS,
+        "cos": math.cos,
+        "sin": math.sin,
         "pi": math.pi,
         "uniform": uniform,
         "whole": lambda low, below: int(rng.integers(low, below)),
@@ -90,7 +76,7 @@ def _build(
         if name not in known:
             raise TypeError(f"there is no parameter {name}")
     for name, formula in known.items():
-        drawn = _value(formula, names)
+        drawn = value_of(formula, names)
         names[name] = parameters.get(name, drawn)
     return assemble(*_parts(entry, names))
 
@@ -98,17 +84,17 @@ def _build(
 def _parts(group: Mapping[str, Any], names: _Names) -> Iterator[Part]:
     """Yields the parts of a group, such as a whole object."""
     for name, formula in group.get("draw", {}).items():
-        names[name] = _value(formula, names)
+        names[name] = value_of(formula, names)
     if "parts" not in group:
         yield _part(group, names)
         return
     for entry in group["parts"]:
-        for k in range(_value(entry.get("repeat", 1), names)):
+        for k in range(value_of(entry.get("repeat", 1), names)):
             inner = dict(names)
             if "repeat" in entry:
                 inner["k"] = k
                 inner["spread"] = partial(_spread, k)
-            if _value(entry.get("if", True), inner):
+            if value_of(entry.get("if", True), inner):
                 yield from _parts(entry, inner)
 
 
@@ -119,7 +105,7 @@ def _spread(k: int, distance: float, count: int) -> float:
 
 def _part(entry: Mapping[str, Any], names: _Names) -> Part:
     given = {
-        key: _value(formula, names)
+        key: value_of(formula, names)
         for key, formula in entry.items()
         if key not in _PLAIN
     }
@@ -127,7 +113,8 @@ def _part(entry: Mapping[str, Any], names: _Names) -> Part:
     at = given.get("at", (0.0, 0.0, 0.0))
     rgb = triple(given["rgb"]) if "rgb" in given else None
     if "post" in given:
-        return post(name, *given["post"], (at[0], at[1]), rgb)
+        radius, height = given["post"]
+        return post(name, radius, height, (at[0], at[1]), rgb)
     if "bar" in given:
         return bar(name, given["from"], given["to"], given["bar"], rgb)
     if "box" in given:

@@ -1,0 +1,29 @@
+"""Formulas of the package's own YAML files, as xacro files have them."""
+
+from collections.abc import Mapping
+from functools import cache
+from types import CodeType
+from typing import Any
+
+# Functions that any formula may use; all others come with its numbers.
+FUNCTIONS: Mapping[str, Any] = {
+    "__builtins__": {},
+    **{f.__name__: f for f in (int, len, max, min, range, round)},
+}
+
+
+def value_of(given: Any, names: dict[str, Any]) -> Any:
+    """Returns the value of a formula, of each in a list, or a plain value.
+
+    Args:
+        given: a Python expression as text; anything else is its own value.
+        names: the numbers and functions that it may use.
+    """
+    if isinstance(given, list):
+        return [value_of(one, names) for one in given]
+    return eval(_compiled(given), names) if isinstance(given, str) else given
+
+
+@cache
+def _compiled(formula: str) -> CodeType:
+    return compile(formula.strip(), "a formula", "eval")
