@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cns_drake.base import terminal
-from cns_drake.base.terminal import example
+from cns_drake.base.terminal import example, number
 from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
 from evaluation.command_line.options import (
@@ -430,8 +430,8 @@ def ranking(
             strict=True,
         )
     ]
-    low, high = map(terminal.number, (found.interval.low, found.interval.high))
-    tau = f"{terminal.number(found.tau)}  (95 %: {low} to {high})"
+    low, high = map(number, (found.interval.low, found.interval.high))
+    tau = f"{number(found.tau)}  (95 %: {low} to {high})"
     rows = [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
     show(found.to_json(), rows, json=json)
 
@@ -476,31 +476,23 @@ def _chosen_method(
 def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     """Yields names and values of the results of `tcr`."""
     change = report.change
-    pair = f"{report.source} <-> {report.target}"
-    yield "pair", pair
-    yield "TCR_sym", terminal.number(change.symmetric)
+    source, target = report.source, report.target
+    yield "pair", f"{source} <-> {target}"
+    yield "TCR_sym", number(change.symmetric)
     if change.undefined_because:
         yield "  because", change.undefined_because
-    for label, names, side in (
-        ("TCR", (report.source, report.target), change.source_to_target),
-        ("TCR", (report.target, report.source), change.target_to_source),
+    for names, side in (
+        (f"{source} -> {target}", change.source_to_target),
+        (f"{target} -> {source}", change.target_to_source),
     ):
         counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
-        yield (
-            f"{label} {names[0]} -> {names[1]}",
-            f"{terminal.number(side.ratio)}  {counts}",
-        )
+        yield f"TCR {names}", f"{number(side.ratio)}  {counts}"
     if report.masked is not None:
-        yield (
-            "TCR_sym where both drove",
-            terminal.number(report.masked.symmetric),
-        )
+        yield "TCR_sym where both drove", number(report.masked.symmetric)
     if report.control is not None and report.control_names is not None:
-        value = terminal.number(report.control.symmetric)
-        yield (
-            "TCR_sym of the routes alone",
-            f"{value}  ({' <-> '.join(report.control_names)})",
-        )
+        names = " <-> ".join(report.control_names)
+        value = number(report.control.symmetric)
+        yield "TCR_sym of the routes alone", f"{value}  ({names})"
 
 
 def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
@@ -510,77 +502,60 @@ def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
         SUCCESS_TRANSLATION,
     )
 
-    metrics = result.metrics
+    metrics, outcomes, pose = result.metrics, result.outcomes, result.pose
+    with_match = metrics.num_with_match
     yield "method", result.method
     yield "database -> query", f"{result.database} -> {result.query}"
     yield "mode", metrics.mode
-    yield (
-        "queries, with a match (N)",
-        f"{metrics.num_queries}, {metrics.num_with_match}",
-    )
+    yield "queries, with a match (N)", f"{metrics.num_queries}, {with_match}"
     yield (
         "R@1",
-        f"{terminal.number(metrics.recall_at_1)}"
+        f"{number(metrics.recall_at_1)}"
         f"  {_interval_text(metrics.recall_at_1_interval)}"
-        f"  (TP {metrics.num_right} of N {metrics.num_with_match})",
+        f"  (TP {metrics.num_right} of N {with_match})",
     )
     for rank in (5, 10, 25):
-        yield f"R@{rank}", terminal.number(metrics.recall_at_n[rank - 1])
-    yield "R@1%", terminal.number(metrics.recall_at_1_percent)
+        yield f"R@{rank}", number(metrics.recall_at_n[rank - 1])
+    yield "R@1%", number(metrics.recall_at_1_percent)
     yield (
         "AUC",
-        f"{terminal.number(metrics.auc)}"
-        f"  {_interval_text(metrics.auc_interval)}",
+        f"{number(metrics.auc)}  {_interval_text(metrics.auc_interval)}",
     )
-    yield (
-        "AUC strict",
-        f"{terminal.number(metrics.auc_strict)}  (recall = TP / N)",
-    )
-    f1 = terminal.number(metrics.f1_max)
+    yield "AUC strict", f"{number(metrics.auc_strict)}  (recall = TP / N)"
+    f1 = number(metrics.f1_max)
+    curve = metrics.curve
     if metrics.f1_max_index is not None:
         index = metrics.f1_max_index
-        f1 += (
-            f"  (TP {metrics.curve.true_positives[index]},"
-            f" T {metrics.curve.counted[index]})"
-        )
+        f1 += f"  (TP {curve.true_positives[index]}, T {curve.counted[index]})"
     yield "F1max", f1
-    number = terminal.number(metrics.curve.recall_at_full_precision)
-    yield "recall at full precision", number
-    outcomes = result.outcomes
-    yield (
-        "mean reciprocal rank",
-        terminal.number(outcomes.mean_reciprocal_rank),
-    )
+    yield "recall at full precision", number(curve.recall_at_full_precision)
+    yield "mean reciprocal rank", number(outcomes.mean_reciprocal_rank)
     if not isnan(outcomes.match_auroc):
-        yield "match AUROC", terminal.number(outcomes.match_auroc)
+        yield "match AUROC", number(outcomes.match_auroc)
     yield (
         "AUC by radius",
         ", ".join(
-            f"{radius:g} m {terminal.number(auc)}"
+            f"{radius:g} m {number(auc)}"
             for radius, auc in result.auc_over_radius().items()
         ),
     )
-    pose = result.pose
     if not isnan(pose.success):
         yield (
             "translation error, median, 90 %",
-            f"{terminal.number(pose.translation_median)} m,"
-            f" {terminal.number(pose.translation_90)} m"
+            f"{number(pose.translation_median)} m,"
+            f" {number(pose.translation_90)} m"
             f"  ({pose.num_accepted} accepted matches)",
         )
         yield (
             "rotation error, median, 90 %",
-            f"{terminal.number(pose.rotation_median_deg)} deg,"
-            f" {terminal.number(pose.rotation_90_deg)} deg",
+            f"{number(pose.rotation_median_deg)} deg,"
+            f" {number(pose.rotation_90_deg)} deg",
         )
-        yield (
-            f"within {SUCCESS_TRANSLATION:g} m"
-            f" and {SUCCESS_ROTATION_DEG:g} deg",
-            f"{terminal.number(pose.success)}  (of N)",
-        )
+        limits = f"{SUCCESS_TRANSLATION:g} m and {SUCCESS_ROTATION_DEG:g} deg"
+        yield f"within {limits}", f"{number(pose.success)}  (of N)"
     yield "protocol", result.protocol.to_text()
 
 
 def _interval_text(interval: Interval) -> str:
-    low, high = terminal.number(interval.low), terminal.number(interval.high)
+    low, high = number(interval.low), number(interval.high)
     return f"[{low}, {high}]"
