@@ -418,17 +418,11 @@ def ranking(
     rows = [
         (
             method,
-            f"{one:.4f} {_interval_text(one_interval)}"
-            f"  {other:.4f} {_interval_text(other_interval)}",
+            f"{found.first[k]:.4f} {_interval_text(found.first_intervals[k])}"
+            f"  {found.second[k]:.4f}"
+            f" {_interval_text(found.second_intervals[k])}",
         )
-        for method, one, one_interval, other, other_interval in zip(
-            found.methods,
-            found.first,
-            found.first_intervals,
-            found.second,
-            found.second_intervals,
-            strict=True,
-        )
+        for k, method in enumerate(found.methods)
     ]
     low, high = map(number, (found.interval.low, found.interval.high))
     tau = f"{number(found.tau)}  (95 %: {low} to {high})"

@@ -77,7 +77,10 @@ class PlaceRecognition:
     def to_json(self) -> dict:
         """Returns all numbers; NaN becomes None."""
         metrics = self.metrics
-        index = metrics.f1_max_index
+        true_positives = counted = 0
+        if metrics.f1_max_index is not None:
+            true_positives = metrics.curve.true_positives[metrics.f1_max_index]
+            counted = metrics.curve.counted[metrics.f1_max_index]
         pose = asdict(self.pose)
         return {
             "method": self.method,
@@ -90,19 +93,11 @@ class PlaceRecognition:
             "recall_at_1": json_number(metrics.recall_at_1),
             "r1": json_number(metrics.recall_at_1),
             "recall_at_1_interval_95": metrics.recall_at_1_interval.to_json(),
-            "recall_at_n": [
-                json_number(float(value)) for value in metrics.recall_at_n
-            ],
-            "recall_at_1_percent": json_number(
-                float(metrics.recall_at_1_percent)
-            ),
+            "recall_at_n": list(map(json_number, metrics.recall_at_n.tolist())),
+            "recall_at_1_percent": json_number(metrics.recall_at_1_percent),
             "f1_max": metrics.f1_max,
-            "f1_max_true_positives": (
-                0 if index is None else int(metrics.curve.true_positives[index])
-            ),
-            "f1_max_counted": (
-                0 if index is None else int(metrics.curve.counted[index])
-            ),
+            "f1_max_true_positives": int(true_positives),
+            "f1_max_counted": int(counted),
             "queries": metrics.num_queries,
             "queries_with_match": metrics.num_with_match,
             "true_positives": metrics.num_right,

@@ -65,19 +65,12 @@ class RankAgreement:
             "interval_95": self.interval.to_json(),
             "methods": {
                 method: {
-                    "first": float(one),
-                    "second": float(other),
-                    "first_interval_95": one_interval.to_json(),
-                    "second_interval_95": other_interval.to_json(),
+                    "first": float(self.first[k]),
+                    "second": float(self.second[k]),
+                    "first_interval_95": self.first_intervals[k].to_json(),
+                    "second_interval_95": self.second_intervals[k].to_json(),
                 }
-                for method, one, other, one_interval, other_interval in zip(
-                    self.methods,
-                    self.first,
-                    self.second,
-                    self.first_intervals,
-                    self.second_intervals,
-                    strict=True,
-                )
+                for k, method in enumerate(self.methods)
             },
         }
 
