@@ -228,11 +228,9 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
     """Returns the box, along the axes, about a turned one."""
     x0, y0, x1, y1 = bounds
     corners = [
-        _turned_place(corner, turn_deg)
-        for corner in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+        _turned_place((x, y), turn_deg) for x in (x0, x1) for y in (y0, y1)
     ]
-    xs, ys = zip(*corners, strict=True)
-    return [min(xs), min(ys), max(xs), max(ys)]
+    return [*map(min, *corners), *map(max, *corners)]
 
 
 def kept_names(stages: Any, names: Sequence[str]) -> Any:

@@ -13,10 +13,10 @@ import tempfile
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
-from cns_drake.city.generation.city_structures import City, make_city
+from cns_drake.base.map_folder import MESH_FOLDER
+from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import render_stages
-from cns_drake.city.plan.stages import Stage, Stages, load_stages
+from cns_drake.city.plan.stages import Stage, load_stages
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import DriveSimulation
@@ -113,7 +113,15 @@ def _variants(
             continue
         # Drives share a world if their maps have the same name.
         path = folder / variant / source.path.resolve().name
-        _write_map(path, city, stages, first, plan, source)
+        whole = Stage(story="the whole city")
+        alone = stages.model_copy(update={"stages": {first: plan, "99": whole}})
+        files = render_stages(
+            source.name, city, alone, [first], source.stage_plan
+        )
+        (path / MESH_FOLDER).mkdir(parents=True)
+        shutil.copy(source.roads, path)
+        for name, text in files.items():
+            (path / name).write_text(text, encoding="utf-8")
         drives[variant] = earlier.model_copy(update={"map": str(path)})
     if earlier.aside:
         drives["no_aside"] = drives[_AS_IT_IS].model_copy(update={"aside": 0.0})
@@ -123,25 +131,6 @@ def _variants(
         for name in _TITLES
         if name in drives
     }
-
-
-def _write_map(
-    path: Path,
-    city: City,
-    stages: Stages,
-    stage: str,
-    plan: Stage,
-    source: MapFolder,
-) -> None:
-    """Writes a map folder with one stage."""
-    alone = stages.model_copy(
-        update={"stages": {stage: plan, "99": Stage(story="the whole city")}}
-    )
-    files = render_stages(source.name, city, alone, [stage], source.stage_plan)
-    (path / MESH_FOLDER).mkdir(parents=True)
-    shutil.copy(source.roads, path)
-    for name, text in files.items():
-        (path / name).write_text(text, encoding="utf-8")
 
 
 def effect_lines(effects: Sequence[Effect]) -> Iterator[str]:

@@ -108,33 +108,27 @@ def export_pairs(
         for one in every
     ]
     pairs = {}
+    cities = [(one.map, one.world) for one in every]
     if options.format == "overlap":
-        for two in itertools.permutations(every, 2):
-            if two[0].map == two[1].map and two[0].world == two[1].world:
-                name = f"{two[0].name} in {two[1].name}"
-                pairs[two[0].name, two[1].name] = part = Part(
-                    output / "parts" / f"{name}.data"
-                )
-                step = MakePart(
-                    part, compare_runs, (*map(DriveSimulation, two), options)
-                )
+        for i, j in itertools.permutations(range(len(every)), 2):
+            if cities[i] == cities[j]:
+                name = f"{names[i]} in {names[j]}"
+                part = Part(output / "parts" / f"{name}.data")
+                both = DriveSimulation(every[i]), DriveSimulation(every[j])
+                step = MakePart(part, compare_runs, (*both, options))
                 jobs.append(Job(f"overlap {name}", step, cost=_PAIR_COST))
+                pairs[names[i], names[j]] = part
     run_jobs(jobs, cluster)
     runs = {name: np.array(part.read()) for name, part in parts.items()}
     if options.format == "overlap":
         found = {key: part.read() for key, part in pairs.items()}
         return [_write_overlaps(output, runs, found)]
-    cities = list(dict.fromkeys((one.map, one.world) for one in every))
-    placed = {
-        one.name: Run(
-            f"runs/{one.name}",
-            runs[one.name],
-            cities.index((one.map, one.world)),
-        )
-        for one in every
-    }
-    learned = [placed[one.name] for one in scenarios]
-    tested = [placed[one.name] for one in held_out]
+    numbers = list(dict.fromkeys(cities))
+    placed = [
+        Run(f"runs/{name}", runs[name], numbers.index(city))
+        for name, city in zip(names, cities, strict=True)
+    ]
+    learned, tested = placed[: len(scenarios)], placed[len(scenarios) :]
     return _write_pickles(output, learned, tested)
 
 
@@ -230,20 +224,18 @@ def _write_pickles(
     output: Path, learned: Sequence[Run], tested: Sequence[Run]
 ) -> list[Path]:
     """Writes the pickles of PointNetVLAD, as MinkLoc3Dv2 reads them."""
-    written = []
-    for name, runs in (
-        ("training_queries_baseline2.pickle", learned),
-        ("test_queries_baseline2.pickle", tested or learned),
-    ):
-        written.append(output / name)
-        _pickle(written[-1], training_tuples(runs))
     database, queries = evaluation_sets(tested or learned)
-    for name, values in (
-        ("evaluation_database.pickle", database),
-        ("evaluation_query.pickle", queries),
-    ):
-        written.append(output / name)
-        _pickle(written[-1], values)
+    contents = {
+        "training_queries_baseline2": training_tuples(learned),
+        "test_queries_baseline2": training_tuples(tested or learned),
+        "evaluation_database": database,
+        "evaluation_query": queries,
+    }
+    written = []
+    for name, values in contents.items():
+        written.append(output / f"{name}.pickle")
+        with completing(written[-1]) as part, open(part, "wb") as stream:
+            pickle.dump(values, stream, protocol=pickle.HIGHEST_PROTOCOL)
     return written
 
 
@@ -254,20 +246,17 @@ def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
     tree = cKDTree(positions)
     near = tree.query_ball_point(positions, _POSITIVE)
     wide = tree.query_ball_point(positions, _NON_NEGATIVE)
-    found = {}
-    for number, file in enumerate(files):
-        values = {
-            "id": number,
-            "timestamp": number,
-            "rel_scan_filepath": file,
-            "positives": np.array(sorted({*near[number]} - {number}), int),
-            "non_negatives": np.array(sorted(wide[number]), int),
-            "position": positions[number],
-        }
-        kind = _tuple_class()
-        one = kind()
-        one.__dict__.update(values)
-        found[number] = one
+    kind = _tuple_class()
+    found = {number: kind() for number in range(len(files))}
+    for number, one in found.items():
+        one.__dict__.update(
+            id=number,
+            timestamp=number,
+            rel_scan_filepath=files[number],
+            positives=np.array(sorted({*near[number]} - {number}), int),
+            non_negatives=np.array(sorted(wide[number]), int),
+            position=positions[number],
+        )
     return found
 
 
@@ -306,11 +295,6 @@ def _tuple_class() -> type:
     sys.modules.setdefault("datasets", types.ModuleType("datasets"))
     sys.modules[_MODULE] = module
     return module.TrainingTuple
-
-
-def _pickle(path: Path, values: object) -> None:
-    with completing(path) as part, open(part, "wb") as stream:
-        pickle.dump(values, stream, protocol=pickle.HIGHEST_PROTOCOL)
 
 
 def _write_overlaps(
