@@ -219,8 +219,7 @@ def overlap(
         DriveSimulation(load_scenario(name))() for name in (database, query)
     )
     found = exact_overlaps(places, queries, protocol, terminal.track)
-    frames = compared_frames(places, queries, protocol)
-    write_overlaps(output, *frames, found)
+    write_overlaps(output, *compared_frames(places, queries, protocol), found)
     print(output)
 
 

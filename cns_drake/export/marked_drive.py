@@ -87,8 +87,7 @@ class MarkedDrive(McapDrive):
     def _absent_by_label(self) -> dict[int, list[int]]:
         groups = defaultdict(list)
         for instance, entry in self._absent.items():
-            label = moving_id(entry.get("class", ""))
-            groups[label].append(instance)
+            groups[moving_id(entry.get("class", ""))].append(instance)
         return groups
 
     def _map_folder(self) -> MapFolder:

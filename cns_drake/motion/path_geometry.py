@@ -233,8 +233,7 @@ class SmoothPath:
         last = round(self.end / self.spacing) - 1
         knot = (wanted / self.spacing).astype(int).clip(0, last)
         length = wanted - knot * self.spacing
-        nodes = self._nodes(knot, length)
-        jet = self.evaluate(np.concatenate([wanted, nodes]))
+        jet = self.evaluate(np.concatenate([wanted, self._nodes(knot, length)]))
         num = len(wanted)
         section = PathSection(knot, length, jet.rows(slice(num, None)))
         return jet.rows(slice(num)), section

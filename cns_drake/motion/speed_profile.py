@@ -67,8 +67,7 @@ def find_speed_profile(
     Args:
         speed_limits: (N,) limits at the path's control points [m/s].
     """
-    count = max(2, int(np.ceil(path.end / _STEP)) + 1)
-    u = np.linspace(0.0, path.end, count)
+    u = np.linspace(0.0, path.end, max(2, int(np.ceil(path.end / _STEP)) + 1))
     jet = path.evaluate(u)
     bending = np.linalg.norm(np.cross(jet.dp, jet.ddp), axis=1) / jet.speed
     lateral = np.sqrt(

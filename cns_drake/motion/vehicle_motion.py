@@ -235,8 +235,7 @@ class VehicleMotion(LeafSystem):
     ) -> tuple[Callable[[Moments], JointMotion], float]:
         """Returns the kind of motion of a joint, and its sign."""
         context = self._plant_context
-        frame = joint.frame_on_child()
-        X_BJ = frame.CalcPose(context, self._base.body_frame())
+        X_BJ = joint.frame_on_child().CalcPose(context, self._base.body_frame())
         R_BJ = X_BJ.rotation().matrix()
         wheel = WheelMotion(self._trajectory, X_BJ.translation())
         if isinstance(joint, RevoluteJoint):

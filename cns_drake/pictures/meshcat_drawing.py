@@ -146,8 +146,7 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
     cloud.mutable_rgbs()[:] = np.round(255.0 * rgb).T
     meshcat.SetObject(path, cloud, point_size=_POINT_PIXELS)
     meshcat.SetProperty(path, "color", _WHITE)
-    points = f"{path}/<object>"
-    meshcat.SetProperty(points, "material.sizeAttenuation", False)
+    meshcat.SetProperty(f"{path}/<object>", "material.sizeAttenuation", False)
 
 
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:

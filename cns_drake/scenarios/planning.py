@@ -182,8 +182,7 @@ def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
     drive without some structures it is the same stage with them.
     """
     if scenario.without:
-        whole = scenario.replaced(without=())
-        return whole, "the whole city"
+        return scenario.replaced(without=()), "the whole city"
     stages = list(map_folder(scenario).stages())
     others = [stage for stage in stages if stage != scenario.stage]
     if scenario.stage is None or not others:

@@ -83,8 +83,7 @@ def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
         RuntimeError: Drake cannot read the file.
     """
     # Drake's reader converts all dialects of VTK to the one that it writes.
-    text = RefineVolumeMeshIntoVtkFileContents(MeshSource(path))
-    words = text.split()
+    words = RefineVolumeMeshIntoVtkFileContents(MeshSource(path)).split()
     vertices = _block(words, "POINTS", 3, 3).astype(float)
     cells = _block(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
     faces = cells[:, _FACES].reshape(-1, 3)
@@ -192,8 +191,7 @@ class MeshFiles:
         if not path.is_file():
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
-        read = _READERS.get(ending, self._foreign.read)
-        p_GVset, triangles = read(path)
+        p_GVset, triangles = _READERS.get(ending, self._foreign.read)(path)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
         # Drake only warns; a ray caster would read foreign memory.

@@ -443,8 +443,7 @@ def _rung(
         drive = getattr(drives, role)
         if drive != getattr(plain, role):
             name = f"{drive.name}_{ending}"
-            renamed = drive.replaced(name=name)
-            drives = replace(drives, **{role: renamed})
+            drives = replace(drives, **{role: drive.replaced(name=name)})
     return Rung(cause, level, seed, text, drives)
 
 

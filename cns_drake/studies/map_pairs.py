@@ -307,5 +307,4 @@ def _import(
         raise InputError(f"{path}: not the file of the test pair {pair.name}")
     # A road network gets buildings of its own, in two stages.
     grow = None if path.suffix == ".xodr" else _GROW
-    options = ImportOptions(seed=pair.seed, grow=grow)
-    import_city(path, city, options, on_note)
+    import_city(path, city, ImportOptions(seed=pair.seed, grow=grow), on_note)

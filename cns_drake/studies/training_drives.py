@@ -231,8 +231,7 @@ def _nearest(
     center = xy[int(rng.integers(len(xy)))]
     order = np.argsort(np.linalg.norm(xy - center, axis=1), kind="stable")
     near = [structures[k].name for k in order[: int(0.5 * share * len(order))]]
-    some = _some(structures, 0.5 * share, rng)
-    return sorted({*near, *some})
+    return sorted({*near, *_some(structures, 0.5 * share, rng)})
 
 
 def _draw_changes(rng: np.random.Generator, number: int) -> dict[str, Any]:

@@ -232,8 +232,7 @@ class NoisyImu(LeafSystem):
             port.Eval(context) if port.HasValue(context) else np.zeros(3)
             for port in self._inputs
         ]
-        measured = self._errors.measure(sample, np.hstack(exact)[None])
-        value.set_value(measured[0])
+        value.set_value(self._errors.measure(sample, np.hstack(exact)[None])[0])
 
     def _calc(self, place: int, context: Context, output: BasicVector) -> None:
         measured = self._measured.Eval(context)

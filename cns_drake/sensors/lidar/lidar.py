@@ -350,8 +350,7 @@ class Lidar(LeafSystem):
             self.pattern.max_range,
             frame,
         )
-        places = turn.table.place.take(returns.beams)
-        return hits.geometry.take(places), returns
+        return hits.geometry.take(turn.table.place.take(returns.beams)), returns
 
     def _turn_at(self, time: float) -> tuple[int, _Turn]:
         """Returns number and beams of the turn that starts at a time [s]."""
