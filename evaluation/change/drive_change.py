@@ -86,26 +86,21 @@ class ChangeReport:
     def to_json(self) -> dict:
         """Returns all numbers; NaN becomes None, with a reason."""
         change = self.change
+        sides = {
+            "source": change.source_to_target,
+            "target": change.target_to_source,
+        }
         values = {
             "source": self.source,
             "target": self.target,
             "tcr_sym": json_number(change.symmetric),
-            "tcr_source_to_target": json_number(change.source_to_target.ratio),
-            "tcr_target_to_source": json_number(change.target_to_source.ratio),
+            "tcr_source_to_target": json_number(sides["source"].ratio),
+            "tcr_target_to_source": json_number(sides["target"].ratio),
             "in_hull": change.num_in_hull,
             "unchanged": change.num_unchanged,
-            "voxels": _both(
-                len(change.source_to_target.in_hull),
-                len(change.target_to_source.in_hull),
-            ),
-            "in_hull_of": _both(
-                change.source_to_target.num_in_hull,
-                change.target_to_source.num_in_hull,
-            ),
-            "unchanged_of": _both(
-                change.source_to_target.num_unchanged,
-                change.target_to_source.num_unchanged,
-            ),
+            "voxels": {k: len(one.in_hull) for k, one in sides.items()},
+            "in_hull_of": {k: one.num_in_hull for k, one in sides.items()},
+            "unchanged_of": {k: one.num_unchanged for k, one in sides.items()},
             "voxel_size": VOXEL_SIZE,
             "tau": TAU,
             "coverage_masked": None,
@@ -115,13 +110,11 @@ class ChangeReport:
         if change.undefined_because:
             values["reason"] = change.undefined_because
         if self.masked is not None:
-            values["coverage_masked"] = _summary(self.masked) | {
-                "radius": COVERAGE_RADIUS
-            }
+            masked = _summary(self.masked)
+            values["coverage_masked"] = {**masked, "radius": COVERAGE_RADIUS}
         if self.control is not None and self.control_names is not None:
-            values["control"] = _summary(self.control) | {
-                "between": list(self.control_names)
-            }
+            names = list(self.control_names)
+            values["control"] = {**_summary(self.control), "between": names}
         if self.alignment is not None:
             values["alignment"] = self.alignment.to_json()
         return values
@@ -302,10 +295,6 @@ def _summary(change: TemporalChange) -> dict:
     if change.undefined_because:
         values["reason"] = change.undefined_because
     return values
-
-
-def _both(source: int, target: int) -> dict:
-    return {"source": source, "target": target}
 
 
 @dataclass(frozen=True)
