@@ -90,7 +90,7 @@ class ChangeReport:
             "source": change.source_to_target,
             "target": change.target_to_source,
         }
-        values = {
+        values: dict[str, object] = {
             "source": self.source,
             "target": self.target,
             "tcr_sym": json_number(change.symmetric),
@@ -111,10 +111,10 @@ class ChangeReport:
             values["reason"] = change.undefined_because
         if self.masked is not None:
             masked = _summary(self.masked)
-            values["coverage_masked"] = {**masked, "radius": COVERAGE_RADIUS}
+            values["coverage_masked"] = masked | {"radius": COVERAGE_RADIUS}
         if self.control is not None and self.control_names is not None:
             names = list(self.control_names)
-            values["control"] = {**_summary(self.control), "between": names}
+            values["control"] = _summary(self.control) | {"between": names}
         if self.alignment is not None:
             values["alignment"] = self.alignment.to_json()
         return values
