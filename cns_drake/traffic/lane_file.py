@@ -182,12 +182,8 @@ def read_lanes(path: Path) -> LaneFile:
         )
         for lane in found.lanes
     )
-    junctions = 1 + max(piece.junction for piece in pieces)
-    if junctions > _MOST:
+    if max(piece.junction for piece in pieces) >= _MOST:
         raise InputError(f"{path}: lanes: junction: at most {_MOST - 1}")
-    phases = [1] * junctions
-    for piece in pieces:
-        phases[piece.junction] = max(phases[piece.junction], piece.phase + 1)
     walkways = [
         Walkway(
             resampled(np.array(way.points)),
@@ -201,8 +197,9 @@ def read_lanes(path: Path) -> LaneFile:
     crossings = tuple(
         make_crossing(np.array(one.line), one.width) for one in found.crossings
     )
-    graph = LaneGraph(pieces, crossings, tuple(phases))
-    return LaneFile(graph, walkways, tuple(found.in_the_way))
+    return LaneFile(
+        LaneGraph(pieces, crossings), walkways, tuple(found.in_the_way)
+    )
 
 
 def _thinned(points: np.ndarray) -> list[list[float]]:

@@ -185,12 +185,10 @@ class LaneGraph:
     Attributes:
         pieces: all of them.
         crossings: where walkers cross lanes.
-        phases: number of phases of each junction's signals; 1 without signals.
     """
 
     pieces: tuple[Piece, ...]
     crossings: tuple[Crossing, ...] = ()
-    phases: tuple[int, ...] = ()
 
     @property
     def lanes(self) -> list[int]:

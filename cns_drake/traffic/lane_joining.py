@@ -108,9 +108,7 @@ def join_lanes(
         )
         for k, last, line, limit in ways
     ]
-    kept = tuple(without_dead_ends(pieces))
-    count = 1 + max((piece.junction for piece in kept), default=-1)
-    return LaneGraph(kept, phases=(1,) * count)
+    return LaneGraph(tuple(without_dead_ends(pieces)))
 
 
 def _merge(

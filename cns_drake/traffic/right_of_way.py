@@ -7,7 +7,6 @@ is slower than expected, it waits on its way for those that entered before it,
 which never wait for it: none waits for ever.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,25 +18,22 @@ from cns_drake.traffic.vehicles import (
     CURRENT,
     Occupants,
     choose_way,
+    is_walked,
     rear_on_way,
 )
 
 # Where there is no signal, a driver has to stand for a while before the line
 # [s]: to be slower than this [m/s], and this near [m].
 _STOPS, _STANDS, _AT_LINE = 3.0, 0.5, 4.0
-# Signals: duration of a green phase, and of red for all after it [s].
-_GREEN, _RED = 27.0, 4.0
-# After this time they change for a driver [s], while no other direction has any
-# within this distance [m].
-_ALONE, _SEEN_FROM = 4.0, 30.0
 # Traffic ahead of the ego car, if it comes within this time, goes first and
 # does not wait for signals [s].
 _EGO_IS_NEAR = 80.0
 _GOES_FIRST = 1e6
-# Expected wait on a way at most [s]; after this time at a stop line no later
-# driver enters a way that meets one's own [s]. Accelerations that are assumed
-# for a driver and others [m/s^2], and the others' part of the allowed speed.
-_SLACK, _LONG = 2.0, 20.0
+# Expected wait on a way for vehicles and for walkers at most [s]; after this
+# time at a stop line no later driver enters a way that meets one's own [s].
+# Accelerations that are assumed for a driver and others [m/s^2], and the
+# others' part of the allowed speed.
+_SLACK, _YIELDS, _LONG = 2.0, 6.0, 20.0
 _OWN, _OTHERS, _PACE = 2.0, 1.0, 0.8
 # If the ego car comes within this time, a vehicle enters its way only once no
 # other is in its way [s].
@@ -50,10 +46,13 @@ _SHORT_WAIT = 5.0
 # [m/s^2].
 _ROOM, _LAST_BRAKES = 2.5, 4.0
 # Drivers request their way from this distance [m], or from this multiple of
-# their braking distance.
-_ASKED_FROM, _ASKED_BRAKING = 10.0, 1.4
+# their braking distance; from farther away, by this time [s], if there is a
+# signal, since none brakes before a green one.
+_ASKED_FROM, _ASKED_BRAKING, _ASKED_FOR = 10.0, 1.4, 3.0
 # After this time without room, a driver takes another way [s].
 _PATIENCE = 3.0
+# Walkers whose green is too short begin to cross in its first part [s].
+_LATE = 2.0
 # Time for a group of walkers to start [s], their assumed speed [m/s], and
 # reserve [s].
 WALK_GROUP = 3.0
@@ -69,6 +68,10 @@ CROSSING = np.dtype(
         ("length", float),  # [m]
         ("order", int),  # As of `VEHICLE`, 0 while no walkers ask.
         ("is_open", bool),  # Whether walkers are on it.
+        # Places on its line from which walkers have yet to go on to its end,
+        # and to its beginning [m].
+        ("to_end", float),
+        ("to_start", float),
     ]
 )
 
@@ -79,10 +82,12 @@ class Permits(NamedTuple):
     Attributes:
         users: (C,) numbers of walkers with a permit.
         crossings: (C,) records `CROSSING`.
+        lines: (C, 2, 2) where each begins [m], and its direction.
     """
 
     users: np.ndarray
     crossings: np.ndarray
+    lines: np.ndarray
 
 
 def make_permits(graph: LaneGraph) -> Permits:
@@ -90,10 +95,13 @@ def make_permits(graph: LaneGraph) -> Permits:
     crossings = np.zeros(len(graph.crossings), CROSSING)
     crossings["waits"] = np.inf
     crossings["opened"] = crossings["closed"] = -np.inf
-    crossings["length"] = [
-        math.dist(one.line[0], one.line[1]) for one in graph.crossings
-    ]
-    return Permits(np.zeros(len(crossings), int), crossings)
+    crossings["to_end"], crossings["to_start"] = -np.inf, np.inf
+    ends = np.array([one.line[[0, -1], :2] for one in graph.crossings])
+    lines = np.diff(ends.reshape(-1, 2, 2), axis=1, prepend=0.0)
+    x, y = lines[:, 1].T
+    crossings["length"] = np.sqrt(x * x + y * y)
+    lines[:, 1] /= crossings["length"][:, None]
+    return Permits(np.zeros(len(crossings), int), crossings, lines)
 
 
 @compiled
@@ -118,19 +126,22 @@ def grant_ways(
         seed: seed of the drawn ways.
     """
     t, pieces, num_cars = k * dt, streets.pieces, len(cars)
-    users, crossings = permits
+    users, crossings = permits.users, permits.crossings
     first = np.full(len(pieces), -1)
-    asked = np.zeros((len(streets.phases), streets.phases.max()), np.bool_)
     for i in range(num_cars):
         lane = cars[i].path[CURRENT]
         if lane < 0 or pieces[lane].is_way:
             continue
-        if pieces[lane].length - cars[i].s < _SEEN_FROM:
-            phase = pieces[streets.after[pieces[lane].after_first]].phase
-            if phase >= 0:
-                asked[pieces[lane].junction, phase] = True
         if cars[i].granted:
-            continue
+            left = pieces[lane].length - cars[i].s
+            if (
+                pieces[cars[i].held].phase < 0
+                or left <= _stops_within(cars[i])
+                or _is_ready(streets, cars[i], k, dt)
+            ):
+                continue
+            # Its signal has changed, and it can stop.
+            cars[i].granted, cars[i].held = False, -1
         if first[lane] < 0 or cars[i].s > cars[first[lane]].s:
             first[lane] = i
         other = cars[i].left_lane
@@ -166,8 +177,10 @@ def grant_ways(
         braking = car.v**2 / (2.0 * car.b)
         asked_from = max(_ASKED_FROM, _ASKED_BRAKING * braking + 5.0)
         left = pieces[lane].length - car.s
+        phase = pieces[streets.after[pieces[lane].after_first]].phase
+        if phase >= 0:
+            asked_from += _ASKED_FOR * car.v + 5.0
         if left <= asked_from:
-            phase = pieces[streets.after[pieces[lane].after_first]].phase
             if 0.0 < streets.until[k, lane] < _EGO_IS_NEAR:
                 since[first[lane]] = streets.until[k, lane] - _GOES_FIRST
             elif phase < 0 and car.since == np.inf:
@@ -184,8 +197,8 @@ def grant_ways(
         if users[c] == 0 and (crossings[c].is_open or since[num_cars + c] > t):
             crossings[c].order, crossings[c].is_open = 0, False
     # What small and what large vehicles must not enter now.
-    taken = np.zeros((2, len(pieces) + len(crossings)), np.bool_)
-    last = 0
+    taken = np.zeros((2, len(pieces)), np.bool_)
+    last = 1
     for i in range(num_cars):
         if cars[i].held >= 0:
             last = max(last, cars[i].order)
@@ -198,27 +211,27 @@ def grant_ways(
             )
     for c in range(len(crossings)):
         last = max(last, crossings[c].order)
-        if crossings[c].order > 0:
-            _take(streets, taken, len(pieces) + c, False, 0.0)
-    blocked = np.zeros(taken.shape[1], np.bool_)
+        _take_crossing(streets, taken, crossings, c)
+    blocked = np.zeros(len(pieces), np.bool_)
     for who in np.argsort(since):
         if since[who] == np.inf:
             break
         if who >= num_cars:
             last = _serve(streets, cars, permits, who - num_cars, k, dt, last)
-            if crossings[who - num_cars].order > 0:
-                place = len(pieces) + who - num_cars
-                _take(streets, taken, place, False, 0.0)
+            _take_crossing(streets, taken, crossings, who - num_cars)
             continue
         car = cars[who]
         if car.path[CURRENT + 1] < 0:
             choose_way(streets, cars, who, seed)
         way, is_large = car.path[CURRENT + 1], car.large
-        if (
-            not _is_ready(streets, car, asked, k, dt)
-            or not _has_room(streets, cars, occupants, who, k, dt, seed)
-            or blocked[way]
-        ):
+        if blocked[way] or not _is_ready(streets, car, k, dt):
+            continue
+        if not _has_room(streets, cars, occupants, who, k, dt, seed):
+            if car.guided and t > since[who] + _LONG:
+                # It cannot take another way: the next room is for it.
+                for other in range(len(pieces)):
+                    first_after = streets.after[pieces[other].after_first]
+                    blocked[other] |= first_after == car.path[CURRENT + 2]
             continue
         # The ego car's plan leaves no time to wait on a way.
         is_near = streets.until[k, way] < _EGO_COMES
@@ -227,7 +240,8 @@ def grant_ways(
         ):
             if is_near or t > since[who] + _LONG:
                 # Later arrivals must not always go first.
-                blocked |= streets.clear[int(is_large), way] > 0.0
+                clear = streets.clear[int(is_large), way]
+                blocked |= clear[: len(pieces)] > 0.0
             continue
         _take(streets, taken, way, is_large, 0.0)
         last += 1
@@ -263,7 +277,7 @@ def _is_soon_free(
     pace = streets.speed[pieces[way].first]
     for c in range(len(crossings)):
         place = streets.begin[size, way, len(pieces) + c]
-        if crossings[c].order > 0 and place < np.inf:
+        if place < np.inf and is_walked(streets, crossings, c, way, size):
             lasts = crossings[c].length / _WALKING + _DAWDLING
             if crossings[c].opened >= 0.0:
                 lasts += WALK_GROUP + crossings[c].opened - t
@@ -271,7 +285,8 @@ def _is_soon_free(
                 lasts += crossings[c].closed - t
             else:
                 lasts += WALK_GROUP
-            if lasts > _duration(place - front, car.v, _OWN, pace):
+            arrives = _duration(place - front, car.v, _OWN, pace)
+            if lasts > arrives + _YIELDS:
                 return False
     for j in range(len(cars)):
         other = cars[j]
@@ -339,7 +354,9 @@ def _serve(
     if one.order == 0:
         if t < one.closed + _REST:
             return last
-        if _until_green(streets, streets.beside[c], t) < min(needed, _GREEN):
+        if _until_red(streets, place, t) < min(
+            needed, streets.signals.green_for[place] - _LATE
+        ):
             return last
         last += 1
         one.order = last
@@ -348,42 +365,49 @@ def _serve(
         return last
     for i in range(len(cars)):
         car = cars[i]
-        if (
-            car.held >= 0
-            and car.order < one.order
-            and rear_on_way(streets, car)
-            < streets.clear[int(car.large), car.held, place]
-        ):
+        if car.held < 0 or car.order > one.order:
+            continue
+        rear, size = rear_on_way(streets, car), int(car.large)
+        ahead = streets.begin[size, car.held, place] - rear - car.length
+        if rear < streets.clear[
+            size, car.held, place
+        ] and ahead < _stops_within(car):
             return last
     # A placeholder holds the permit until the group has begun to walk.
     permits.users[c], one.opened, one.is_open = 1, t, True
+    # Vehicles that are not yet there wait for it, whenever they came.
+    one.order = 1
     return last
 
 
 @compiled
-def _until_green(streets: Streets, way: int, t: float) -> float:
-    """Returns the time until the signal of a way is green next [s].
+def _until_red(streets: Streets, place: int, t: float) -> float:
+    """Returns for how long a way or a crossing is still green [s].
 
-    That is 0 while it is green, inf for no way.
+    That is 0 or less while it is red, and inf without a signal.
     """
-    if way < 0:
+    cycle, green_from, green_for = streets.signals
+    if green_for[place] == cycle:
         return np.inf
-    row, phase = streets.pieces[way], _GREEN + _RED
-    cycle = phase * streets.phases[row.junction]
-    left = (row.phase * phase - t) % cycle
-    return 0.0 if left > cycle - _GREEN else left
+    return green_for[place] - (t - green_from[place]) % cycle
+
+
+@compiled
+def _stops_within(car: Any) -> float:
+    """Returns the way on which a driver can stop in comfort [m]."""
+    return 1.0 + car.v + car.v**2 / (2.0 * car.b)
 
 
 @compiled
 def _take(
     streets: Streets, taken: np.ndarray, place: int, is_large: bool, rear: float
 ) -> None:
-    """Notes what a vehicle on a way, or a walker on a crossing, excludes.
+    """Notes what a vehicle on a way excludes.
 
     Args:
         streets: the lanes.
-        taken: (2, P + C) what small and what large vehicles must not enter.
-        place: the way or crossing.
+        taken: (2, P) what small and what large vehicles must not enter.
+        place: the way.
         is_large: whether the vehicle is large.
         rear: of the vehicle, along the way [m].
     """
@@ -396,15 +420,23 @@ def _take(
 
 
 @compiled
-def _is_ready(
-    streets: Streets, car: Any, asked: np.ndarray, k: int, dt: float
-) -> bool:
+def _take_crossing(
+    streets: Streets, taken: np.ndarray, crossings: np.ndarray, c: int
+) -> None:
+    """Notes the ways that walkers on the c-th crossing exclude."""
+    for way in range(len(streets.pieces)):
+        for size in range(2):
+            if streets.begin[size, way, len(streets.pieces) + c] < np.inf:
+                taken[size, way] |= is_walked(streets, crossings, c, way, size)
+
+
+@compiled
+def _is_ready(streets: Streets, car: Any, k: int, dt: float) -> bool:
     """Returns whether a vehicle has waited for a signal, or at a stop line.
 
     Args:
         streets: the lanes, and the ego car.
         car: a record `VEHICLE`, in a lane.
-        asked: (J, phases) the phases of each junction that a vehicle comes in.
         k: number of the time.
         dt: the step [s].
     """
@@ -414,11 +446,7 @@ def _is_ready(
         return True
     if row.phase < 0:
         return t >= car.since + _STOPS
-    if _until_green(streets, way, t) == 0.0:
-        return True
-    # A signal changes for one who waits alone.
-    now = int(t // (_GREEN + _RED)) % streets.phases[row.junction]
-    return t > car.since + _ALONE and not asked[row.junction, now]
+    return _until_red(streets, way, t) > 0.0
 
 
 @compiled

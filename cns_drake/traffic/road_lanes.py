@@ -125,15 +125,8 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
         pieces[number[ref]] = replace(
             pieces[number[ref]], after=tuple(range(first, len(pieces)))
         )
-    count = max(clusters.values()) + 1
-    phases = [1] * count
-    for junction in range(count):
-        if _has_signals(network, clusters, junction):
-            phases[junction] = 2
     return LaneGraph(
-        tuple(without_dead_ends(pieces)),
-        tuple(_crossings(network, trims)),
-        tuple(phases),
+        tuple(without_dead_ends(pieces)), tuple(_crossings(network, trims))
     )
 
 

@@ -8,6 +8,7 @@ import shapely
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import arctan2, cos, sin
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.traffic.signals import Signals, make_signals, way_shares
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 
 # Greatest acceleration in bends, and braking before them [m/s^2].
@@ -28,8 +29,6 @@ _HALF_LANE = 1.45
 # the speed limit, and this wait at its end [s].
 _SLOW_PART, WAIT = 0.6, 20.0
 
-# A crossing so near to the stop line lies before it [m].
-_AT_LINE = 6.0
 # How two ways meet that share the lane before them, or that behind them.
 SPLIT, MERGE = 1, 2
 
@@ -60,10 +59,12 @@ class Streets(NamedTuple):
         points: (M, 3) points of all pieces [m].
         speed: (M,) allowed speed there, with regard to bends [m/s].
         after: numbers of the pieces that follow each piece.
-        phases: (J,) number of phases of a junction's signals.
+        liked: for each of these, the share of drivers that take it or one of
+            those before it.
+        signals: their program.
         begin, clear, joint: (2, P + C, P + C) see `find_conflicts`.
-        beside: (C,) number of a way with a signal that begins at each crossing,
-            -1 for none.
+        over: (P, C) place on a crossing's line where a way leads over it, NaN
+            if it does not [m].
         until: (K, P + C) float32 time until the ego car is there, 0 while it
             is, inf if it never will be [s].
         ego_rear, ego_front: (K, P) float32 distance of its ends along a piece
@@ -75,11 +76,12 @@ class Streets(NamedTuple):
     points: np.ndarray
     speed: np.ndarray
     after: np.ndarray
-    phases: np.ndarray
+    liked: np.ndarray
+    signals: Signals
     begin: np.ndarray
     clear: np.ndarray
     joint: np.ndarray
-    beside: np.ndarray
+    over: np.ndarray
     until: np.ndarray
     ego_rear: np.ndarray
     ego_front: np.ndarray
@@ -149,22 +151,31 @@ def make_streets(
         rows[name] = [getattr(piece, name) for piece in pieces]
     rows["step"] = rows["length"] / (count - 1)
     conflicts = find_conflicts(graph)
-    signals = np.flatnonzero(rows["phase"] >= 0)
-    beside = np.full(len(graph.crossings), -1)
-    for c in range(len(beside)):
-        begins = conflicts[0][0, signals, len(pieces) + c]
-        if len(signals) and begins.min() < _AT_LINE:
-            beside[c] = signals[begins.argmin()]
+    shares = [way_shares(graph, k) for k in range(len(pieces))]
     return Streets(
         rows,
         np.concatenate([piece.points for piece in pieces]),
         np.concatenate([_speeds(piece) for piece in pieces]),
         np.array([a for piece in pieces for a in piece.after]),
-        np.array(graph.phases or (1,)),
+        np.concatenate([np.cumsum(one) for one in shares]),
+        make_signals(graph, conflicts[0][0]),
         *conflicts,
-        beside,
+        _places_on_crossings(graph),
         *_find_ego(graph, box, xy, yaw, dt),
     )
+
+
+def _places_on_crossings(graph: LaneGraph) -> np.ndarray:
+    """Returns `Streets.over`."""
+    ways = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
+    lines = [shapely.LineString(one.line[:, :2]) for one in graph.crossings]
+    over = np.full((len(ways), len(lines)), np.nan)
+    tree = shapely.STRtree(ways)
+    for c, line in enumerate(lines):
+        for way in tree.query(line, "intersects"):
+            where = shapely.intersection(ways[way], line)
+            over[way, c] = line.project(where.centroid)
+    return over
 
 
 def _speeds(piece: Piece) -> np.ndarray:
@@ -203,7 +214,7 @@ def find_conflicts(
         (2, P + C, P + C) places of a front along a, where the area of a first
         meets that of b, inf if the two never meet [m];
         those of a rear along a, from which on b is free again, 0 if the two
-        never meet, inf if a is a crossing [m];
+        never meet, or if a is a crossing [m];
         and `SPLIT` or `MERGE` where two ways meet at their beginning or end
         alone, in the lane that they share.
     """
@@ -230,9 +241,7 @@ def find_conflicts(
         pairs = tree.query(areas, predicate="intersects").T.tolist()
         shapely.prepare(areas)
         for one, other in pairs:
-            if one >= num_pieces > other:
-                clear[k, one, other] = np.inf
-            elif one < num_pieces and one != other:
+            if one < num_pieces and one != other:
                 front, hulls = swept[one]
                 meets = np.flatnonzero(shapely.intersects(areas[other], hulls))
                 first, last = meets[0], meets[-1]

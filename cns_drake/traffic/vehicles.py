@@ -44,6 +44,10 @@ SIGHT = 120.0
 # The gap for which drivers brake as in an emergency [m].
 _LEAST_GAP = 0.5
 
+# Small and large vehicles pass a walker whose middle is this far beyond the
+# middle of their way [m].
+_PASSED = (2.0, 3.5)
+
 # A driver considers a change of lane only at every such step.
 _THINKS = 10
 # Politeness, least gain, and the most that others brake [m/s^2].
@@ -363,6 +367,28 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 
 
 @compiled
+def is_walked(
+    streets: Streets, crossings: np.ndarray, c: int, way: int, size: int
+) -> bool:
+    """Returns whether walkers on the c-th crossing have yet to pass a way.
+
+    Args:
+        streets: the lanes.
+        crossings: (C,) records `CROSSING`.
+        c: number of the crossing.
+        way: number of the way, which leads over it.
+        size: 0 for small vehicles, 1 for large ones.
+    """
+    one, place = crossings[c], streets.over[way, c]
+    if one.order == 0:
+        return False
+    return not (
+        place + _PASSED[size] < one.to_end
+        and place - _PASSED[size] > one.to_start
+    )
+
+
+@compiled
 def find_prior(
     streets: Streets, cars: np.ndarray, crossings: np.ndarray, i: int
 ) -> tuple[float, float, float]:
@@ -398,7 +424,11 @@ def find_prior(
     size = int(car.large)
     for c in range(len(crossings)):
         place = streets.begin[size, way, len(pieces) + c]
-        if 0 < crossings[c].order < car.order and front <= place:
+        if (
+            front <= place < np.inf
+            and crossings[c].order < car.order
+            and is_walked(streets, crossings, c, way, size)
+        ):
             line = min(line, place - front)
     for j in range(len(cars)):
         other = cars[j]
@@ -652,8 +682,12 @@ def choose_way(streets: Streets, cars: np.ndarray, i: int, seed: int) -> None:
     least = np.inf
     for _ in range(2):
         car.draws += 1
-        pick = int(uniform(seed, i, car.draws) * lane.after_count)
-        way = streets.after[lane.after_first + min(pick, lane.after_count - 1)]
+        pick = uniform(seed, i, car.draws)
+        row = lane.after_first
+        last = row + lane.after_count - 1
+        while row < last and pick >= streets.liked[row]:
+            row += 1
+        way = streets.after[row]
         beyond = streets.after[streets.pieces[way].after_first]
         number = 0.0
         for j in range(len(cars)):

@@ -173,6 +173,7 @@ class Crowd:
         crossings["waits"][~waited] = np.inf
         force = _forces(self._paths, walkers, is_waiting)
         _move(self._paths, walkers, force, dt)
+        self._note_crossers()
         x, y = walkers["velocity"].T
         speed = np.sqrt(x * x + y * y)
         walkers["phase"] += gait_rate(speed) * dt
@@ -189,6 +190,24 @@ class Crowd:
         at = paths["num_points"] - 2 - walkers["at"]
         walkers["at"][back] = np.maximum(at, 0)[back]
         walkers["next_path"][back] = -1
+
+    def _note_crossers(self) -> None:
+        """Notes the parts of crossings that walkers have yet to pass."""
+        crossings, walkers = self._permits.crossings, self.walkers
+        crossings["to_end"], crossings["to_start"] = np.inf, -np.inf
+        on = self._paths.paths["crossing"][walkers["path"]]
+        rows = np.flatnonzero(on >= 0)
+        c, walkers = on[rows], walkers[rows]
+        starts, along = self._permits.lines[c].transpose(1, 0, 2)
+        place = ((walkers["xy"] - starts) * along).sum(axis=1)
+        row = self._paths.paths["first"][walkers["path"]] + walkers["at"]
+        ahead = (self._paths.tangents[row] * along).sum(axis=1) > 0.0
+        np.minimum.at(crossings["to_end"], c[ahead], place[ahead])
+        np.maximum.at(crossings["to_start"], c[~ahead], place[~ahead])
+        # Others may follow.
+        begins = (crossings["opened"] >= 0.0) | ~crossings["is_open"]
+        crossings["to_end"][begins] = -np.inf
+        crossings["to_start"][begins] = np.inf
 
     def _follow_paths(self) -> np.ndarray:
         """Notes the points that walkers pass; returns who is near the end."""
@@ -381,18 +400,18 @@ def _forces(
         here = path.first + one.at
         low, high = paths.limits[here]
         right = (paths.tangents[here, 1], -paths.tangents[here, 0])
-        wanted_x = wanted_y = 0.0
-        if not is_waiting[i]:
-            target = path.first + min(one.at + _AHEAD, path.num_points - 1)
-            left, most = paths.limits[target]
-            aside = 0.5 * (left + most + one.aside * (most - left))
-            x = paths.points[target, 0] + aside * right[0] - one.xy[0]
-            y = paths.points[target, 1] + aside * right[1] - one.xy[1]
-            distance = max(np.sqrt(x * x + y * y), 1e-6)
-            wanted_x = one.speed * x / distance
-            wanted_y = one.speed * y / distance
-        force[i, 0] += (wanted_x - one.velocity[0]) / _RELAXATION
-        force[i, 1] += (wanted_y - one.velocity[1]) / _RELAXATION
+        force[i] -= one.velocity / _RELAXATION
+        if is_waiting[i]:
+            # Edges would push it to and fro in a narrow gap.
+            continue
+        target = path.first + min(one.at + _AHEAD, path.num_points - 1)
+        left, most = paths.limits[target]
+        aside = 0.5 * (left + most + one.aside * (most - left))
+        x = paths.points[target, 0] + aside * right[0] - one.xy[0]
+        y = paths.points[target, 1] + aside * right[1] - one.xy[1]
+        wanted = one.speed / max(np.sqrt(x * x + y * y), 1e-6)
+        force[i, 0] += wanted * x / _RELAXATION
+        force[i, 1] += wanted * y / _RELAXATION
         across = -(
             (paths.points[here, 0] - one.xy[0]) * right[0]
             + (paths.points[here, 1] - one.xy[1]) * right[1]

@@ -500,7 +500,7 @@ def _with_signals(
     lines = [shapely.LineString(graph.pieces[k].points[:, :2]) for k in ways]
     near = shapely.STRtree(signals).query(lines, "dwithin", _WAY_NEAR)
     # Lanes that never cross have junctions of their own; signals join them.
-    group = {k: k for k in range(len(graph.phases))}
+    group = {piece.junction: piece.junction for piece in graph.pieces}
     controlled: dict[int, int] = {}
     for k, signal in near.T.tolist():
         junction = graph.pieces[ways[k]].junction
@@ -510,7 +510,6 @@ def _with_signals(
     switched = {group[k] for k in controlled.values()}
     pieces = list(graph.pieces)
     axes: dict[int, float] = {}
-    phases = list(graph.phases)
     for k, piece in enumerate(pieces):
         junction = group[piece.junction]
         pieces[k] = replace(piece, junction=junction)
@@ -521,5 +520,4 @@ def _with_signals(
         axis = axes.setdefault(junction, heading)
         across = abs(np.sin(wrapped(heading - axis))) > np.sin(np.pi / 4)
         pieces[k] = replace(pieces[k], phase=int(across))
-        phases[junction] = 2
-    return replace(graph, pieces=tuple(pieces), phases=tuple(phases))
+    return replace(graph, pieces=tuple(pieces))

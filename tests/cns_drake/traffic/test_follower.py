@@ -46,7 +46,6 @@ class Street:
                 Piece(line(300, 330), 14.0, True, (2,), junction=0),
                 Piece(line(330, 630), 14.0, False, (1,), junction=0),
             ),
-            phases=(1,),
         )
         path = LanePath(line(10, 620)[::4], 2.0, np.full(306, 14.0))
         self.trajectory = Trajectory(path, Speeds())
@@ -186,7 +185,6 @@ def test_changes_to_the_lane_of_its_way_in_time():
             Piece(line(130, 200), 14.0, False, (2,), junction=0),
             Piece(line(130, 200) + aside, 14.0, False, (3,), junction=0),
         ),
-        phases=(1,),
     )
     share = np.clip((100.0 - np.arange(0.0, 180.0)) / 4.0 + 0.5, 0.0, 1.0)
     points = line(0, 179)[::2] + share[:, None] * aside

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 import shapely
 import shapely.affinity
 
@@ -319,8 +320,8 @@ def test_walkers_pass_what_stands_on_sidewalks():
         met += len(tree.query(found, "intersects")[0])
         near += len(tree.query(found, "dwithin", 0.5)[0])
     assert near > 100
-    # Where ways meet, a walker may touch something, and one may wait there.
-    assert met < 3e-3 * 80 * 60
+    # Where ways meet, a walker may touch something.
+    assert met < 1e-3 * 80 * 60
     moved = np.ptp(traffic.walkers.values[..., :2], axis=0).max(axis=1)
     assert (moved > 5.0).mean() > 0.9
 
@@ -362,11 +363,11 @@ def test_ways_that_cross_exclude_each_other():
             if graph.pieces[a].is_way and graph.pieces[b].is_way:
                 meets = lines[a].distance(lines[b]) < 1.5
                 assert not meets or small[a, b] > 0.0
-    assert ((small > 0.0) == (small.T > 0.0)).all()
+    ways, crossed = small[:, :num], small[:, num:]
+    assert ((ways[:num] > 0.0) == (ways[:num].T > 0.0)).all()
+    assert (crossed[:num] > 0.0).any()
+    assert not small[num:].any()
     assert (small <= large + 1.0)[small == 0.0].all()
-    # A crossing excludes its ways for as long as walkers are on it.
-    crossing = small[num:, :num]
-    assert (np.isinf(crossing) == (crossing > 0.0)).all()
 
 
 def test_a_way_is_free_behind_the_last_place_where_it_meets_another():
@@ -397,6 +398,30 @@ def test_a_way_is_free_behind_the_last_place_where_it_meets_another():
         assert found[0, 0] == found[1, 1] == 0.0
 
 
+def vehicles_in_streets(graph, xy):
+    """Returns the vehicles (T, S) in each direction of streets over 60 m."""
+    lanes = [k for k in graph.lanes if graph.pieces[k].left < 0]
+    beside = {graph.pieces[k].left: k for k in graph.lanes}
+    streets = []
+    for lane in lanes:
+        streets.append([lane])
+        while streets[-1][-1] in beside:
+            streets[-1].append(beside[streets[-1][-1]])
+    owner = {k: row for row, own in enumerate(streets) for k in own}
+    points = [piece.points[:, :2] for piece in graph.pieces]
+    of_point = np.repeat(
+        [owner.get(k, -1) for k in range(len(points))],
+        [len(line) for line in points],
+    )
+    _, near = cKDTree(np.concatenate(points)).query(xy)
+    found = of_point[near]
+    count = np.stack(
+        [(found == row).sum(axis=1) for row in range(len(streets))], axis=1
+    )
+    long = [graph.pieces[own[0]].length > 60.0 for own in streets]
+    return count[:, long]
+
+
 @pytest.mark.parametrize(
     "name", ["downtown", "riverside", "suburbia", "metropolis"]
 )
@@ -420,8 +445,13 @@ def test_traffic_flows(name):
     assert traffic.left_out == 0
     xy = traffic.vehicles.values[:, :, :2]
     stands = np.linalg.norm(np.diff(xy, axis=0), axis=2) < 0.05
-    assert 0.1 < stands.mean() < 0.5
-    assert stands.mean(axis=0).max() < 0.85
+    if name == "metropolis":
+        # No street is empty while vehicles queue in others.
+        is_empty = vehicles_in_streets(graph, xy[::10]) == 0
+        assert is_empty.mean(axis=0).max() < 0.3
+        assert not is_empty.all(axis=0).any()
+    assert 0.1 < stands.mean() < 0.4
+    assert stands.mean(axis=0).max() < 0.8
     # No vehicle stays within ten metres for more than two and a half minutes.
     for first in range(0, len(xy) - 1500, 250):
         apart = np.linalg.norm(xy[first : first + 1501] - xy[first], axis=2)
