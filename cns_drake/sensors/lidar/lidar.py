@@ -33,10 +33,7 @@ from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
 from cns_drake.sensors.lidar.seen_geometry import SeenGeometry, Sight
-from cns_drake.sensors.returns.calibrated import (
-    CalibratedReturns,
-    CalibratedTurn,
-)
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 # The class of points without a structure.
 SCATTERED_LABEL = CLASS_IDS["outlier"]
@@ -166,7 +163,7 @@ class Lidar(LeafSystem):
             frozenset(anchored_frames),
             num_threads,
         )
-        self._first = self._latest = _Turn(0, pattern.beams(0))
+        self._first = self._latest = _Turn(0, pattern.beams(0), returns)
         # When each column fires, as a part of a turn.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
@@ -330,7 +327,7 @@ class Lidar(LeafSystem):
                 seen.scene,
                 seen.materials(is_wet=self._returns.is_wet),
                 self.pattern,
-                turn.calibrated(self._returns),
+                turn.calibrated,
                 p_WSset,
                 R_WSset,
                 times,
@@ -360,7 +357,8 @@ class Lidar(LeafSystem):
         # Two threads may ask for different turns.
         turn = self._latest
         if turn.frame != frame:
-            turn = self._latest = _Turn(frame, self.pattern.beams(frame))
+            beams = self.pattern.beams(frame)
+            turn = self._latest = _Turn(frame, beams, self._returns)
         return frame, turn
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
@@ -423,12 +421,15 @@ class BeamTable(NamedTuple):
 
     Attributes:
         d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
+        p_Sset: (num_beams, 3) float32 where beams start [m]; (0, 3) if that is
+            the origin of S.
         ring: (num_beams,) uint16.
         t_ns: (num_beams,) uint32 firing time since the start of the turn.
         place: (num_beams,) position of each beam in the order of casting.
     """
 
     d_Sset: np.ndarray
+    p_Sset: np.ndarray
     ring: np.ndarray
     t_ns: np.ndarray
     place: np.ndarray
@@ -442,25 +443,27 @@ class _Turn:
         beams: in firing order.
         d_Sset_cast: (N, 3) directions in the order of casting.
         table: what beams add to points.
+        calibrated: the same for calibrated returns, None for ideal ones.
     """
 
-    def __init__(self, frame: int, beams: Beams):
+    def __init__(
+        self, frame: int, beams: Beams, returns: CalibratedReturns | None
+    ):
         self.frame = frame
         self.beams = beams
         self.d_Sset_cast = beams.d_Sset[beams.packet_order]
+        d_Sset, p_Sset = beams.d_Sset, np.zeros((0, 3))
+        self.calibrated = None if returns is None else returns.turn(beams)
+        if self.calibrated is not None:
+            d_Sset = self.calibrated.reported
+            p_Sset = self.calibrated.p_SLset
         self.table = BeamTable(
-            beams.d_Sset.astype(np.float32),
+            d_Sset.astype(np.float32),
+            p_Sset.astype(np.float32),
             beams.ring,
             beams.t_ns,
             np.argsort(beams.packet_order),
         )
-        self._calibrated: CalibratedTurn | None = None
-
-    def calibrated(self, returns: CalibratedReturns) -> CalibratedTurn:
-        """Returns the same for calibrated returns; always those of one unit."""
-        if self._calibrated is None:
-            self._calibrated = returns.turn(self.beams)
-        return self._calibrated
 
 
 @compiled
@@ -495,6 +498,10 @@ def assemble_points(
         x = table.d_Sset[beam, 0] * ranges[k]
         y = table.d_Sset[beam, 1] * ranges[k]
         z = table.d_Sset[beam, 2] * ranges[k]
+        if len(table.p_Sset):
+            x += table.p_Sset[beam, 0]
+            y += table.p_Sset[beam, 1]
+            z += table.p_Sset[beam, 2]
         if step > 0:
             x = np.rint(x / step) * step
             y = np.rint(y / step) * step

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
+from cns_drake.base.elementary import cos, sin
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, RayHits
 from cns_drake.ray_casting.rays import rotate
 from cns_drake.sensors.lidar.measurement import Echoes
@@ -16,7 +18,7 @@ from cns_drake.sensors.returns.footprint import find_sides, meet_sides
 from cns_drake.sensors.returns.light import BeamHits, dot, join, texture
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
-from cns_drake.sensors.returns.random_numbers import frame_key, normal
+from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.unit_sheets import (
     RANGE_BIAS,
     UNIT_SHEETS,
@@ -158,16 +160,30 @@ class CalibratedReturns:
         """
         key = frame_key(self.seed, self.sensor_name, frame)
         reach = self.reach(pattern.max_range)
-        hits = scene.cast_rays(
-            p_WSset,
-            turn.d_Sset,
-            reach,
-            R_WSset=R_WSset,
-            times=times,
-            with_normals=True,
-        )
-
-        met = BeamHits.of(rotate(R_WSset, turn.d_Sset), hits)
+        times = np.asarray(times, np.float32)
+        found = []
+        for height, rows in turn.blocks:
+            d_Sset = turn.d_Sset[rows]
+            # Whole turns of the columns need none of them picked out.
+            p, R, when = (
+                one[rows] if len(one) == len(turn.beam) else one
+                for one in (p_WSset, R_WSset, times)
+            )
+            # A single place for all rays is faster.
+            hits = scene.cast_rays(
+                p + height * R[:, :, 2],
+                d_Sset,
+                reach,
+                R_WSset=R,
+                times=when,
+                with_normals=True,
+            )
+            found.append(BeamHits.of(rotate(R, d_Sset), hits))
+        met = join(found)
+        if turn.height.any():
+            every = np.arange(len(turn.height))
+            up_W = _taken(R_WSset[:, :, 2], every)
+            p_WSset = _taken(p_WSset, every) + turn.height[:, None] * up_W
 
         def cast(
             p_Wset: np.ndarray,
@@ -184,8 +200,7 @@ class CalibratedReturns:
         sides = find_sides(key, turn.beam, turn.orders, met, divergence, reach)
         # A single place for all is faster.
         rows = sides.row
-        origins = p_WSset[rows % len(p_WSset)] if len(p_WSset) > 1 else p_WSset
-        times = np.asarray(times, np.float32)
+        origins = _taken(p_WSset, rows)
         when = times[rows % len(times)]
         side_met = BeamHits.of(
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
@@ -227,7 +242,7 @@ class CalibratedReturns:
         """Returns the beams of a turn, with the errors of the unit."""
         laser = np.arange(int(beams.ring.max()) + 1)
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
-        sheet = self.sheet
+        sheet, head = self.sheet, self.sheet.head
         angle = np.radians(sheet.angle_error_deg)
         sizes = (
             RANGE_BIAS * sheet.range_floor,
@@ -240,7 +255,51 @@ class CalibratedReturns:
             size * np.clip(normal(key, laser, draw), -3.0, 3.0)
             for draw, size in enumerate(sizes)
         ]
-        return CalibratedTurn(beams, *(one[beams.ring] for one in errors))
+        range_error, elevation, azimuth, gain = (
+            one[beams.ring] for one in errors
+        )
+        x, y, z = beams.d_Sset.T
+        shift, own = 0.0, 0.0
+        if head.tick_deg:
+            tick, now = np.radians(head.tick_deg), np.arctan2(y, x)
+            shift = np.rint(now / tick) * tick - now
+            own = (uniform(key, laser, len(sizes)) - 0.5) * 2.0 * tick
+            own = own[beams.ring]
+        across = np.maximum(np.sqrt(x * x + y * y), 1e-9)
+        lowest, heights = np.transpose(head.heights)
+        block = (np.degrees(np.arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
+        return CalibratedTurn(
+            beams,
+            _turned(beams.d_Sset, own + azimuth, elevation / across),
+            _turned(beams.d_Sset, own + shift, 0.0),
+            heights[block],
+            range_error,
+            1.0 + gain,
+        )
+
+
+def _taken(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Returns values of rows that take them in turn; a single one is left."""
+    return values if len(values) == 1 else values[rows % len(values)]
+
+
+def _turned(
+    d_Sset: np.ndarray, left: np.ndarray | float, up: np.ndarray | float
+) -> np.ndarray:
+    """Returns directions with other azimuths and, a little, elevations.
+
+    Args:
+        d_Sset: (N, 3).
+        left: by how much azimuths differ [rad].
+        up: by how much elevations differ, over the cosine of each [rad].
+    """
+    x, y, z = d_Sset.T
+    c, s = cos(left), sin(left)
+    x, y = c * x - s * y, s * x + c * y
+    d = np.stack(
+        [x - up * x * z, y - up * y * z, z + up * (x * x + y * y)], axis=1
+    )
+    return d / np.sqrt(dot(d, d))[:, None]
 
 
 class CalibratedTurn:
@@ -248,6 +307,10 @@ class CalibratedTurn:
 
     Attributes:
         d_Sset: (N, 3) true directions in the order of casting.
+        height: (N,) heights of their lasers above the origin [m].
+        blocks: each height, and the rows that have it.
+        reported: (N, 3) directions by the unit, in firing order.
+        p_SLset: (N, 3) places of their lasers, in firing order [m].
         beam: (N,) number of each beam, in firing order.
         orders: (2, N) orders of the rays in which neighbours follow each
             other: that of casting, and that of firing, which has the row of
@@ -259,27 +322,25 @@ class CalibratedTurn:
     def __init__(
         self,
         beams: Beams,
+        d_Sset: np.ndarray,
+        reported: np.ndarray,
+        height: np.ndarray,
         range_error: np.ndarray,
-        elevation_error: np.ndarray,
-        azimuth_error: np.ndarray,
-        gain_error: np.ndarray,
+        gain: np.ndarray,
     ):
-        """Takes the beams and the (N,) errors of each."""
-        self.range_error, self.gain = range_error, 1.0 + gain_error
-        x, y, z = beams.d_Sset.T
-        across = np.maximum(np.sqrt(x * x + y * y), 1e-9)
-        up = elevation_error / across
-        d_Sset = np.stack(
-            [
-                x - azimuth_error * y - up * x * z,
-                y + azimuth_error * x - up * y * z,
-                z + up * across * across,
-            ],
-            axis=1,
-        )
-        d_Sset /= np.sqrt(dot(d_Sset, d_Sset))[:, None]
+        """Takes the attributes, all in firing order."""
+        self.range_error, self.gain = range_error, gain
+        self.reported = reported
+        self.p_SLset = np.outer(height, (0.0, 0.0, 1.0))
         self.beam = np.asarray(beams.packet_order, np.int64)
         self.d_Sset = np.ascontiguousarray(d_Sset[self.beam])
+        self.height = height[self.beam]
         self.orders = np.stack(
             [np.arange(len(self.beam)), np.argsort(self.beam)]
         )
+        ends = np.flatnonzero(np.diff(self.height)) + 1
+        ends = np.concatenate([[0], ends, [len(self.height)]])
+        self.blocks = [
+            (self.height[first], slice(first, last))
+            for first, last in pairwise(ends)
+        ]

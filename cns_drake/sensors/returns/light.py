@@ -130,6 +130,12 @@ def reflected(
 
 # Edges of the cells of equal albedo [m]: patches, and grains.
 _PATCH, _GRAIN = 0.35, 0.06
+# Contrast of patches in units of that of grains.
+_PATCHES = 2.5
+# Height of courses of a wall, width and height of what hangs on it [m], and
+# the part of the wall that it covers; the farthest that tufts end a beam [m].
+_COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.15
+_FARTHEST = 1.0
 
 
 @compiled
@@ -162,6 +168,7 @@ def texture(
     # As names of their own, fields are fast.
     beam, geometry = light.beam, light.geometry
     contrast, relief = materials.contrast, materials.relief
+    tufts, fittings = materials.tufts, materials.fittings
     for k in range(len(energy)):
         part = contrast[geometry[k]]
         if part == 0.0:
@@ -180,8 +187,20 @@ def texture(
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z
         grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
         patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
-        energy[k] *= 1.0 + part * (patch + grain)
+        share = 0.5 * part * (_PATCHES * patch + grain)
+        energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
+        if tufts[geometry[k]] > 0.0:
+            # They stand up: a flat beam ends far in front of their foot.
+            down = max(-d_Wset[ray, 2], 0.01)
+            height = 0.5 * tufts[geometry[k]] * (1.0 + grain)
+            distance[k] -= min(height / down, _FARTHEST)
+        out = fittings[geometry[k]]
+        if out > 0.0:
+            distance[k] -= 0.2 * out * _albedo(0.0, 0.0, z / _COURSE)
+            thing = _albedo(a / _WIDE, b / _WIDE, z / _HIGH)
+            if thing > 1.0 - 2.0 * _COVERED:
+                distance[k] -= out * (0.5 + 0.5 * patch)
     return Light(light.beam, distance, energy, light.geometry)
 
 

@@ -18,7 +18,7 @@ from cns_drake.scene.structure_table import StructureTable
 from cns_drake.scene.surfaces import HalfSpaceSurface, Surface, TriangleSurface
 
 # Kinds of materials.
-LAMBERT, RETRO, GLASS, LEAVES, BEADS = range(5)
+LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)
 
 # Class -> reflectivity of a dark and of a bright colour; equal if the colour
 # has no influence near 900 nm.
@@ -56,18 +56,21 @@ _SMOOTH = {c for c in _BY_CLASS if c.endswith("car") or "vehicle" in c} | {
 # the cosine and 0.34 times the square of the sine, here over the first one.
 _OREN_NAYAR = 0.44
 # How far albedo differs from its mean within a surface, as a part of it, in
-# grains and in patches; and how far beams end in front of it and behind it [m]:
-# in gravel, in grass, among leaves, on sills, pipes and joints.
+# grains, and more so in patches; and how far beams end in front of it and
+# behind it [m]: in gravel, among leaves, on joints.
 _TEXTURE = {
     "road": (0.25, 0.01),
     "parking": (0.25, 0.01),
     "sidewalk": (0.2, 0.015),
-    "building": (0.25, 0.04),
-    "terrain": (0.4, 0.25),
+    "building": (0.25, 0.02),
+    "terrain": (0.4, 0.02),
     "vegetation": (0.4, 0.2),
     "trunk": (0.3, 0.04),
 }
 _OTHER_TEXTURE, _SMOOTH_TEXTURE = (0.2, 0.02), (0.05, 0.0)
+# Height of tufts of rough grass, and how far courses, sills and what hangs on
+# fronts stand out [m].
+_TUFTS, _FITTINGS = {"terrain": 0.15}, {"building": 0.35}
 # Diffuse light from dust on a pane, and from water.
 _GLASS_DUST = 0.02
 _WATER = 0.02
@@ -89,9 +92,9 @@ class Materials(NamedTuple):
 
     Attributes:
         kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS`, `LEAVES` (for volumes of
-            leaves, not for single leaves) or `BEADS`, the retro-reflector of
-            road markings, which works at any angle: EN 1436 measures it 1.24
-            deg above the road.
+            leaves), `SPRAYS` (for sheets that stand for leaves on a twig) or
+            `BEADS`, the retro-reflector of road markings, which works at any
+            angle: EN 1436 measures it 1.24 deg above the road.
         reflectivity: (G,) float32, of a retro-reflector in units of a
             Lambertian target of reflectivity 1 that faces the beam.
         leaf_area_density: (G,) float32 [1/m].
@@ -99,6 +102,8 @@ class Materials(NamedTuple):
             to the cosine.
         contrast: (G,) float32, how far albedo differs within a surface.
         relief: (G,) float32, how far beams end off the surface [m].
+        tufts: (G,) float32 height of what grows on it [m].
+        fittings: (G,) float32, how far what hangs on it stands out [m].
     """
 
     kind: np.ndarray
@@ -107,6 +112,8 @@ class Materials(NamedTuple):
     rough: np.ndarray
     contrast: np.ndarray
     relief: np.ndarray
+    tufts: np.ndarray
+    fittings: np.ndarray
 
 
 def find_materials(
@@ -142,7 +149,7 @@ def find_materials(
         _surface(geometry, structures, kind)
         for geometry, kind in zip(geometries, kinds, strict=True)
     ]
-    surface = np.array(surfaces, np.float32).reshape(-1, 3).T
+    surface = np.array(surfaces, np.float32).reshape(-1, 5).T
     return Materials(
         np.array(kinds, np.uint8),
         np.array(rhos, np.float32),
@@ -153,20 +160,22 @@ def find_materials(
 
 def _surface(
     geometry: PerceptionGeometry, structures: StructureTable, kind: int
-) -> tuple[float, float, float]:
-    """Returns `rough`, `contrast` and `relief`; see `Materials`."""
+) -> tuple[float, ...]:
+    """Returns `rough` and what follows it in `Materials`."""
     entry = structures[geometry.structure]
     given = geometry.reflectivity, entry.reflectivity
-    if kind not in (LAMBERT, LEAVES) or given != (None, None):
-        return 0.0, 0.0, 0.0
-    smooth = entry.semantic_class in _SMOOTH
+    if kind not in (LAMBERT, LEAVES, SPRAYS) or given != (None, None):
+        return (0.0,) * 5
+    name = entry.semantic_class
+    smooth = name in _SMOOTH
     other = _SMOOTH_TEXTURE if smooth else _OTHER_TEXTURE
-    texture = _TEXTURE.get(entry.semantic_class, other)
-    contrast, relief = texture
+    contrast, relief = _TEXTURE.get(name, other)
     # A volume of leaves has depth in any case.
     if kind == LEAVES:
         relief = 0.0
-    return 0.0 if smooth else _OREN_NAYAR, contrast, relief
+    rough = 0.0 if smooth else _OREN_NAYAR
+    standing = _TUFTS.get(name, 0.0), _FITTINGS.get(name, 0.0)
+    return rough, contrast, relief, *standing
 
 
 def _material(
@@ -194,7 +203,7 @@ def _material(
     if entry.semantic_class == "vegetation":
         if words & {"wood", "trunk", "box", "pot", "edge"}:
             return LAMBERT, _BARK, 0.0
-        kind = LEAVES if is_closed(geometry.surface) else LAMBERT
+        kind = LEAVES if is_closed(geometry.surface) else SPRAYS
         return kind, bright, _LEAF_AREA_DENSITY
     return LAMBERT, dark + (bright - dark) * _brightness(geometry.rgb), 0.0
 

@@ -26,13 +26,20 @@ from cns_drake.sensors.returns.light import (
     select,
 )
 from cns_drake.sensors.returns.link_budget import LinkBudget
-from cns_drake.sensors.returns.materials import GLASS, LEAVES, Materials
+from cns_drake.sensors.returns.materials import (
+    GLASS,
+    LEAVES,
+    SPRAYS,
+    Materials,
+)
 from cns_drake.sensors.returns.random_numbers import uniform
 
 # Refractive index of window glass near 900 nm.
 _GLASS_INDEX = 1.52
 # G of leaves of all directions.
 _LEAF_PROJECTION = 0.5
+# Leaf area that a ray passes through a spray: two of five go on.
+_SPRAY = 0.9
 # Greatest number of continuations of a ray.
 _MOST_STEPS = 6
 # A continued ray begins this far behind the surface [m].
@@ -104,7 +111,7 @@ def start_ways(
     Returns:
         The light, the rays that meet panes or leaves, and what they meet.
     """
-    is_open = np.isin(materials.kind, (GLASS, LEAVES))
+    is_open = np.isin(materials.kind, (GLASS, LEAVES, SPRAYS))
     axes = np.flatnonzero((hits.geometry >= 0) & (rest > 0.0))
     lit = np.flatnonzero(side_hits.geometry >= 0)
     onto_open = is_open[hits.geometry[axes]]
@@ -253,6 +260,13 @@ def _step(
                 density = materials.leaf_area_density[geometry]
                 way_in = left / (_LEAF_PROJECTION * density)
                 inside[way], reach[way] = geometry, min(way_in, reach[way])
+            for axis in range(3):
+                d_Wset[way, axis] = met.d_Wset[ray, axis]
+            way += 1
+            continue
+        if materials.kind[geometry] == SPRAYS and left > _SPRAY:
+            before[way], share[way], depth[way] = ray, 1.0, left - _SPRAY
+            inside[way], reach[way] = medium, max_range - length
             for axis in range(3):
                 d_Wset[way, axis] = met.d_Wset[ray, axis]
             way += 1

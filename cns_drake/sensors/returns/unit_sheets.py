@@ -58,6 +58,22 @@ class Response:
 
 
 @dataclass(frozen=True)
+class Head:
+    """Where the lasers of a unit sit, and how it reports its turn.
+
+    Attributes:
+        heights: the lowest elevation of each block of lasers [deg], and its
+            height above the origin [m], from the top.
+        tick_deg: azimuths are reported in steps of this; 0 for exact ones.
+            Then each laser has an azimuth of its own, up to one step aside
+            [deg].
+    """
+
+    heights: tuple[tuple[float, float], ...] = ((-90.0, 0.0),)
+    tick_deg: float = 0.0
+
+
+@dataclass(frozen=True)
 class UnitSheet:
     """The data sheet of a unit.
 
@@ -76,6 +92,7 @@ class UnitSheet:
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
         response: its intensities.
+        head: the places of its lasers.
     """
 
     rows: tuple[SheetRow, ...]
@@ -88,6 +105,7 @@ class UnitSheet:
     source: str
     angle_error_deg: float = 0.03
     response: Response = Response()
+    head: Head = Head()
 
     @property
     def budget(self) -> LinkBudget:
@@ -186,10 +204,12 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
         ("probability",),
         "Velodyne HDL-64E manual: 120 m for cars and foliage (reflectivity "
         "about 0.8), 50 m for pavement (about 0.1), below 2 cm, 2 mrad, 5 ns; "
-        "response and errors of angles fitted to the first eleven scans of "
-        "KITTI odometry 00",
+        "response, errors of angles and steps of azimuths fitted to the first "
+        "eleven scans of KITTI odometry 00; heights of blocks rounded from the "
+        "calibration of an S2.1 in ROS's velodyne_pointcloud",
         0.06,
         Response(0.57, 0.3, True, 4.0, 0.05, 0.1, 0.1),
+        Head(((-8.5, 0.2), (-90.0, 0.115)), 0.09),
     ),
     "hdl-32e": UnitSheet(
         _rows((0.8, 100.0, 0.9), None),

@@ -9,12 +9,14 @@ from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 
 @pytest.mark.parametrize("step", [0.0, 2.0**-10, 0.003])
-def test_points_are_what_numpy_makes_of_the_beams(step):
+@pytest.mark.parametrize("is_apart", [False, True])
+def test_points_are_what_numpy_makes_of_the_beams(step, is_apart):
     rng = np.random.default_rng(8)
     pattern = make_beam_pattern("vlp-16", 0.05)
     num = pattern.num_beams
     table = BeamTable(
         pattern.d_Sset.astype(np.float32),
+        rng.normal(0.0, 0.1, (num * is_apart, 3)).astype(np.float32),
         pattern.beams(0).ring,
         pattern.beams(0).t_ns,
         rng.permutation(num),
@@ -32,6 +34,8 @@ def test_points_are_what_numpy_makes_of_the_beams(step):
         np.float32(step),
     )  # fmt: skip
     expected = table.d_Sset[beams] * ranges[:, None]
+    if is_apart:
+        expected += table.p_Sset[beams]
     assert expected.dtype == np.float32
     if step:
         expected = np.rint(expected / np.float32(step)) * np.float32(step)

@@ -174,14 +174,16 @@ def test_markings_shine_however_flat_they_are_seen(above_deg):
     bright = {}
     tilt = np.deg2rad(90.0 - above_deg)
     for name in ("markings", "asphalt"):
-        X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, tilt), [12.0, 0.0, 0.0])
-        points = scan(
-            [plate(name, None, X_WG)], ahead(100), unit(), structures=road
-        )
-        bright[name] = np.median(points["intensity"])
+        found = []
+        for x in np.linspace(10.0, 14.0, 9):
+            X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, tilt), [x, 0.0, 0.0])
+            plate_ = plate(name, None, X_WG)
+            points = scan([plate_], ahead(100), unit(), structures=road)
+            found.append(points["intensity"])
+        bright[name] = np.median(np.concatenate(found))
     assert bright["markings"] == 47.0
     # Oren and Nayar for slopes of 30 deg, over their value for a target that
-    # faces the unit; a few grains are brighter or darker than the mean.
+    # faces the unit; nine patches are brighter or darker than the mean.
     cosine = np.sin(np.deg2rad(above_deg))
     a, b = (1.0 - 0.5 * 0.274 / 0.604), 0.45 * 0.274 / 0.364
     expected = 15.0 * (cosine + b / a * (1.0 - cosine**2))

@@ -2,14 +2,17 @@
 
 from dataclasses import replace
 
-from helpers.plates import facing, plate, scan, unit
+from helpers.plates import ahead, facing, plate, scan, unit
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.geometry import HalfSpace
+from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
+from cns_drake.ray_casting.ray_casting_scene import RayHits
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
+from cns_drake.sensors.returns.materials import LAMBERT, Materials
 from cns_drake.sensors.returns.unit_sheets import Response
 
 ROAD = StructureTable([StructureEntry(1, "asphalt", "road")])
@@ -54,12 +57,114 @@ def test_reported_angles_are_nominal_and_true_ones_are_not():
     for error in (up, round_):
         of_laser = np.array([error[ring == k].mean() for k in range(64)])
         np.testing.assert_allclose(error, of_laser[ring], atol=1e-4)
-        assert 0.04 < of_laser.std() < 0.08
+        assert 0.04 < of_laser.std() < 0.1
     points = scan([plate("wall", 0.8, facing(8.0))], pattern, returns)
     p = np.stack([points[axis] for axis in "xyz"], axis=1)
+    # Blocks are at these heights, by the sheet.
+    p[:, 2] -= np.where(points["ring"] < 32, 0.2, 0.115)
     elevation = np.arcsin(p[:, 2] / np.linalg.norm(p, axis=1))
     expected = np.array(pattern.elevations_rad)[points["ring"]]
     np.testing.assert_allclose(elevation, expected, atol=1e-6)
+    # Azimuths of a laser are whole steps apart.
+    steps = np.arctan2(p[:, 1], p[:, 0]) / np.radians(0.09)
+    for ring in (0, 31, 32, 63):
+        rest = np.exp(2j * np.pi * steps[points["ring"] == ring])
+        assert abs(rest.mean()) > 0.999
+
+
+def test_beams_start_at_their_lasers():
+    whole = make_beam_pattern("hdl-64e")
+    pattern = whole.within((-8, 8))
+    returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
+    returns = replace(returns, sheet=replace(returns.sheet, angle_error_deg=0))
+    wall = plate("wall", 0.8, facing(8.0), (0.1, 400.0, 0.4))
+    points = scan([wall], pattern, returns)
+    height = np.where(np.arange(64) < 32, 0.2, 0.115)
+    met = height + 8.0 * np.tan(whole.elevations_rad)
+    # Beams beside an edge may meet it or not.
+    for is_met, least in ((np.abs(met) < 0.19, 40), (np.abs(met) > 0.21, 0)):
+        found = np.bincount(points["ring"], minlength=64)[is_met]
+        assert (found >= least).all() if least else not found.any()
+
+
+class Wall:
+    """A scene with a wall 8 m ahead, for a unit that does not turn."""
+
+    def cast_rays(self, p_WSset, d_Sset, max_range, **_):
+        p_WSset = np.resize(p_WSset, d_Sset.shape)
+        ranges = (8.0 - p_WSset[:, 0]) / d_Sset[:, 0]
+        normals = np.tile(np.float32([-1.0, 0.0, 0.0]), (len(ranges), 1))
+        is_met = (ranges > 0.0) & (ranges < 30.0)
+        return RayHits(
+            np.where(is_met, ranges, np.inf).astype(np.float32),
+            np.where(is_met, 0, -1).astype(np.int32),
+            normals * is_met[:, None],
+            is_met,
+        )
+
+    def surface_frames(self):
+        return np.zeros(1, int), np.eye(3)[None], np.zeros((1, 3))
+
+
+def test_lasers_have_their_places_however_poses_are_given():
+    pattern = make_beam_pattern("hdl-64e")
+    returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
+    turn = returns.turn(pattern.beams(0))
+    zero, half = np.zeros(1, np.float32), np.full(1, 0.5, np.float32)
+    materials = Materials(
+        np.array([LAMBERT], np.uint8), half, zero, zero, half, zero, zero, zero
+    )
+    found = [
+        returns.measure(
+            Wall(),
+            materials,
+            pattern,
+            turn,
+            np.zeros((count, 3)),
+            np.tile(np.eye(3), (count, 1, 1)),
+            np.zeros(count),
+            0,
+        )
+        for count in (1, pattern.num_columns, pattern.num_beams)
+    ]
+    assert len(found[0].beam) > 20_000
+    for other in found[1:]:
+        np.testing.assert_array_equal(other.beam, found[0].beam)
+        np.testing.assert_array_equal(other.distance, found[0].distance)
+        np.testing.assert_array_equal(other.intensity, found[0].intensity)
+
+
+def test_tufts_stand_on_rough_grass():
+    grass = StructureTable([StructureEntry(1, "grass", "terrain")])
+    X_WG = RigidTransform([0.0, 0.0, -1.75])
+    pattern = make_beam_pattern("os1-128").within((-60, 60))
+    ground = plate("grass", None, X_WG, (400.0, 400.0, 0.1))
+    points = scan([ground], pattern, unit(), structures=grass)
+    near = points[np.hypot(points["x"], points["y"]) < 8.0]
+    height = near["z"] + 1.7
+    assert height.mean() == pytest.approx(0.075, abs=0.01)
+    assert height.std() == pytest.approx(0.15 / 12**0.5, abs=0.01)
+
+
+def test_things_hang_on_fronts():
+    house = StructureTable([StructureEntry(1, "house", "building")])
+    pattern = make_beam_pattern("os1-128").within((-20, 20))
+    front = plate("house", None, facing(9.0))
+    points = scan([front], pattern, unit(), structures=house)
+    out = 9.0 - points["x"]
+    assert 0.05 < np.mean(out > 0.12) < 0.15
+    assert out.min() > -0.2
+    assert out.max() < 0.55
+
+
+def test_two_of_five_rays_pass_a_spray():
+    tree = StructureTable([StructureEntry(1, "tree", "vegetation")])
+    X_WG = RigidTransform(RollPitchYaw(0.0, -np.pi / 2, 0.0), [9.0, 0.0, 0.0])
+    spray = plate("tree/leaves", None, X_WG, shape=HalfSpace())
+    wall = plate("behind", 0.5, facing(20.0))
+    points = scan([spray, wall], ahead(8_000), unit(), structures=tree)
+    passed = np.mean(points["x"] > 19.0)
+    assert passed == pytest.approx(np.exp(-0.9), abs=0.02)
 
 
 def road(x, distance, returns, seed=5):
