@@ -19,11 +19,7 @@ from cns_drake.sensors.returns.light import BeamHits, dot, join, texture
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
-from cns_drake.sensors.returns.unit_sheets import (
-    RANGE_BIAS,
-    UNIT_SHEETS,
-    UnitSheet,
-)
+from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
 
 CLEAR = Weather()
@@ -245,7 +241,7 @@ class CalibratedReturns:
         sheet, head = self.sheet, self.sheet.head
         angle = np.radians(sheet.angle_error_deg)
         sizes = (
-            RANGE_BIAS * sheet.range_floor,
+            sheet.range_bias,
             angle,
             angle,
             sheet.response.gain,

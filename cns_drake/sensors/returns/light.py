@@ -193,7 +193,8 @@ def texture(
         if tufts[geometry[k]] > 0.0:
             # They stand up: a flat beam ends far in front of their foot.
             down = max(-d_Wset[ray, 2], 0.01)
-            height = 0.5 * tufts[geometry[k]] * (1.0 + grain)
+            height = 0.5 + 0.35 * patch + 0.15 * grain
+            height *= tufts[geometry[k]]
             distance[k] -= min(height / down, _FARTHEST)
         out = fittings[geometry[k]]
         if out > 0.0:

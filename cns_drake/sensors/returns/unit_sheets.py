@@ -19,9 +19,6 @@ from cns_drake.sensors.returns.link_budget import (
 
 # Speed of light [m/s].
 _LIGHT = 299_792_458.0
-# The part of the best accuracy that is each laser's own; the rest, 0.6, is each
-# shot's: the squares add up.
-RANGE_BIAS = 0.8
 
 
 @dataclass(frozen=True)
@@ -81,8 +78,7 @@ class UnitSheet:
         rows: ranges at stated reflectivities, at most two.
         range_noise: standard deviation of a range at an SNR of 1 [m].
         range_floor: the best stated accuracy or precision, as the standard
-            deviation of a range at any SNR [m]: 0.8 of it for each laser of a
-            unit, 0.6 of it for each shot.
+            deviation of a range at any SNR [m].
         divergence_deg: full angle of the beam at 1 / e^2 of its peak [deg].
         pulse_ns: width of its pulse at half of the peak [ns].
         retro_from: the intensity at which retro-reflectors begin; diffuse
@@ -91,6 +87,8 @@ class UnitSheet:
         source: where the numbers are from.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
+        own_part: the part of the best accuracy that is each laser's own; the
+            rest is each shot's: the squares add up to 1.
         response: its intensities.
         head: the places of its lasers.
     """
@@ -104,15 +102,20 @@ class UnitSheet:
     unknown: tuple[str, ...]
     source: str
     angle_error_deg: float = 0.03
+    own_part: float = 0.8
     response: Response = Response()
     head: Head = Head()
 
     @property
     def budget(self) -> LinkBudget:
-        bias = RANGE_BIAS * self.range_floor
         return fit_link_budget(
-            self.rows, self.range_noise, self.range_floor, bias
+            self.rows, self.range_noise, self.range_floor, self.range_bias
         )
+
+    @property
+    def range_bias(self) -> float:
+        """Standard deviation of a laser's own error of range [m]."""
+        return self.own_part * self.range_floor
 
     @property
     def divergence(self) -> float:
@@ -204,10 +207,11 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
         ("probability",),
         "Velodyne HDL-64E manual: 120 m for cars and foliage (reflectivity "
         "about 0.8), 50 m for pavement (about 0.1), below 2 cm, 2 mrad, 5 ns; "
-        "response, errors of angles and steps of azimuths fitted to the first "
+        "response, errors of lasers and steps of azimuths fitted to the first "
         "eleven scans of KITTI odometry 00; heights of blocks rounded from the "
         "calibration of an S2.1 in ROS's velodyne_pointcloud",
-        0.06,
+        0.05,
+        0.9,
         Response(0.57, 0.3, True, 4.0, 0.05, 0.1, 0.1),
         Head(((-8.5, 0.2), (-90.0, 0.115)), 0.09),
     ),

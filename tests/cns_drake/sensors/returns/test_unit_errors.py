@@ -35,9 +35,9 @@ def offsets(seed, frame=0, name="lidar"):
 def test_errors_of_range_belong_to_the_unit():
     one, again = offsets(1), offsets(2, frame=5)
     other = offsets(1, name="other")
-    assert 0.6 * 0.016 < one.std() < 1.4 * 0.016
-    # What differs is the mean over 46 shots of 12 mm.
-    assert np.std(one - again) < 0.004
+    assert 0.6 * 0.018 < one.std() < 1.4 * 0.018
+    # What differs is the mean over 46 shots of 9 mm.
+    assert np.std(one - again) < 0.003
     assert abs(np.corrcoef(one, other)[0, 1]) < 0.4
 
 
@@ -57,7 +57,7 @@ def test_reported_angles_are_nominal_and_true_ones_are_not():
     for error in (up, round_):
         of_laser = np.array([error[ring == k].mean() for k in range(64)])
         np.testing.assert_allclose(error, of_laser[ring], atol=1e-4)
-        assert 0.04 < of_laser.std() < 0.1
+        assert 0.03 < of_laser.std() < 0.09
     points = scan([plate("wall", 0.8, facing(8.0))], pattern, returns)
     p = np.stack([points[axis] for axis in "xyz"], axis=1)
     # Blocks are at these heights, by the sheet.
@@ -143,7 +143,10 @@ def test_tufts_stand_on_rough_grass():
     near = points[np.hypot(points["x"], points["y"]) < 8.0]
     height = near["z"] + 1.7
     assert height.mean() == pytest.approx(0.075, abs=0.01)
-    assert height.std() == pytest.approx(0.15 / 12**0.5, abs=0.01)
+    # Of patches and grains.
+    assert height.std() == pytest.approx(
+        0.15 * np.hypot(0.7, 0.3) / 12**0.5, abs=0.01
+    )
 
 
 def test_things_hang_on_fronts():
