@@ -159,7 +159,6 @@ class CalibratedReturns:
         times = np.asarray(times, np.float32)
         found = []
         for height, rows in turn.blocks:
-            d_Sset = turn.d_Sset[rows]
             # Whole turns of the columns need none of them picked out.
             p, R, when = (
                 one[rows] if len(one) == len(turn.beam) else one
@@ -168,14 +167,15 @@ class CalibratedReturns:
             # A single place for all rays is faster.
             hits = scene.cast_rays(
                 p + height * R[:, :, 2],
-                d_Sset,
+                turn.d_Sset[rows],
                 reach,
                 R_WSset=R,
                 times=when,
                 with_normals=True,
             )
-            found.append(BeamHits.of(rotate(R, d_Sset), hits))
-        met = join(found)
+            found.append(list(vars(hits).values()))
+        joined = RayHits(*map(np.concatenate, zip(*found, strict=True)))
+        met = BeamHits.of(rotate(R_WSset, turn.d_Sset), joined)
         if turn.height.any():
             every = np.arange(len(turn.height))
             up_W = _taken(R_WSset[:, :, 2], every)
