@@ -143,7 +143,7 @@ def test_tufts_stand_on_rough_grass():
     near = points[np.hypot(points["x"], points["y"]) < 8.0]
     height = near["z"] + 1.7
     assert height.mean() == pytest.approx(0.075, abs=0.01)
-    # Of patches and grains.
+    # Patches and grains are uniform.
     assert height.std() == pytest.approx(
         0.15 * np.hypot(0.7, 0.3) / 12**0.5, abs=0.01
     )
