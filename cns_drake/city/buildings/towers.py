@@ -321,48 +321,8 @@ def _add_sign(p: Hotel, plan: np.ndarray) -> None:
     p.add("sign", blade, *arms, rgb=(0.55, 0.16, 0.14))
 
 
-_CLADDINGS = (
-    ((0.70, 0.66, 0.60), (0.84, 0.83, 0.80)),
-    ((0.45, 0.42, 0.40), (0.72, 0.70, 0.66)),
-    ((0.60, 0.50, 0.42), (0.56, 0.60, 0.63)),
-)
-_PODIUM_TOWER_ROOF_ITEMS = (
-    "lift_house",
-    "cooling_tower",
-    "air_handler",
-    "mast",
-)
-
-
 class PodiumTower(Building):
-    """The podium tower: a block of shops with a tower set back on its roof.
-
-    The tower covers the share `tower` of the podium along x and y and
-    stands at the fraction `at` of the room that is left.
-    """
-
-    def draw(self, d: Dice) -> None:
-        x0, y0, x1, y1 = d.site.bounds
-        podium_rgb, tower_rgb = d.pick(_CLADDINGS)
-        share = d.rng.uniform(0.5, 0.68, 2)
-        run = 2 * (share[0] * d.width + share[1] * d.depth)
-        self.podium_storeys = d.whole(2, 4)
-        self.ground_height = d.uniform(4.8, 5.6, 2)
-        self.storey_height = d.uniform(3.2, 3.7)
-        self.shop_pitch = d.uniform(5.5, 7.5) * min(
-            1.3, max(1.0, (x1 - x0 + y1 - y0) / 70)
-        )
-        self.tower = (float(share[0]), float(share[1]))
-        self.at = tuple(d.rng.choice([0.15, 0.5, 0.85], 2).tolist())
-        self.chamfer = d.pick((0.0, 2.0, 3.5))
-        self.pitch = max(d.uniform(3.0, 4.2), run / 19)
-        self.recess = d.uniform(0.35, 0.5, 2)
-        self.frame = d.uniform(0.5, 0.9, 2)
-        self.mullions = int(run < 70.0)
-        self.balconies = d.chance(0.5)
-        self.awnings = d.uniform(0.3, 0.9)
-        self.rgb = podium_rgb
-        self.tower_rgb = tower_rgb
+    """The podium tower: a block of shops with a tower set back on its roof."""
 
     def build(self) -> None:
         """Builds podium and tower on a rectangle."""
@@ -432,7 +392,7 @@ def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
     louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
     screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
     roof = tiers.add_crown(p, plan, screen, top, 2.2)
-    equip_roof(p, plan, roof, _PODIUM_TOWER_ROOF_ITEMS)
+    equip_roof(p, plan, roof, p.roof_items)
 
 
 def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:
