@@ -830,8 +830,6 @@ NOT_RUN = {
     "minutes; test_map_pairs reads its table",
     "cns-drake ladder --levels": "hours of work; the recipe ladder climbs some "
     "of it",
-    "cns-drake simulate metropolis_03 --returns calibrated": "records two "
-    "drives, for minutes; test_cli scans with calibrated returns",
     "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
     "script of another project; test_traffic_recording records traffic",
     "cns-drake size": "describes shipped drives, for many minutes; test_size "
