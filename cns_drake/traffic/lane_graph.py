@@ -12,8 +12,10 @@ from shapely.geometry.base import BaseGeometry
 
 # Distance of the points of a piece at most [m].
 SPACING = 0.5
-# Walkers' middles keep this distance from things beside them [m].
+# Walkers' middles keep this distance from things beside them; that where they
+# may wait and turn, on so many points at either end, is their boxes' reach [m].
 _BESIDE = 0.36
+_AROUND, _WAITS = 0.53, 4
 # Number of places across a walkway, and least number of points along it.
 _ACROSS, _ALONG = 21, 4
 # Walkers step aside by this number of places from point to point.
@@ -125,9 +127,14 @@ def kept_clear(
         right /= np.linalg.norm(right, axis=1)[:, None]
         across = np.linspace(-way.half_width, way.half_width, _ACROSS)
         places = points[:, None] + across[:, None] * right[:, None]
-        near = tree.query(shapely.points(places).ravel(), "dwithin", _BESIDE)[0]
-        barred = np.zeros(places.shape[:2], int)
-        barred.flat[near] = 1
+        barred, around = np.zeros((2, *places.shape[:2]), int)
+        for each, reach in ((barred, _BESIDE), (around, _AROUND)):
+            near = tree.query(shapely.points(places).ravel(), "dwithin", reach)
+            each.flat[near[0]] = 1
+        ends = np.zeros(len(points), bool)
+        ends[:_WAITS] = ends[-_WAITS:] = way.crossing < 0
+        ends &= ~around.all(axis=1)
+        barred[ends] = around[ends]
         # A walker is longer than wide, and needs a way to step aside.
         barred = maximum_filter1d(barred, 3, axis=0)
         for step in (1, -1):

@@ -546,7 +546,7 @@ def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
     beyond = max(across - high, low - across, 0.0)
     half = 0.5 * (high - low)
     if nearest == path.num_points - 1:
-        return np.hypot(beyond, max(along - half, 0.0))
+        return np.hypot(beyond, max(along, 0.0))
     if nearest == 0:
         return np.hypot(beyond, max(-_AT_NODE - half - along, 0.0))
     return beyond

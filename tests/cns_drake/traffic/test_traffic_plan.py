@@ -291,6 +291,17 @@ def test_walkways_end_where_things_bar_the_way():
     assert [way.crossing for way in found] == [-1, -1]
 
 
+def test_walkers_wait_farther_from_things():
+    """At the ends of a walkway, where they turn, their boxes' corners count."""
+    post = shapely.Point(19.5, 1.15).buffer(0.2)
+    (way,) = kept_clear([straight()], [post])
+    # 0.53 m beside it, rounded down to one of 20 parts; it is on the left.
+    np.testing.assert_allclose(way.limits[-1], [-0.4, 1.0])
+    post = shapely.Point(10.0, 1.15).buffer(0.2)
+    (way,) = kept_clear([straight()], [post])
+    np.testing.assert_allclose(way.limits[20], [-0.5, 1.0])
+
+
 def test_walkers_pass_what_stands_on_sidewalks():
     _, graph, walkways = roads("riverside")
     rng = np.random.default_rng(3)
