@@ -35,6 +35,6 @@ def test_numbers_are_those_of_the_table(tmp_path):
 def test_the_page_has_all_pairs_and_methods():
     page = documents.read("docs/results.md")
     methods, pairs, values = survival_chart.read_table(page.text)
-    assert (len(methods), len(pairs)) == (6, 10)
+    assert (len(methods), len(pairs)) == (6, 18)
     assert np.isfinite(values[:, :, 0]).all()
     assert values[:, :, 0].max() == pytest.approx(1.0, abs=0.2)
