@@ -53,9 +53,7 @@ STEPS = {
     "motion": (
         (VehicleMotion, "_calc_state"),
         (VehicleMotion, "_calc_position"),
-        (VehicleMotion, "_calc_poses"),
-        (VehicleMotion, "_calc_velocities"),
-        (VehicleMotion, "_calc_accelerations"),
+        (VehicleMotion, "_calc_bodies"),
         (OdometrySensor, "_calc_odometry"),
     ),
     "cast": ((RayCastingScene, "cast_rays"),),
