@@ -5,7 +5,6 @@ distributes the tests needs none of them.
 """
 
 import gc
-import os
 import signal
 import sys
 from types import ModuleType
@@ -37,11 +36,6 @@ def pytest_addoption(parser):
     parser.addoption(
         "--fuzz-seed", type=int, default=0, help="in which ways it does"
     )
-
-
-def pytest_xdist_auto_num_workers():
-    """One worker more than cores: many tests wait for programs they start."""
-    return len(os.sched_getaffinity(0)) + 1
 
 
 def pytest_collection_modifyitems(items):

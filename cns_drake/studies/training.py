@@ -306,7 +306,7 @@ def train(
         )
         return cross.mean(), (best > 0.0).mean()
 
-    @jax.jit  # type: ignore[untyped-decorator]  # JAX is no dependency.
+    @jax.jit
     def update(
         values: Parameters,
         first: Parameters,

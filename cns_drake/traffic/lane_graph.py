@@ -161,18 +161,18 @@ def kept_clear(
         if way.crossing >= 0 and len(bars):
             continue
         for before, after in pairwise([-1, *bars.tolist(), len(points)]):
-            rows, ends = slice(before + 1, after), [way.start, way.end]
+            rows, nodes = slice(before + 1, after), [way.start, way.end]
             if after - before <= _ALONG:
                 continue
             for k, is_cut in enumerate((before >= 0, after < len(points))):
                 if is_cut:
-                    ends[k], num_nodes = num_nodes, num_nodes + 1
+                    nodes[k], num_nodes = num_nodes, num_nodes + 1
             found.append(
                 replace(
                     way,
                     points=way.points[rows],
-                    start=ends[0],
-                    end=ends[1],
+                    start=nodes[0],
+                    end=nodes[1],
                     free=limits[rows],
                 )
             )

@@ -402,7 +402,7 @@ def _forces(
         right = (paths.tangents[here, 1], -paths.tangents[here, 0])
         force[i] -= one.velocity / _RELAXATION
         if is_waiting[i]:
-            # Edges would push it to and fro in a narrow gap.
+            # Edges would shake it in a narrow gap.
             continue
         target = path.first + min(one.at + _AHEAD, path.num_points - 1)
         left, most = paths.limits[target]

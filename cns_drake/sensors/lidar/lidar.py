@@ -323,6 +323,7 @@ class Lidar(LeafSystem):
         """Returns the hit geometry of each return, and the returns."""
         assert seen.scene is not None
         if self._returns is not None:
+            assert turn.calibrated is not None
             reported = self._returns.measure(
                 seen.scene,
                 seen.materials(is_wet=self._returns.is_wet),

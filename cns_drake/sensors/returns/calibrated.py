@@ -195,9 +195,8 @@ class CalibratedReturns:
         divergence = self.sheet.divergence
         sides = find_sides(key, turn.beam, turn.orders, met, divergence, reach)
         # A single place for all is faster.
-        rows = sides.row
-        origins = _taken(p_WSset, rows)
-        when = times[rows % len(times)]
+        origins = _taken(p_WSset, sides.row)
+        when = times[sides.row % len(times)]
         side_met = BeamHits.of(
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
         )
