@@ -14,6 +14,7 @@ import functools
 import hashlib
 import json
 from pathlib import Path
+import re
 from typing import NamedTuple
 
 from cns_drake.base.files import user_errors
@@ -100,6 +101,7 @@ class _Imports(NamedTuple):
     offered: Mapping[str, str]
 
 
+@functools.cache
 def _source(module: _Module) -> Path | None:
     """Returns the source of a module; None if there is none."""
     place = module.root.joinpath(*module.name.split("."))
@@ -122,6 +124,7 @@ def _imported(module: _Module) -> Iterator[_Module]:
             yield package._replace(name=offered[name])
 
 
+@functools.cache
 def _imports_of(module: _Module) -> _Imports:
     path = _source(module)
     if path is None:
@@ -140,6 +143,8 @@ def _modules_in(package: str) -> Iterator[_Module]:
 
 
 def _digest(modules: Iterable[_Module], without: tuple[str, ...]) -> str:
+    for read in (_source, _imports_of):  # Files may have changed.
+        read.cache_clear()
     total = hashlib.sha256(repr(installed_versions(_LIBRARIES)).encode())
     for name, path in sorted(_files(modules, without).items()):
         total.update(f"{name}\n".encode())
@@ -179,9 +184,17 @@ def _files(
 @functools.cache
 def _find_imports(text: bytes, package: str) -> _Imports:
     """Returns the imports in the source of a module of a package."""
-    try:
-        tree = ast.parse(text)
-    except (SyntaxError, ValueError):
+    # To parse takes long: what is below the last import is left out if what is
+    # above is whole.
+    below = re.compile(rb"^[^\s)]", re.MULTILINE)
+    end = below.search(text, text.rfind(b"import") + 1)
+    for part in (text[: end.start()] if end else text, text):
+        try:
+            tree = ast.parse(part)
+            break
+        except (SyntaxError, ValueError):
+            continue
+    else:
         return _Imports((), {})  # Running the file reports it.
     names: list[tuple[str, str]] = []
     offered: dict[str, str] = {}
