@@ -11,6 +11,7 @@ from __future__ import annotations
 import gc
 import importlib
 import json
+import multiprocessing
 import os
 from pathlib import Path
 import pkgutil
@@ -22,8 +23,14 @@ import sys
 import tempfile
 
 from cns_drake.base.compiled import start_compiler
+from cns_drake.base.jobs import processes
+from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import look_seldom
+from evaluation.study import chosen_methods
+
+# Environment variable with the methods that a study compares.
+METHODS_VARIABLE = "CNS_DRAKE_TEST_METHODS"
 
 _CLIENT = """#!{python} -IS
 import json, os, socket, sys
@@ -98,6 +105,9 @@ def _serve(listener: socket.socket) -> None:
             if "map_closures" not in found.name:  # It needs an extra.
                 importlib.import_module(found.name)
     start_compiler()
+    code_digest("cns_drake.*", "evaluation.*")
+    # So are jobs, which would otherwise import all modules for each command.
+    processes._context = multiprocessing.get_context("fork")
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     # Forks would take most of their time to look for garbage in all this.
     gc.freeze()
@@ -125,6 +135,9 @@ def _answer(client: socket.socket) -> None:
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = words
+        if METHODS_VARIABLE in environment:
+            methods = tuple(environment[METHODS_VARIABLE].split())
+            chosen_methods.shipped_methods = lambda: methods
         module = _PROGRAMS[Path(words[0]).name]
         sys.exit(importlib.import_module(module).main())
     status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])

@@ -41,6 +41,7 @@ class Recipe:
         prints: texts on stdout.
         makes: globs of files that exist afterwards.
         prepare: called afterwards with the folder.
+        all_methods: whether a study compares all shipped methods.
     """
 
     start: str
@@ -52,6 +53,7 @@ class Recipe:
     prints: tuple[str, ...] = ()
     makes: tuple[str, ...] = ()
     prepare: Callable[[Path], None] | None = None
+    all_methods: bool = False
 
 
 def shorten_drives(folder: Path) -> None:
@@ -107,6 +109,7 @@ RECIPES = {
             "output/pages/town_01.html",
             "town.html",
         ),
+        all_methods=True,
     ),
     "imported scenario": Recipe(
         'map: .\nstage: "01"',
@@ -169,11 +172,13 @@ RECIPES = {
             ("reproduce metropolis", "reproduce town"),
         ),
         after=("own city",),
+        all_methods=True,
     ),
     "reproduce all": Recipe(
         "cns-drake reproduce --output output",
         changes=(("reproduce", "reproduce town"),),
         after=("own city",),
+        all_methods=True,
     ),
     "diagram script": Recipe(
         ".venv/bin/python diagrams/metropolis_01.py",
@@ -276,6 +281,7 @@ RECIPES = {
             ("study --quick", "output"),
         ),
         after=("own city",),
+        all_methods=True,
     ),
     "help: tcr": Recipe(
         "cns-eval tcr drives/metropolis_01",
@@ -428,6 +434,7 @@ RECIPES = {
         "cns-drake reproduce riverside --output output",
         changes=(("reproduce riverside", "reproduce town"),),
         after=("own city",),
+        all_methods=True,
     ),
     "another unit": Recipe(
         ".venv/bin/cns-drake simulate riverside_01 --lidar os1-128",
@@ -688,6 +695,7 @@ RECIPES = {
         ".venv/bin/cns-drake reproduce metropolis --output output",
         changes=(("reproduce metropolis", "reproduce town"),),
         after=("own city",),
+        all_methods=True,
     ),
     "home: localisation": Recipe(
         ".venv/bin/cns-eval localise output/metropolis_01 "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import contextlib
 import os
 from pathlib import Path
@@ -11,8 +12,11 @@ import subprocess
 import threading
 
 from helpers import documents
-from helpers.command_server import CommandServer
+from helpers.command_server import METHODS_VARIABLE, CommandServer
 from helpers.document_recipes import NOT_RUN, RECIPES
+
+# Studies take most of their time for the methods, one after the other.
+_METHODS = "scan-context++ solid"
 
 # A machine that runs other tests as well may answer late.
 _PATIENT = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "300s"}
@@ -79,18 +83,25 @@ class Workplace:
         if recipe.ready is not None:
             self._start(text, recipe.ready)
             commands = []
-        printed = [self._run(piece.place, command) for command in commands]
+        more = {} if recipe.all_methods else {METHODS_VARIABLE: _METHODS}
+        printed = [
+            self._run(piece.place, command, os.environ | more)
+            for command in commands
+        ]
         if recipe.prepare is not None:
             recipe.prepare(self.folder)
         return "".join(printed)
 
-    def _run(self, place: str, command: str) -> str:
+    def _run(
+        self, place: str, command: str, environment: Mapping[str, str]
+    ) -> str:
         # The help of commands names them without their folder.
         command = f".venv/bin/{command.removeprefix('.venv/bin/')}"
         if command not in self._printed:
             done = subprocess.run(
                 ["bash", "-euo", "pipefail", "-c", command],
                 cwd=self.folder,
+                env=environment,
                 capture_output=True,
                 text=True,
                 check=False,
