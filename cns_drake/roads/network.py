@@ -63,6 +63,9 @@ class RoadNetwork:
     def __init__(self, roads: dict[str, Road], junctions: dict[str, Junction]):
         self.roads = roads
         self.junctions = junctions
+        self._ends: dict[
+            tuple[LaneRef, str], tuple[float, float, float, float]
+        ] = {}
 
     def exit_junction(self, lane: LaneRef) -> str:
         """Returns the name of the junction that a lane leads to."""
@@ -98,8 +101,8 @@ class RoadNetwork:
             raise ValueError(
                 f"U-turn from road {incoming.road} to road {outgoing.road}"
             )
-        a = self.roads[incoming.road].lane_end(*incoming[1:], "exit")
-        b = self.roads[outgoing.road].lane_end(*outgoing[1:], "entry")
+        a = self._lane_end(incoming, "exit")
+        b = self._lane_end(outgoing, "entry")
         place = self.junctions[junction]
         turn = _classify(_turn_deg(a, b), len(place.arms))
         # To the right, the outermost lane follows the kerb.
@@ -119,9 +122,18 @@ class RoadNetwork:
         """
         if incoming.road == outgoing.road:
             return incoming.direction != outgoing.direction
-        a = self.roads[incoming.road].lane_end(*incoming[1:], "exit")
-        b = self.roads[outgoing.road].lane_end(*outgoing[1:], "entry")
+        a = self._lane_end(incoming, "exit")
+        b = self._lane_end(outgoing, "entry")
         return abs(_turn_deg(a, b)) > _U_TURN_LIMIT_DEG
+
+    def _lane_end(
+        self, lane: LaneRef, end: str
+    ) -> tuple[float, float, float, float]:
+        """Returns what `Road.lane_end` does; each pair of lanes asks for it."""
+        if (lane, end) not in self._ends:
+            road = self.roads[lane.road]
+            self._ends[lane, end] = road.lane_end(*lane[1:], end)
+        return self._ends[lane, end]
 
     def lanes(self) -> Iterator[LaneRef]:
         """Yields every lane of every road."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import arctan2
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
@@ -302,7 +304,20 @@ def load_ways(folder: MapFolder) -> LaneFile:
     """
     if not folder.roads.is_file():
         return read_lanes(folder.lanes)
-    network = load_road_network(folder.roads)
+    with user_errors(folder.roads):
+        content = folder.roads.read_bytes()
+    return _ways_along(folder.roads, content)
+
+
+@functools.lru_cache(maxsize=1)
+def _ways_along(roads: Path, content: bytes) -> LaneFile:
+    """Returns the ways along roads; a ladder asks for them again and again.
+
+    Args:
+        roads: the file.
+        content: its content, since the file may change.
+    """
+    network = load_road_network(roads)
     graph = make_lane_graph(network)
     return LaneFile(graph, make_walkways(network, graph))
 

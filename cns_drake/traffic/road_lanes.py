@@ -273,11 +273,14 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
             )
     for junction in network.junctions.values():
         found += _corners(network, junction, nodes, places)
+    crossed = [
+        (road, end, _crossing_line(road, end))
+        for road, end in itertools.product(network.roads.values(), ENDS)
+        if (road.name, end, 1) in nodes
+    ]
     for k, crossing in enumerate(graph.crossings):
-        for road, end in itertools.product(network.roads.values(), ENDS):
-            if (road.name, end, 1) in nodes and np.allclose(
-                crossing.line, _crossing_line(road, end)
-            ):
+        for road, end, across in crossed:
+            if np.allclose(crossing.line, across):
                 ends = []
                 for side, kerb in zip((1, -1), crossing.line, strict=True):
                     number = nodes[road.name, end, side]
