@@ -68,6 +68,19 @@ def unrendered_figures(monkeypatch):
     leave_figures_unrendered(monkeypatch)
 
 
+@pytest.fixture
+def few_methods(monkeypatch):
+    """Has studies compare two methods, whose names it returns.
+
+    For tests of other results than those of each method.
+    """
+    from evaluation.study import chosen_methods
+
+    names = ("scan-context++", "solid")
+    monkeypatch.setattr(chosen_methods, "shipped_methods", lambda: names)
+    return names
+
+
 @pytest.fixture(scope="session")
 def small_map(tmp_path_factory):
     """Folder of a map that loads at once, with stages 01 and 04."""

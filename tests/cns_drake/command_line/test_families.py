@@ -13,7 +13,7 @@ from evaluation.command_line.cli import app as evaluation_app
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.usefixtures("unrendered_figures"),
+    pytest.mark.usefixtures("unrendered_figures", "few_methods"),
 ]
 
 # Members and their control have scenario files; the query drive has none.

@@ -170,6 +170,7 @@ def town(tmp_path_factory):
     return folder
 
 
+@pytest.mark.usefixtures("few_methods")
 def test_families_on_other_cities_share_them(town, tmp_path, monkeypatch):
     output = tmp_path / "output"
 

@@ -87,6 +87,7 @@ def test_each_knob_is_taken_back(town):
     assert f"{as_it_is:.4f}" in rows[0]
 
 
+@pytest.mark.usefixtures("few_methods")
 def test_absent_knobs_are_not_taken_back(town):
     stages = town / "stages.yaml"
     text = stages.read_text()

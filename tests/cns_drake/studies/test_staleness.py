@@ -10,12 +10,12 @@ import pytest
 from cns_drake.base.jobs import fingerprint
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import reproduction
-from evaluation.study import chosen_methods
 
 pytestmark = [
     pytest.mark.slow,
     # The tests ask which figures are made, not what they show.
-    pytest.mark.usefixtures("unrendered_figures"),
+    # One of two methods changes.
+    pytest.mark.usefixtures("unrendered_figures", "few_methods"),
 ]
 
 DRIVES = {"town_01", "town_04", "town_01_stage_04"}
@@ -49,10 +49,6 @@ def reproduce(tmp_path, monkeypatch):
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 30)
     done = []
-    # Two methods suffice: one changes.
-    monkeypatch.setattr(
-        chosen_methods, "shipped_methods", lambda: ("scan-context++", "solid")
-    )
     monkeypatch.setattr(
         reproduction,
         "run_jobs",
