@@ -145,6 +145,21 @@ def test_the_same_trace_gives_the_same_plan(trace):
     assert len(kinds) > 2
 
 
+def test_walkers_do_not_walk_in_step(tmp_path):
+    """Each begins at its own place of the gait, in the first frame too."""
+
+    def add(text):
+        one = re.search(r'<person id="p" .*?/>', text)[0].partition(" x=")[2]
+        others = "".join(f'<person id="q{k}" x={one}' for k in range(9))
+        return text.replace("</timestep>", others + "</timestep>")
+
+    plan = play(write_trace(tmp_path / "many.xml", change=add))
+    for t in (0.0, 3.3):
+        phases = plan.walkers.at(t)[0][:, 4] % (2 * np.pi)
+        assert len(np.unique(phases.round(2))) > 7
+        assert np.ptp(np.sin(phases)) > 1.0
+
+
 def test_objects_that_would_meet_the_ego_car_are_left_out(trace):
     def ego(times):
         # The ego car stands where the traced car passes at 3.5 s.

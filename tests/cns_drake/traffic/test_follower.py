@@ -199,3 +199,38 @@ def test_changes_to_the_lane_of_its_way_in_time():
     assert lane.beside == 1
     assert lane.parts == pytest.approx(110.0, abs=3.0)
     assert {run.beside for run in runs if run is not lane} == {-1}
+
+
+def test_leaves_the_lanes_where_it_drives_away_from_them():
+    """30 deg aside after 50 m: it is on no lane from 2 m beside it on."""
+    graph = LaneGraph((Piece(line(0, 100), 14.0, False, (0,), junction=0),))
+    s = np.arange(0.0, 40.0)[:, None]
+    turned = np.pi / 6 + ANGLE
+    away = np.array([np.cos(turned), np.sin(turned)])
+    points = np.concatenate(
+        [line(0, 49)[::2, :2], line(50, 50)[0, :2] + s * away]
+    )
+    lane, outside = find_runs(graph, points, 1.0)
+    assert (lane.piece, lane.first, lane.s) == (0, 0.0, pytest.approx(0.0))
+    assert outside.piece == -1
+    # A place is on the lane while its square distance is at most 4 m^2.
+    assert lane.last == outside.first == 55.0
+    assert outside.last == len(points)
+    (alone,) = find_runs(graph, points[60:], 1.0)
+    assert (alone.piece, alone.beside) == (-1, -1)
+
+
+@pytest.mark.parametrize(("aside", "is_on"), [(1.95, True), (2.05, False)])
+def test_goes_on_along_many_pieces(aside, is_on):
+    """That costs nothing, however short they are."""
+    pieces = [
+        Piece(line(2 * k, 2 * k + 2), 14.0, k % 2 == 1, (k + 1,), junction=0)
+        for k in range(30)
+    ]
+    pieces[-1] = Piece(pieces[-1].points, 14.0, True, (0,), junction=0)
+    points = line(0, 60)[::2, :2] + aside * np.array([-AHEAD[1], AHEAD[0]])
+    runs = find_runs(LaneGraph(tuple(pieces)), points, 1.0)
+    assert [run.piece for run in runs] == ([*range(30)] if is_on else [-1])
+    for run in runs[1:]:
+        assert run.first == pytest.approx(2.0 * run.piece, abs=1e-6)
+        assert run.s == 0.0

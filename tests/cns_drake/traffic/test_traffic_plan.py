@@ -300,6 +300,12 @@ def test_walkers_wait_farther_from_things():
     post = shapely.Point(10.0, 1.15).buffer(0.2)
     (way,) = kept_clear([straight()], [post])
     np.testing.assert_allclose(way.limits[20], [-0.5, 1.0])
+    # Nobody turns on a crossing.
+    post = shapely.Point(19.5, 1.15).buffer(0.2)
+    for number in (0, 1):
+        over = replace(straight(), crossing=number)
+        _, way = kept_clear([straight(), over], [post])
+        np.testing.assert_allclose(way.limits[-1], [-0.5, 1.0])
 
 
 def test_walkers_pass_what_stands_on_sidewalks():
