@@ -14,13 +14,23 @@ def _polygon(pose, half):
 
 
 def test_agrees_with_shapely():
+    """Also for long boxes that meet end to end."""
     rng = np.random.default_rng(3)
-    for _ in range(500):
+    for number in range(500):
         a, b = rng.uniform(-3, 3, 3), rng.uniform(-3, 3, 3)
         half_a, half_b = rng.uniform(0.2, 2.0, (2, 2))
-        one, other = _polygon(a, half_a), _polygon(b, half_b)
+        if number % 2:
+            half_a, half_b = (4.0, 0.3), (0.3, 4.0)
+            a[2], b = 0.4, a + 7.8 * np.array([np.cos(0.4), np.sin(0.4), 0])
+            b = b + rng.normal(0.0, 0.2, 3)
+            b[2] = 0.4 - np.pi / 2
+        half = np.array([half_a, half_b])
+        one, other = _polygon(a, half[0]), _polygon(b, half[1])
         expected = one.intersection(other).area > 1e-9
-        assert boxes_overlap(a, b, half_a, half_b) == expected
+        assert boxes_overlap(a, b, *half) == expected
+        found = np.zeros((2, 2), bool)
+        find_overlaps(np.array([[a, b]]), half, found)
+        assert found[0, 1] == found[1, 0] == expected
 
 
 def test_the_most_involved_goes_first():

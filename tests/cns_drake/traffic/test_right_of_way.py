@@ -1,5 +1,6 @@
 """Vehicles on ways that cross, split and join: closed forms."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -243,3 +244,52 @@ def test_a_car_in_two_lanes_asks_as_the_first_in_both(other, lane):
     grant_ways(streets, cars, occupants, permits, 1, DT, 1)
     is_ahead = other > 98.0
     assert cars["granted"].tolist() == [is_ahead, not is_ahead]
+
+
+def granted(graph, streets, cars, t):
+    """Returns who has a permit after the first step at a time [s]."""
+    permits = make_permits(graph)
+    occupants = make_occupants(len(graph.pieces), len(cars))
+    k = round(t / DT)
+    find_occupants(occupants, streets, cars, k)
+    grant_ways(streets, cars, occupants, permits, k, DT, 1)
+    return cars["granted"].tolist()
+
+
+@pytest.mark.parametrize("v", [0.0, 4.0])
+@pytest.mark.parametrize("comes", [False, True])
+@pytest.mark.parametrize("more", [-0.01, 0.01])
+def test_nobody_enters_without_room_behind_the_way(v, comes, more):
+    """For 4 m and a gap of 2.5 m, likewise for one on the way, of 4 m.
+
+    The last vehicle brakes at 4 m/s^2 at most.
+    """
+    graph, streets = junction()
+    rear = (2 if comes else 1) * 6.5 - v**2 / 8.0
+    cars = vehicles((0, 99.0, 0.0), (2, rear + 4.0 + more, v), (0, 0.0, 0.0))
+    on_way(cars, 2, *((1, 30.0, 1) if comes else (4, 39.0, 1)))
+    cars["granted"][2] = False
+    cars["since"][0] = 0.0
+    cars["path"][1, CURRENT + 1 :] = -1
+    is_granted = granted(graph, streets, cars, 5.0)[0]
+    assert is_granted == (more > 0)
+    # Otherwise it looks for another way after some time.
+    assert cars["refused"][0] == (0.0 if is_granted else DT)
+
+
+@pytest.mark.parametrize(("t", "waits"), [(24.9, False), (25.1, True)])
+def test_room_is_kept_for_the_ego_car_after_a_long_wait(t, waits):
+    """It is 10 m long, has waited since 5 s, and a motorcycle has room."""
+    graph, _ = junction()
+    pieces = list(graph.pieces)
+    pieces[4] = replace(pieces[4], after=(2,))
+    far = np.tile((1e4, 0.0), (300, 1))
+    graph = LaneGraph(tuple(pieces))
+    streets = make_streets(
+        graph, EgoBox(-1.0, 3.0, 1.0), far, np.zeros(300), DT
+    )
+    cars = vehicles((3, 99.0, 0.0), (2, 10.0, 0.0), (0, 99.0, 0.0))
+    cars["path"][0, CURRENT + 2] = 2
+    cars["length"], cars["since"] = (2.0, 4.0, 10.0), (6.0, np.inf, 5.0)
+    cars["guided"][2] = True
+    assert granted(graph, streets, cars, t) == [not waits, False, False]
