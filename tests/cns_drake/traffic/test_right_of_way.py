@@ -293,3 +293,56 @@ def test_room_is_kept_for_the_ego_car_after_a_long_wait(t, waits):
     cars["length"], cars["since"] = (2.0, 4.0, 10.0), (6.0, np.inf, 5.0)
     cars["guided"][2] = True
     assert granted(graph, streets, cars, t) == [not waits, False, False]
+
+
+@pytest.mark.parametrize("error", [-0.05, 0.05])
+def test_nobody_enters_shortly_before_the_ego_car(error):
+    """It takes 9 s for 45 m at half of the limit, and is 3 s ahead."""
+    graph, streets = junction()
+    streets.until[:, 1] = 12.0 + error
+    cars = vehicles((0, 99.0, 0.0))
+    cars["since"] = 0.0
+    assert granted(graph, streets, cars, 5.0) == [error > 0]
+
+
+@pytest.mark.parametrize(("until", "goes"), [(19.9, False), (20.1, True)])
+def test_nobody_waits_on_its_way_shortly_before_the_ego_car(until, goes):
+    """Otherwise it may enter before the other one has quite passed."""
+    graph, streets = junction()
+    streets.until[:, 1] = until
+    cars = vehicles((0, 99.0, 0.0), (3, 0.0, 0.0))
+    on_way(cars, 1, 4, 20.0, 1)
+    cars["v"][1], cars["since"][0] = 9.0, 0.0
+    assert granted(graph, streets, cars, 5.0)[0] == goes
+
+
+@pytest.mark.parametrize("error", [-0.05, 0.05])
+@pytest.mark.parametrize(("t", "is_green"), [(20.0, True), (27.0, False)])
+def test_who_can_stop_at_red_does(t, is_green, error):
+    """In 1 s, and at 2 m/s^2, a metre before the line; green is until 26 s."""
+    graph, streets = junction((0, 1))
+    needed = 1.0 + 8.0 + 8.0**2 / (2 * 2.0)
+    cars = vehicles((0, 100.0 - needed - error, 8.0))
+    cars["granted"], cars["held"] = True, 1
+    (keeps,) = granted(graph, streets, cars, t)
+    assert keeps == (is_green or error < 0)
+    assert cars["held"][0] == (1 if keeps else -1)
+
+
+@pytest.mark.parametrize(
+    ("v", "phases", "reach"),
+    [
+        # From 10 m, or 1.4 times the braking distance and 5 m.
+        (2.0, (-1, -1), 10.0),
+        (8.0, (-1, -1), 1.4 * 16.0 + 5.0),
+        # By 3 s and 5 m farther if there is a signal.
+        (8.0, (0, 1), 1.4 * 16.0 + 5.0 + 3.0 * 8.0 + 5.0),
+    ],
+)
+@pytest.mark.parametrize("error", [-0.05, 0.05])
+def test_from_where_drivers_ask_for_their_way(v, phases, reach, error):
+    graph, streets = junction(phases)
+    # The ego car is far away, but for those it makes hurry.
+    streets.until[:, 0] = 70.0
+    cars = vehicles((0, 100.0 - reach - error, v))
+    assert granted(graph, streets, cars, 1.0) == [error < 0]
