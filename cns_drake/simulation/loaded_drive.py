@@ -31,7 +31,12 @@ from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
-from cns_drake.traffic.lane_graph import LaneGraph, Walkway, kept_clear
+from cns_drake.traffic.lane_graph import (
+    LaneGraph,
+    Walkway,
+    kept_clear,
+    with_unmarked_crossings,
+)
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_adding import traffic_structures
@@ -257,7 +262,9 @@ def plan_scenario_traffic(
         world = world or load_stage(
             scenario, with_vehicle=False, trajectory=trajectory
         )
-        walkways = kept_clear(walkways, _things(world))
+        things = _things(world)
+        walkways = kept_clear(walkways, things)
+        graph, walkways = with_unmarked_crossings(graph, walkways, things)
     follows = scenario.driver.follows
     plan = plan_traffic(
         graph,

@@ -20,6 +20,13 @@ _AROUND, _WAITS = 0.53, 4
 _ACROSS, _ALONG = 21, 4
 # Walkers step aside by this number of places from point to point.
 _ASIDE = 2
+# A crossing without marks leads over so many lanes at most; it keeps this
+# distance from the ends of lanes, so that no vehicle on it has its front in
+# another one, from ways, and from the ends of walkways [m].
+_MOST_LANES, _FROM_ENDS, _FROM_WAYS, _FROM_NODES = 4, 15.0, 5.0, 4.0
+# Its width, half the width of the walkers' way and of a lane, the greatest
+# distance of a walkway from a lane, and that of the places tried [m].
+_WIDTH, _HALF_WAY, _HALF_LANE, _REACH, _TRIED = 2.4, 0.5, 1.75, 20.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -58,21 +65,26 @@ class Piece:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A walkers' crossing of the lanes at one road end.
+    """A walkers' crossing of the lanes at one road end, or elsewhere.
 
     Attributes:
-        line: (2, 3) from kerb to kerb [m].
+        line: (2, 3) from kerb to kerb, or from sidewalk to sidewalk [m].
         area: where walkers are on it [m].
+        marked: whether vehicles make way for walkers who wait; if not, it is
+            not at a road's end, and walkers begin in a gap.
     """
 
     line: np.ndarray
     area: BaseGeometry
+    marked: bool = True
 
 
-def make_crossing(line: np.ndarray, width: float) -> Crossing:
+def make_crossing(
+    line: np.ndarray, width: float, marked: bool = True
+) -> Crossing:
     """Returns a crossing of a width [m] about a line (2, 3) [m]."""
     course = LineString(line[:, :2])
-    return Crossing(line, course.buffer(width / 2, cap_style="flat"))
+    return Crossing(line, course.buffer(width / 2, cap_style="flat"), marked)
 
 
 @dataclass(frozen=True)
@@ -201,6 +213,116 @@ class LaneGraph:
     def lanes(self) -> list[int]:
         """Numbers of the pieces that are lanes."""
         return [k for k, p in enumerate(self.pieces) if not p.is_way]
+
+
+def with_unmarked_crossings(
+    graph: LaneGraph,
+    walkways: Sequence[Walkway],
+    things: Sequence[BaseGeometry] = (),
+) -> tuple[LaneGraph, list[Walkway]]:
+    """Adds places between crossings where walkers may cross narrow streets.
+
+    Each is as near to the middle of a lane as there is a walkway on both sides
+    and nothing stands in between. A walkway has one at most.
+
+    Args:
+        graph: lanes and crossings.
+        walkways: along its lanes and over its crossings.
+        things: what stands there, seen from above [m].
+
+    Returns:
+        The graph with more crossings; the walkways, cut there, and more.
+    """
+    sides = [k for k, way in enumerate(walkways) if way.crossing < 0]
+    lines = [LineString(walkways[k].points[:, :2]) for k in sides]
+    lanes = [LineString(piece.points[:, :2]) for piece in graph.pieces]
+    side_tree, lane_tree, thing_tree = map(
+        shapely.STRtree, (lines, lanes, things)
+    )
+    crossings, found = list(graph.crossings), list[Walkway]()
+    # Walkway -> the row where it is cut, and the number of the place there.
+    cuts: dict[int, tuple[int, int]] = {}
+    node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
+
+    def beside(p: np.ndarray, reach: np.ndarray) -> tuple[int, int] | None:
+        """Returns the first walkway on one side, and its row there."""
+        ray = LineString([p, p + reach])
+        near = side_tree.query(ray, "intersects")
+        if not len(near):
+            return None
+        apart = [shapely.Point(p).distance(ray & lines[k]) for k in near]
+        k = sides[near[int(np.argmin(apart))]]
+        xy = walkways[k].points[:, :2]
+        row = int(np.linalg.norm(xy - p, axis=1).argmin())
+        margin = int(_FROM_NODES / SPACING)
+        is_inside = margin <= row < len(xy) - margin
+        return (k, row) if is_inside and k not in cuts else None
+
+    def course(p: np.ndarray, q: np.ndarray, z: float) -> np.ndarray | None:
+        """Returns a way (4, 3) over lanes at a height, None if it is barred."""
+        line = LineString([p[:2], q[:2]])
+        ahead = (q - p)[:2] / line.length
+        over = lane_tree.query(line, "intersects")
+        near = lane_tree.query(line, "dwithin", _FROM_WAYS)
+        # Walkers wait at both ends.
+        longer = LineString([p[:2] - ahead, q[:2] + ahead])
+        if (
+            len(over) > _MOST_LANES
+            or any(graph.pieces[k].is_way for k in near)
+            or len(thing_tree.query(longer, "dwithin", _HALF_WAY + _AROUND))
+        ):
+            return None
+        places = []
+        for k in over:
+            place = line & lanes[k]
+            s = lanes[k].project(place)
+            if not _FROM_ENDS < s < lanes[k].length - _FROM_ENDS:
+                return None
+            places.append(line.project(place))
+        edges = min(places) - _HALF_LANE, max(places) + _HALF_LANE
+        return np.array([p, *((*(p[:2] + s * ahead), z) for s in edges), q])
+
+    for k in graph.lanes:
+        points = graph.pieces[k].points
+        margin = int(_FROM_ENDS / SPACING)
+        middle, step = len(points) // 2, int(_TRIED / SPACING)
+        first = margin + (middle - margin) % step
+        rows = range(first, len(points) - margin, step)
+        for row in sorted(rows, key=lambda row: abs(row - middle)):
+            x, y = np.diff(points[row : row + 2, :2], axis=0)[0] / SPACING
+            left = _REACH * np.array([-y, x])
+            ends = beside(points[row, :2], left), beside(points[row, :2], -left)
+            if ends[0] is None or ends[1] is None or ends[0][0] == ends[1][0]:
+                continue
+            p, q = (walkways[way].points[at] for way, at in ends)
+            line = course(p, q, points[row, 2])
+            if line is None:
+                continue
+            cuts |= {way: (at, node + i) for i, (way, at) in enumerate(ends)}
+            found.append(
+                Walkway(
+                    resampled(line), _HALF_WAY, node, node + 1, len(crossings)
+                )
+            )
+            crossings.append(make_crossing(line[[0, -1]], _WIDTH, marked=False))
+            node += 2
+            break
+    for k, way in enumerate(walkways):
+        row, between = cuts.get(k, (len(way.points) - 1, way.end))
+        for rows, start, end in (
+            (slice(row + 1), way.start, between),
+            (slice(row, None), between, way.end),
+        )[: 1 + (k in cuts)]:
+            found.append(
+                replace(
+                    way,
+                    points=way.points[rows],
+                    start=start,
+                    end=end,
+                    free=way.limits[rows],
+                )
+            )
+    return LaneGraph(graph.pieces, tuple(crossings)), found
 
 
 def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:

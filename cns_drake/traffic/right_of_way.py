@@ -19,6 +19,7 @@ from cns_drake.traffic.vehicles import (
     Occupants,
     choose_way,
     is_walked,
+    lane_over,
     rear_on_way,
 )
 
@@ -59,6 +60,8 @@ WALK_GROUP = 3.0
 _WALKING, _DAWDLING = 1.0, 3.0
 # Time for vehicles after a group has left a crossing [s].
 _REST = 30.0
+# Where there are no marks, walkers begin if no vehicle comes so soon [s].
+_WALKERS_GAP = 6.0
 
 CROSSING = np.dtype(
     [
@@ -68,6 +71,7 @@ CROSSING = np.dtype(
         ("length", float),  # [m]
         ("order", int),  # As of `VEHICLE`, 0 while no walkers ask.
         ("is_open", bool),  # Whether walkers are on it.
+        ("marked", bool),  # See `Crossing`.
         # Places on its line from which walkers have yet to go on to its end,
         # and to its beginning [m].
         ("to_end", float),
@@ -96,6 +100,7 @@ def make_permits(graph: LaneGraph) -> Permits:
     crossings["waits"] = np.inf
     crossings["opened"] = crossings["closed"] = -np.inf
     crossings["to_end"], crossings["to_start"] = -np.inf, np.inf
+    crossings["marked"] = [one.marked for one in graph.crossings]
     ends = np.array([one.line[[0, -1], :2] for one in graph.crossings])
     lines = np.diff(ends.reshape(-1, 2, 2), axis=1, prepend=0.0)
     x, y = lines[:, 1].T
@@ -354,6 +359,8 @@ def _serve(
     if one.order == 0:
         if t < one.closed + _REST:
             return last
+        if not one.marked and not _is_gap(streets, cars, c):
+            return last
         if _until_red(streets, place, t) < min(
             needed, streets.signals.green_for[place] - _LATE
         ):
@@ -378,6 +385,18 @@ def _serve(
     # Vehicles that are not yet there wait for it, whenever they came.
     one.order = 1
     return last
+
+
+@compiled
+def _is_gap(streets: Streets, cars: np.ndarray, c: int) -> bool:
+    """Returns whether no vehicle is on the c-th crossing, or will be soon."""
+    for i in range(len(cars)):
+        car = cars[i]
+        _, enters, leaves = lane_over(streets, car, c)
+        reach = max(_stops_within(car), _WALKERS_GAP * car.v)
+        if enters < reach and leaves > 0.0:
+            return False
+    return True
 
 
 @compiled

@@ -207,8 +207,9 @@ def find_conflicts(
     """Returns where pieces and crossings exclude each other.
 
     Two different ways exclude each other if their swept areas meet; lanes
-    exclude nothing. The matrices are over pieces and then crossings, first
-    while all vehicles are small, and then while one is large.
+    exclude nothing but crossings without marks. The matrices are over pieces
+    and then crossings, first while all vehicles are small, and then while one
+    is large.
 
     Returns:
         (2, P + C, P + C) places of a front along a, where the area of a first
@@ -256,6 +257,14 @@ def find_conflicts(
                     and graph.pieces[one].after == graph.pieces[other].after
                 ):
                     joint[k, one, other] = MERGE
+    for c, crossing in enumerate(graph.crossings, num_pieces):
+        for k in [] if crossing.marked else graph.lanes:
+            line = shapely.LineString(graph.pieces[k].points[:, :2])
+            if line.intersects(crossing.area):
+                ends = shapely.get_coordinates(line & crossing.area)[[0, -1]]
+                begin[:, k, c], clear[:, k, c] = sorted(
+                    line.project(shapely.Point(end)) for end in ends
+                )
     return begin, clear, np.minimum(joint, joint.transpose(0, 2, 1))
 
 

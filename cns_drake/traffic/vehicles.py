@@ -389,14 +389,37 @@ def is_walked(
 
 
 @compiled
+def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
+    """Returns where a vehicle comes to the c-th crossing, one without marks.
+
+    Returns:
+        The lane that leads over it, -1 for none on the vehicle's path; the
+        distances until it enters the crossing and leaves it, inf for none [m].
+    """
+    begin, number = -car.s, len(streets.pieces) + c
+    for column in range(CURRENT, NUM_PIECES):
+        piece = car.path[column]
+        if piece < 0:
+            break
+        row = streets.pieces[piece]
+        enters = streets.begin[0, piece, number]
+        if enters < np.inf and not row.is_way:
+            leaves = streets.clear[0, piece, number] + car.length
+            return piece, begin + enters, begin + leaves
+        begin += row.length
+    return -1, np.inf, np.inf
+
+
+@compiled
 def find_prior(
     streets: Streets, cars: np.ndarray, crossings: np.ndarray, i: int
 ) -> tuple[float, float, float]:
     """Returns what the i-th vehicle has to wait for on the way it holds.
 
-    It stops before a crossing that walkers use, and before the place where its
-    way meets that of a vehicle that got its way earlier and has not yet passed
-    the place. Where both leave one lane or enter one, it follows the other.
+    It stops before a crossing that walkers use, in lanes as well, and before
+    the place where its way meets that of a vehicle that got its way earlier and
+    has not yet passed the place. Where both leave one lane or enter one, it
+    follows the other.
     Thus vehicles wait only for those with a lower `order`, the first for none,
     and never for ever.
 
@@ -412,6 +435,12 @@ def find_prior(
     """
     line, gap, speed = np.inf, np.inf, 0.0
     car, pieces = cars[i], streets.pieces
+    size = int(car.large)
+    for c in range(len(crossings)):
+        if crossings[c].order > 0 and not crossings[c].marked:
+            lane, enters, _ = lane_over(streets, car, c)
+            if enters >= 0.0 and is_walked(streets, crossings, c, lane, size):
+                line = min(line, enters)
     way = car.held
     if way < 0:
         return line, gap, speed
@@ -421,7 +450,6 @@ def find_prior(
         front = car.s - pieces[car.path[CURRENT]].length
     else:
         return line, gap, speed
-    size = int(car.large)
     for c in range(len(crossings)):
         place = streets.begin[size, way, len(pieces) + c]
         if (

@@ -46,8 +46,11 @@ _STRONGEST = 2.5
 # A walker turns back after being blocked for this time [s], and so does one
 # who waits within this distance [m].
 _PATIENCE, _BESIDE = 4.0, 1.5
-# Walkers that cross, for each one that goes straight on, if both are possible.
-_CROSSES = 0.25
+# Walkers that cross, for each one that goes straight on, if both are possible:
+# at crossings, and elsewhere.
+_CROSSES, _CROSSES_ELSEWHERE = 0.25, 0.05
+# Time after which a walker waits no longer for a gap [s].
+_GIVES_UP = 10.0
 # Length of sidewalk for one walker [m].
 _WALKER_SPACE = 3.0
 # Share of walkers with a companion behind them, which makes a third of them
@@ -253,6 +256,9 @@ class Crowd:
             if self._users[c] == 0:
                 crossings["waits"][c] = min(crossings["waits"][c], t)
                 waited[c] = True
+                waits = t - crossings["waits"][c]
+                if not crossings["marked"][c] and waits > _GIVES_UP:
+                    walkers["next_path"][i] = -1
                 return False
             if t >= crossings["opened"][c] + WALK_GROUP:
                 return False
@@ -273,12 +279,19 @@ class Crowd:
             return path ^ 1
         self.walkers["draws"][i] += 1
         # Few walkers cross, none goes back.
-        likings = [
-            0.0
-            if other // 2 == path // 2
-            else (1.0 if self._paths.paths["crossing"][other] < 0 else _CROSSES)
-            for other in choices
-        ]
+        marked = self._permits.crossings["marked"]
+        likings = []
+        for other in choices:
+            over = int(self._paths.paths["crossing"][other])
+            likings.append(
+                0.0
+                if other // 2 == path // 2
+                else 1.0
+                if over < 0
+                else _CROSSES
+                if marked[over]
+                else _CROSSES_ELSEWHERE
+            )
         who, draw = self.walkers[["group", "draws"]][i]
         pick = uniform(seed, who, draw) * sum(likings)
         below = np.flatnonzero(pick < np.cumsum(likings))
