@@ -296,11 +296,10 @@ def _things(world: World) -> list[BaseGeometry]:
     Walkways lead along buildings, which need no regard.
     """
     passed = GROUND_CLASSES | {"building"}
-    return [
-        thing.footprint
-        for thing in read_structures(world).values()
-        if thing.semantic_class not in passed
-    ]
+    things = read_structures(
+        world, lambda name: world.structures[name].semantic_class not in passed
+    )
+    return [thing.footprint for thing in things.values()]
 
 
 def load_ways(folder: MapFolder) -> LaneFile:

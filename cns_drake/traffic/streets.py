@@ -324,7 +324,10 @@ def _find_ego(
     graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray, dt: float
 ) -> tuple[np.ndarray, ...]:
     """Returns the fields of `Streets` from `until` on; see `make_streets`."""
-    corners = box.corners(xy, yaw)
+    # A car that stands is looked at once.
+    poses = np.column_stack([xy, yaw])
+    is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))
+    corners = box.corners(xy[is_new], yaw[is_new])
     boxes = shapely.polygons(corners)
     lines = np.array(
         [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
@@ -333,18 +336,17 @@ def _find_ego(
         line.buffer(_HALF_LANE, cap_style="flat", join_style="mitre")
         for line in lines
     ] + [crossing.area for crossing in graph.crossings]
-    until = np.full((len(xy), len(areas)), np.inf, np.float32)
-    rear, front, speed = np.zeros((3, len(xy), len(lines)), np.float32)
-    times, places = shapely.STRtree(areas).query(boxes, predicate="intersects")
-    until[times, places] = 0.0
+    until = np.full((len(boxes), len(areas)), np.inf, np.float32)
+    rear, front, x, y = np.zeros((4, len(boxes), len(lines)))
+    which, places = shapely.STRtree(areas).query(boxes, predicate="intersects")
+    until[which, places] = 0.0
     on_piece = places < len(lines)
-    times, places = times[on_piece], places[on_piece]
+    which, places = which[on_piece], places[on_piece]
     along = shapely.line_locate_point(
-        lines[places][:, None], shapely.points(corners[times])
+        lines[places][:, None], shapely.points(corners[which])
     )
     behind, ahead = along.min(axis=1), along.max(axis=1)
-    rear[times, places], front[times, places] = behind, ahead
-    velocity = np.gradient(xy, dt, axis=0)
+    rear[which, places], front[which, places] = behind, ahead
     tangent = np.subtract(
         *(
             shapely.get_coordinates(
@@ -354,10 +356,16 @@ def _find_ego(
         )
     )
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-6)[:, None]
-    speed[times, places] = np.sum(velocity[times] * tangent, axis=1)
+    x[which, places], y[which, places] = tangent.T
+    velocity = np.gradient(xy, dt, axis=0)
+    pose = np.cumsum(is_new) - 1
+    speed = velocity[:, :1] * x[pose] + velocity[:, 1:] * y[pose]
+    until = until[pose]
     for k in range(len(xy) - 2, -1, -1):
         np.minimum(until[k], until[k + 1] + dt, out=until[k])
-    return until, rear, front, speed
+    return until, *(
+        each.astype(np.float32) for each in (rear[pose], front[pose], speed)
+    )
 
 
 def places_on(

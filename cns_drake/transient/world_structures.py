@@ -114,14 +114,14 @@ class Structure:
     @cached_property
     def outline(self) -> BaseGeometry:
         """The convex hull of all of it, seen from above [m]."""
-        return shapely.MultiPoint(self.p_WPs[:, :2]).convex_hull
+        return shapely.multipoints(self.p_WPs[:, :2]).convex_hull
 
     @cached_property
     def footprint(self) -> BaseGeometry:
         """The convex hull of the parts near its foot, seen from above [m]."""
         p_WPs = self.p_WPs
         low = p_WPs[p_WPs[:, 2] <= self.bottom + _HEADROOM]
-        return shapely.MultiPoint(low[:, :2]).convex_hull
+        return shapely.multipoints(low[:, :2]).convex_hull
 
 
 def read_structures(
