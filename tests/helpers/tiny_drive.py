@@ -12,7 +12,7 @@ from cns_drake.simulation.simulation import simulate
 from helpers.small_map import box_visual, world_text
 
 FRAMES = 60
-LONG = 3000
+LONG = 1200
 
 
 def tiny_scenario(folder, **changes):
