@@ -6,14 +6,11 @@ from helpers import studies
 from helpers.small_towns import drive
 import pytest
 
-from evaluation.methods import known_methods
 from evaluation.study.collection import find_recordings
 from evaluation.study.plan import plan_study
 from evaluation.study.surveys import Survey
 
 pytestmark = pytest.mark.slow
-
-METHODS = len(known_methods())
 
 
 def measuring_jobs(recordings, output):
@@ -34,7 +31,7 @@ def parts(output):
     }
 
 
-def test_every_attempt_gets_further(tmp_path, monkeypatch):
+def test_every_attempt_gets_further(tmp_path, monkeypatch, few_methods):
     drive(tmp_path / "in" / "metropolis_01", "01", "a")
     drive(tmp_path / "in" / "metropolis_04", "04", "b")
     whole, broken = tmp_path / "whole", tmp_path / "broken"
@@ -42,7 +39,8 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch):
     expected = parts(whole)
     # Two maps and the scans of each drive, a description by each method;
     # results, and reasons for wrong ones.
-    assert len(expected) == 2 * (3 + METHODS) + METHODS + 1
+    methods = len(few_methods)
+    assert len(expected) == 2 * (3 + methods) + methods + 1
     replace = os.replace
 
     def replace_and_stop(source, target):
@@ -60,7 +58,7 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch):
     assert parts(broken) == expected
 
 
-def test_a_new_recording_under_an_old_name(tmp_path):
+def test_a_new_recording_under_an_old_name(tmp_path, few_methods):
     for stage, route in (("01", "a"), ("04", "b")):
         drive(tmp_path / "in" / f"metropolis_{stage}", stage, route)
     out = tmp_path / "out"
@@ -75,4 +73,4 @@ def test_a_new_recording_under_an_old_name(tmp_path):
     assert after.keys() == before.keys()
     kept = {path for path in after if after[path] == before[path]}
     assert {path.parent.name for path in kept} == {"metropolis_04"}
-    assert len(kept) == 3 + METHODS
+    assert len(kept) == 3 + len(few_methods)

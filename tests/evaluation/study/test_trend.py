@@ -101,6 +101,7 @@ def test_processes_change_nothing_and_are_not_needed_twice(
     assert measure_trend(*arguments, Cluster()) == points
 
 
+@pytest.mark.usefixtures("few_methods")
 def test_the_kept_share_comes_from_the_control(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(
         trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
