@@ -201,6 +201,10 @@ def test_moves_plausibly(short):
     speed = np.linalg.norm(velocity, axis=2)
     assert speed.max() < 1.1 * 22.4
     assert (speed > 0.5).mean() > 0.2
+    # No heading jumps by a turn.
+    for tracks, rate in ((short.vehicles, 2.0), (short.walkers, 3.0)):
+        turned = np.diff(tracks.values[..., 3], axis=0)
+        assert 0.01 < np.abs(turned).max() < rate * 0.1
     # Walkers face their direction of motion.
     yaw = short.vehicles.values[:-1, :, 3]
     ahead = np.cos(yaw) * velocity[..., 0] + np.sin(yaw) * velocity[..., 1]
