@@ -82,6 +82,16 @@ def test_keeps_the_equilibrium_gap(v, gap):
     assert acceleration(v, 0.99 * expected, 0.0) < 0
 
 
+def test_brakes_for_a_slower_vehicle():
+    """s* grows by v dv / (2 sqrt(a b)), but for one that is faster."""
+    for approach, gap in ((4.0, 60.0), (2.0, 40.0), (-30.0, 30.0)):
+        wanted = 10.0 * T + 10.0 * approach / (2.0 * np.sqrt(A * B))
+        wanted = STANDSTILL_GAP + max(0.0, wanted)
+        expected = A * (1 - (10.0 / V0) ** 4 - (wanted / gap) ** 2)
+        assert expected > -HARDEST_BRAKING
+        assert acceleration(10.0, gap, approach) == pytest.approx(expected)
+
+
 def test_integrates_to_the_equilibrium_gap():
     """A following car ends at that gap within 1 %."""
     leader, x, v, dt = 60.0, 0.0, 4.0, 0.1

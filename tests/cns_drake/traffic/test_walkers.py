@@ -155,6 +155,33 @@ def test_walkers_aim_to_the_right(angle):
     assert street.place()[1][0] == pytest.approx(1.5, abs=0.05)
 
 
+@pytest.mark.parametrize("angle", [0.0, np.pi / 2, 2.4])
+def test_a_walker_goes_round_a_corner_without_a_stop(angle):
+    """A bend of 3 m to the left, after 8 m of a walkway 1 m wide."""
+    turn = np.linspace(0.0, np.pi / 2, 10)[:, None]
+    s = np.arange(0.0, 8.1, 0.5)[:, None]
+    ahead = np.array([np.cos(angle), np.sin(angle)])
+    left = np.array([-ahead[1], ahead[0]])
+    bend = 3.0 * (np.sin(turn) * ahead + (1 - np.cos(turn)) * left)
+    xy = np.concatenate(
+        [s * ahead, (8.0 * ahead + bend)[1:-1], 11.0 * ahead + (3.0 + s) * left]
+    )
+    way = Walkway(np.column_stack([xy, 0 * xy[:, 0]]), 0.5, 0, 1)
+    permits = make_permits(LaneGraph(()))
+    crowd = Crowd(1, [way], permits, np.random.default_rng(1))
+    walkers = crowd.walkers
+    walkers["path"], walkers["at"], walkers["xy"] = 0, 4, 2.0 * ahead
+    walkers["velocity"], walkers["speed"], walkers["aside"] = ahead, 1.0, 0.0
+    walkers["yaw"] = angle
+    line = shapely.LineString(xy)
+    for _ in range(150):
+        crowd.step(0.0, DT, 1)
+        place = shapely.Point(walkers["xy"][0])
+        assert line.distance(place) < 0.5
+        assert np.linalg.norm(walkers["velocity"][0]) > 0.5
+    assert 15.5 < line.project(place) < 17.5
+
+
 def test_few_walkers_cross_and_none_goes_back():
     """One in five, where others go straight on."""
     ways = [
