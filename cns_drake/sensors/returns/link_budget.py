@@ -126,6 +126,7 @@ def detection_probability(snr: ArrayLike) -> np.ndarray:
     return np.where(snr > CERTAIN_SNR, 1.0, probability)
 
 
+@compiled
 def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
     """Returns the standard deviation of a laser's ranges [m].
 

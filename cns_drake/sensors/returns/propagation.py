@@ -94,7 +94,7 @@ def start_ways(
     sides: Sides,
     side_hits: BeamHits,
     materials: Materials,
-) -> tuple[Light, Ways, BeamHits]:
+) -> tuple[list[Light], Ways, BeamHits]:
     """Returns what opaque surfaces send back, and the rays that meet others.
 
     Args:
@@ -117,23 +117,20 @@ def start_ways(
     onto_open = is_open[hits.geometry[axes]]
     side_onto_open = is_open[side_hits.geometry[lit]]
     k, n = axes[~onto_open], lit[~side_onto_open]
-    share, distance, geometry, cosine = (
-        np.concatenate([of_axes[k], of_sides[n]])
-        for of_axes, of_sides in (
-            (rest, sides.share),
-            (hits.ranges, side_hits.ranges),
-            (hits.geometry, side_hits.geometry),
-            (hits.cosine, side_hits.cosine),
+    lights = [
+        reflect(
+            beam[row],
+            share[among],
+            met.ranges[among],
+            met.geometry[among],
+            met.cosine[among],
+            materials,
         )
-    )
-    light = reflect(
-        beam[np.concatenate([k, sides.row[n]])],
-        share,
-        distance,
-        geometry,
-        cosine,
-        materials,
-    )
+        for row, share, met, among in (
+            (k, rest, hits, k),
+            (sides.row[n], sides.share, side_hits, n),
+        )
+    ]
     k, n = axes[onto_open], lit[side_onto_open]
     row = np.concatenate([k, sides.row[n]])
     met = join([select(hits, k), select(side_hits, n)])
@@ -151,7 +148,7 @@ def start_ways(
         np.full(len(row), -1, np.int32),
         np.full(len(row), np.inf, np.float32),
     )
-    return light, ways, met
+    return lights, ways, met
 
 
 @compiled
