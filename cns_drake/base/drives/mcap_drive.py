@@ -58,6 +58,7 @@ class McapDrive(Drive):
         """Opens a recording.
 
         Args:
+            path: the .mcap file, or the folder that holds it.
             lidar: name of the LiDAR; its scans are on the topic
                 /<lidar>/points.
 
