@@ -106,7 +106,7 @@ def _serve(listener: socket.socket) -> None:
                 importlib.import_module(found.name)
     start_compiler()
     code_digest("cns_drake.*", "evaluation.*")
-    # So are jobs, which would otherwise import all modules for each command.
+    # Jobs are forks, too: else each command would import all modules again.
     processes._context = multiprocessing.get_context("fork")
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     # Forks would take most of their time to look for garbage in all this.
