@@ -291,9 +291,11 @@ def with_unmarked_crossings(
         for row in sorted(rows, key=lambda row: abs(row - middle)):
             x, y = np.diff(points[row : row + 2, :2], axis=0)[0] / SPACING
             left = _REACH * np.array([-y, x])
-            ends = beside(points[row, :2], left), beside(points[row, :2], -left)
-            if ends[0] is None or ends[1] is None or ends[0][0] == ends[1][0]:
+            here = points[row, :2]
+            one, other = beside(here, left), beside(here, -left)
+            if one is None or other is None or one[0] == other[0]:
                 continue
+            ends = one, other
             p, q = (walkways[way].points[at] for way, at in ends)
             line = course(p, q, points[row, 2])
             if line is None:
@@ -309,17 +311,17 @@ def with_unmarked_crossings(
             break
     for k, way in enumerate(walkways):
         row, between = cuts.get(k, (len(way.points) - 1, way.end))
-        for rows, start, end in (
-            (slice(row + 1), way.start, between),
-            (slice(row, None), between, way.end),
+        for part, start, end in (
+            (slice(0, row + 1), way.start, between),
+            (slice(row, len(way.points)), between, way.end),
         )[: 1 + (k in cuts)]:
             found.append(
                 replace(
                     way,
-                    points=way.points[rows],
+                    points=way.points[part],
                     start=start,
                     end=end,
-                    free=way.limits[rows],
+                    free=way.limits[part],
                 )
             )
     return LaneGraph(graph.pieces, tuple(crossings)), found

@@ -336,8 +336,8 @@ def _find_ego(
         line.buffer(_HALF_LANE, cap_style="flat", join_style="mitre")
         for line in lines
     ] + [crossing.area for crossing in graph.crossings]
-    until = np.full((len(boxes), len(areas)), np.inf, np.float32)
-    rear, front, x, y = np.zeros((4, len(boxes), len(lines)))
+    until = np.full((len(corners), len(areas)), np.inf, np.float32)
+    rear, front, x, y = np.zeros((4, len(corners), len(lines)))
     which, places = shapely.STRtree(areas).query(boxes, predicate="intersects")
     until[which, places] = 0.0
     on_piece = places < len(lines)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 import hashlib
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from pydrake.geometry import Role
@@ -114,14 +114,16 @@ class Structure:
     @cached_property
     def outline(self) -> BaseGeometry:
         """The convex hull of all of it, seen from above [m]."""
-        return shapely.multipoints(self.p_WPs[:, :2]).convex_hull
+        hull = shapely.convex_hull(shapely.multipoints(self.p_WPs[:, :2]))
+        return cast(BaseGeometry, hull)
 
     @cached_property
     def footprint(self) -> BaseGeometry:
         """The convex hull of the parts near its foot, seen from above [m]."""
         p_WPs = self.p_WPs
         low = p_WPs[p_WPs[:, 2] <= self.bottom + _HEADROOM]
-        return shapely.multipoints(low[:, :2]).convex_hull
+        hull = shapely.convex_hull(shapely.multipoints(low[:, :2]))
+        return cast(BaseGeometry, hull)
 
 
 def read_structures(
