@@ -1,6 +1,7 @@
 """Polygons of the ground: triangles, tiles, surfaces, walls, taken places."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+import itertools
 import math
 from typing import TypeVar
 
@@ -15,6 +16,8 @@ from cns_drake.city.geometry.mesh import Mesh
 _MM = 1000.0
 # A corner or point as whole millimetres.
 _Point = tuple[int, int]
+# Fewer points than this are compared one by one: arrays of them take longer.
+_MANY = 50
 
 
 def triangulate(polygon: Polygon) -> np.ndarray:
@@ -58,6 +61,20 @@ def _with_corners_on_edges(
     ring: list[_Point], corners: list[_Point]
 ) -> list[_Point]:
     """Returns a ring with a corner wherever another ring touches it."""
+    if len(ring) * len(corners) < _MANY:
+        result = []
+        for a, b in _edges(ring):
+            on_edge = [
+                c
+                for c in corners
+                if c not in (a, b) and _cross(a, b, c) == 0
+                if _is_between(a, b, c)
+            ]
+            result += [
+                a,
+                *sorted(on_edge, key=lambda c: _square_distance(a, c)),
+            ]
+        return result
     points = np.array(corners, dtype=np.int64)
     starts = np.array(ring, dtype=np.int64)
     ways = np.roll(starts, -1, axis=0) - starts
@@ -172,7 +189,11 @@ def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
                 ring[left[k]],
                 ring[left[k + 1 - len(left)]],
             )
-            if _cross(*ear) > 0 and not _any_inside(points[left], ear):
+            if _cross(*ear) > 0 and not (
+                any(_is_inside(ring[i], ear) for i in left)
+                if len(left) < _MANY
+                else _any_inside(points[left], ear)
+            ):
                 triangles.append(ear)
                 left.pop(k)
                 # Continuing behind the ear avoids fans of thin triangles.
@@ -185,6 +206,17 @@ def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
             return triangles
     a, b, c = (ring[i] for i in left)
     return [*triangles, (a, b, c)] if _cross(a, b, c) > 0 else triangles
+
+
+def _is_inside(point: _Point, triangle: tuple[_Point, _Point, _Point]) -> bool:
+    """Returns whether a triangle has a point that is none of its corners."""
+    a, b, c = triangle
+    return (
+        point not in triangle
+        and _cross(a, b, point) >= 0
+        and _cross(b, c, point) >= 0
+        and _cross(c, a, point) >= 0
+    )
 
 
 def _any_inside(
@@ -330,6 +362,11 @@ def surface_mesh(
     pieces: list[BaseGeometry | None] = [geometry]
     if spacing > 0:
         squares, pieces = _cut_into_squares(geometry, spacing)
+    parts = [[] if piece is None else polygons_of(piece) for piece in pieces]
+    rings = [_quad(polygon) for polygon in itertools.chain(*parts)]
+    quads = np.reshape([r for r in rings if r is not None], (-1, 4, 2))
+    plane = iter(_are_planes(quads, height))
+    own = (r if r is not None and next(plane) else None for r in rings)
     is_plane = iter(_are_planes(squares, height))
     whole = iter(squares)
     halves = triangulate(box(0, 0, spacing, spacing))
@@ -340,31 +377,18 @@ def surface_mesh(
         faces.append(tuple(range(len(corners), len(corners) + len(ring))))
         corners.extend(ring)
 
-    for piece in pieces:
+    for piece, polygons in zip(pieces, parts, strict=True):
         if piece is None:
             # A square of the grid stays one face where it is plane.
             ring = next(whole)
-            rings = [ring] if next(is_plane) else halves + ring[3]
-        else:
-            rings = _faces(piece, height)
-        for ring in rings:
-            add(ring)
+            for face in [ring] if next(is_plane) else halves + ring[3]:
+                add(face)
+        for polygon in polygons:
+            quad = next(own)
+            for face in triangulate(polygon) if quad is None else [quad]:
+                add(face)
     xy = np.array(corners).reshape(-1, 2)
     return Mesh(np.column_stack([xy, _heights(xy, height)]), tuple(faces))
-
-
-def _faces(
-    geometry: BaseGeometry, height: HeightMap | float
-) -> Iterator[np.ndarray]:
-    """Yields the corners of the faces that polygons are cut into."""
-    for polygon in polygons_of(geometry):
-        if _is_convex_quad(polygon):
-            ring = np.array(shapely.normalize(polygon).exterior.coords[:4])
-            ring = _counter_clockwise(ring)
-            if _are_planes(ring[None], height)[0]:
-                yield ring
-                continue
-        yield from triangulate(polygon)
 
 
 def _cut_into_squares(
@@ -451,13 +475,20 @@ def _counter_clockwise(ring: np.ndarray) -> np.ndarray:
     return ring if area > 0 else ring[::-1]
 
 
-def _is_convex_quad(polygon: Polygon) -> bool:
-    """Returns whether a polygon is a grid square: its area fills its bounds."""
-    return (
-        len(polygon.exterior.coords) == 5
-        and not polygon.interiors
-        and polygon.area > 0.999999 * box(*polygon.bounds).area
-    )
+def _quad(polygon: Polygon) -> np.ndarray | None:
+    """Returns the (4, 2) corners of a polygon that is an upright rectangle.
+
+    Its area fills its bounds. The corners are counter-clockwise.
+    """
+    x0, y0, x1, y1 = polygon.bounds
+    if (
+        polygon.interiors
+        or len(polygon.exterior.coords) != 5
+        or polygon.area <= 0.999999 * (x1 - x0) * (y1 - y0)
+    ):
+        return None
+    ring = np.array(shapely.normalize(polygon).exterior.coords[:4])
+    return _counter_clockwise(ring)
 
 
 def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
