@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 FAILING = "raise RuntimeError('not to be imported')\n"
 # What a user may have -> its files.
