@@ -229,7 +229,7 @@ def _drops(
     found = [select(surfaces, np.zeros(0, np.int64))]
     for k in range(_MOST_DROPS):
         draw = _FIRST_DROP_DRAW + 2 * k
-        arrived = arrived - log(1.0 - uniform(key, beam, draw))
+        arrived = arrived + _number_before(key, beam, draw)
         is_near = arrived < mean
         beam, arrived, mean = beam[is_near], arrived[is_near], mean[is_near]
         if not len(beam):
@@ -253,6 +253,12 @@ def _drops(
             )
         )
     return join(found)
+
+
+@compiled
+def _number_before(key: np.uint64, beam: np.ndarray, draw: int) -> np.ndarray:
+    """Returns the mean number of drops before the next one, at random."""
+    return -np.log(1.0 - uniform(key, beam, draw))
 
 
 def _fog(
