@@ -95,7 +95,7 @@ def test_changes_behind_a_slow_vehicle():
 
 @pytest.mark.parametrize("error", [-0.02, 0.02])
 def test_changes_for_a_gain_alone(error):
-    """Of 0.25 m/s^2; all drive at 10 m/s."""
+    """The gain is 0.25 m/s^2; all drive at 10 m/s."""
     gap = (1 + error) * WANTED * np.sqrt(A / 0.25)
     assert changes((0, 100.0, V), (0, 104.0 + gap, V))[0] == (error < 0)
     # That for others counts a fifth.
@@ -148,7 +148,7 @@ def test_the_ego_car_is_another_one_than_all_vehicles():
     assert find_ahead(occupants, 0, 110.0, 1) == (30.0, 3.0)
     assert find_ahead(occupants, 0, 100.0, 0) == (6.0, V)
     assert find_ahead(occupants, 0, 170.0, 2)[0] == np.inf
-    # Of two at one place the first is ahead.
+    # The first of two at one place is ahead.
     assert find_ahead(occupants, 0, 170.0, 3) == (-4.0, V)
 
 
