@@ -82,6 +82,20 @@ def make_plan():
     )
 
 
+def test_slow_walkers_swing_their_limbs_less():
+    """By the part of 1.2 m/s at which they walk, and all faster ones alike."""
+    t, zero = 0.1 * np.arange(30), np.zeros(30)
+    rows = [[speed * t, zero, zero, zero, 5.0 * t] for speed in (0.6, 0.3, 1.5)]
+    rows.append([zero, 0.6 * t, zero, zero, 5.0 * t])
+    none = Tracks(0.1, np.zeros((30, 0, 5)))
+    plan = TrafficPlan((), none, Tracks(0.1, np.transpose(rows, (2, 0, 1))))
+    for time in (0.0, 0.2, 2.9):
+        expected = np.sin(5.0 * time) * np.array([0.5, 0.25, 1.0, 0.5])
+        np.testing.assert_allclose(
+            bodies_at(plan, time).swing, expected, atol=1e-12
+        )
+
+
 def make_diagram(plan, goes_on, is_posed=True):
     builder = DiagramBuilder()
     scene_graph = builder.AddSystem(SceneGraph())

@@ -304,6 +304,11 @@ def test_walkers_wait_farther_from_things():
     post = shapely.Point(10.0, 1.15).buffer(0.2)
     (way,) = kept_clear([straight()], [post])
     np.testing.assert_allclose(way.limits[20], [-0.5, 1.0])
+    # The last four points are such places.
+    for x, row, low in ((18.5, -4, -0.4), (18.0, -5, -0.5)):
+        post = shapely.Point(x, 1.15).buffer(0.2)
+        (way,) = kept_clear([straight()], [post])
+        np.testing.assert_allclose(way.limits[row], [low, 1.0])
     # Nobody turns on a crossing.
     post = shapely.Point(19.5, 1.15).buffer(0.2)
     for number in (0, 1):
