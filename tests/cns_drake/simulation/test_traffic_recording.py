@@ -42,7 +42,7 @@ def scenario(tmp_path_factory):
         world=None,
         map=str(town),
         stage="04",
-        traffic={"vehicles": 20, "walkers": 60, "seed": 3},
+        traffic={"vehicles": 20, "walkers": 60, "seed": 11},
         lidars={"lidar": UNIT},
         frames=FRAMES,
     )
