@@ -243,7 +243,7 @@ def measure_maps(
     )
     with tempfile.TemporaryDirectory() as folder:
         maps = Path(folder) / "maps"
-        write_truth(a, b, maps, spacing, reporter.track)
+        write_truth(a, b, maps, spacing, reporter.track, across_maps=True)
         return score_methods(maps, methods, reporter.track)
 
 

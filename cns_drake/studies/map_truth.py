@@ -189,6 +189,8 @@ def write_truth(
     output: Path,
     spacing: float = SPACING,
     track: Track = silent,
+    *,
+    across_maps: bool = False,
 ) -> tuple[Mapping[str, Counter[int]], list[StructureChange]]:
     """Writes the maps of two drives with their labels.
 
@@ -198,6 +200,7 @@ def write_truth(
     Args:
         output: the folder, new or empty.
         spacing: length of the way between two scans [m].
+        across_maps: their maps may have different names, as an aged one has.
 
     Returns:
         Side -> label -> number of points; what became of the structures.
@@ -206,7 +209,7 @@ def write_truth(
         InputError: the drives are of different worlds, or the folder cannot be
             written.
     """
-    check_same_world(a.drive, b.drive)
+    check_same_world(a.drive, b.drive, across_maps=across_maps)
     _check_same_map(a, b)
     with user_errors(output):
         if output.exists() and (not output.is_dir() or any(output.iterdir())):

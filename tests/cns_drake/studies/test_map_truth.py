@@ -1,19 +1,29 @@
 """Labels of two maps by rays: walls, screens, leaves, glass, another caster."""
 
 import json
+import shutil
 
 from helpers import eval_program
 from helpers.eval_program import run_program
 from helpers.map_pairs import GROUND, WALL, survey, wall_at
-from helpers.small_map import box_visual
+from helpers.small_map import box_visual, scenario_values
 import numpy as np
 import open3d
 import pytest
 
 from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.lidar.patterns import BeamCoverage
-from cns_drake.studies.map_truth import NEAR, open_survey, write_truth
+from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.map_pairs import TRUTH, measure_maps
+from cns_drake.studies.map_truth import (
+    NEAR,
+    open_survey,
+    simulate_survey,
+    write_truth,
+)
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import Label, read_pair, read_truth
 
@@ -210,6 +220,23 @@ def test_recordings_are_labelled_and_scored(short_recording, tmp_path, capsys):
     )
     assert status == 2
     assert "exists already" in err
+
+
+def test_an_aged_city_has_another_name(small_map, tmp_path):
+    aged = shutil.copytree(small_map, tmp_path / "small_s1")
+    drives = []
+    for name, folder, stage in (
+        ("today", small_map, "01"),
+        ("later", aged, "04"),
+    ):
+        values = scenario_values(folder) | {"stage": stage, "frames": 20}
+        values |= {"name": name, "lidars": {"lidar": {"columns": 90}}}
+        drives.append(DriveSimulation(make_scenario(values, name)))
+    scores = measure_maps(Reporter(), *drives, (TRUTH,), 1.0)
+    assert scores[TRUTH]["miou"] == 1.0
+    surveys = [simulate_survey(drive.scenario) for drive in drives]
+    with pytest.raises(InputError, match="through small_s1"):
+        write_truth(*surveys, tmp_path / "out")
 
 
 def test_two_worlds_and_changed_worlds_are_refused(
