@@ -219,7 +219,7 @@ def measure_years(
         both = DriveSimulation(drives.database), DriveSimulation(drives.query)
         for task, (file, function, arguments) in tasks.items():
             step = MakePart(file(name), function, (*both, *arguments))
-            job = f"{task} {name}"
+            job = f"{task} task of {name}"
             jobs[job] = Job(job, step, cost=_MAP_COST)
             further.setdefault(task, []).append(step.part)
 
