@@ -12,10 +12,12 @@ from shapely.geometry.base import BaseGeometry
 
 # Distance of the points of a piece at most [m].
 SPACING = 0.5
-# Walkers' middles keep this distance from things beside them; that where they
-# may wait and turn, on so many points at either end, is their boxes' reach [m].
-_BESIDE = 0.36
-_AROUND, _WAITS = 0.53, 4
+# Walkers' middles keep so far from things that their boxes clear them in any
+# direction; where that takes more than this part of a walkway, as far as their
+# sides need [m].
+_AROUND, _NARROW, _BESIDE = 0.53, 0.5, 0.36
+# Walkers begin a walkway this many points before its first one, at most.
+_BEFORE = 4
 # Number of places across a walkway, and least number of points along it.
 _ACROSS, _ALONG = 21, 4
 # Walkers step aside by this number of places from point to point.
@@ -98,6 +100,8 @@ class Walkway:
         crossing: number of the crossing that it leads over, -1 for none.
         free: (N, 2) least and greatest offset to the right that things leave
             free at each point [m]; None if that is the half width either way.
+        narrow: (N,) bool, where walkers have to face along it; None for
+            nowhere.
     """
 
     points: np.ndarray
@@ -106,6 +110,7 @@ class Walkway:
     end: int
     crossing: int = -1
     free: np.ndarray | None = None
+    narrow: np.ndarray | None = None
 
     @property
     def limits(self) -> np.ndarray:
@@ -134,7 +139,7 @@ def kept_clear(
         (max(way.start, way.end) for way in walkways), default=0
     )
     for way in walkways:
-        points = way.points[:, :2]
+        points = _lengthened(way.points[:, :2], _BEFORE)
         right = np.gradient(points, axis=0)[:, ::-1] * (1.0, -1.0)
         right /= np.linalg.norm(right, axis=1)[:, None]
         across = np.linspace(-way.half_width, way.half_width, _ACROSS)
@@ -143,10 +148,15 @@ def kept_clear(
         for each, reach in ((barred, _BESIDE), (around, _AROUND)):
             near = tree.query(shapely.points(places).ravel(), "dwithin", reach)
             each.flat[near[0]] = 1
-        ends = np.zeros(len(points), bool)
-        ends[:_WAITS] = ends[-_WAITS:] = way.crossing < 0
-        ends &= ~around.all(axis=1)
-        barred[ends] = around[ends]
+        narrow = around.mean(axis=1) > _NARROW
+        barred[~narrow] = around[~narrow]
+        # What bars the whole way there stands behind those who begin it.
+        for line in (barred, barred[::-1]):
+            for row in line[:_BEFORE][::-1]:
+                if not (line[_BEFORE] | row).all():
+                    line[_BEFORE] |= row
+        barred = barred[_BEFORE:-_BEFORE]
+        narrow = maximum_filter1d(narrow, 3)[_BEFORE:-_BEFORE]
         # A walker is longer than wide, and needs a way to step aside.
         barred = maximum_filter1d(barred, 3, axis=0)
         for step in (1, -1):
@@ -158,7 +168,7 @@ def kept_clear(
                     before, 2 * _ASIDE + 1, mode="constant", cval=1
                 )
         free = np.pad(1 - barred, ((0, 0), (1, 1)))
-        limits = np.full((len(points), 2), np.nan)
+        limits = np.full((len(barred), 2), np.nan)
         last = np.array([0, _ACROSS])
         for row, edges in enumerate(np.diff(free)):
             gaps = np.flatnonzero(edges).reshape(-1, 2)
@@ -172,11 +182,11 @@ def kept_clear(
         bars = np.flatnonzero(np.isnan(limits[:, 0]))
         if way.crossing >= 0 and len(bars):
             continue
-        for before, after in pairwise([-1, *bars.tolist(), len(points)]):
+        for before, after in pairwise([-1, *bars.tolist(), len(barred)]):
             rows, nodes = slice(before + 1, after), [way.start, way.end]
             if after - before <= _ALONG:
                 continue
-            for k, is_cut in enumerate((before >= 0, after < len(points))):
+            for k, is_cut in enumerate((before >= 0, after < len(barred))):
                 if is_cut:
                     nodes[k], num_nodes = num_nodes, num_nodes + 1
             found.append(
@@ -186,6 +196,7 @@ def kept_clear(
                     start=nodes[0],
                     end=nodes[1],
                     free=limits[rows],
+                    narrow=narrow[rows],
                 )
             )
     # No crossing leads to where there is no walkway.
@@ -195,6 +206,15 @@ def kept_clear(
         for way in found
         if way.crossing < 0 or {way.start, way.end} <= reached
     ]
+
+
+def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
+    """Returns points (N, 2) with some more straight on at either end."""
+    more = np.arange(1, count + 1)[:, None]
+    before = points[0] - more[::-1] * (points[1] - points[0])
+    return np.concatenate(
+        [before, points, points[-1] + more * (points[-1] - points[-2])]
+    )
 
 
 @dataclass(frozen=True)
@@ -322,6 +342,7 @@ def with_unmarked_crossings(
                     start=start,
                     end=end,
                     free=way.limits[part],
+                    narrow=None if way.narrow is None else way.narrow[part],
                 )
             )
     return LaneGraph(graph.pieces, tuple(crossings)), found

@@ -95,12 +95,14 @@ class Paths(NamedTuple):
         tangents: (M, 2) unit vectors from each point to the next; that of the
             last point of a path is the one before.
         limits: (M, 2) least and greatest offset to the right [m].
+        narrow: (M,) bool, where walkers face along their path.
     """
 
     paths: np.ndarray
     points: np.ndarray
     tangents: np.ndarray
     limits: np.ndarray
+    narrow: np.ndarray
 
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
@@ -214,7 +216,7 @@ class Crowd:
 
     def _follow_paths(self) -> np.ndarray:
         """Notes the points that walkers pass; returns who is near the end."""
-        walkers, (_, points, tangents, _) = self.walkers, self._paths
+        walkers, (_, points, tangents, *_) = self.walkers, self._paths
         paths = self._paths.paths[walkers["path"]]
 
         def ahead(rows: np.ndarray) -> np.ndarray:
@@ -331,16 +333,22 @@ def _make_paths(walkways: Sequence[Walkway]) -> Paths:
     paths["crossing"] = np.repeat([way.crossing for way in walkways], 2)
     paths["node"] = [node for way in walkways for node in (way.end, way.start)]
     points, tangents = [np.zeros((0, 3))], [np.zeros((0, 2))]
-    limits = [np.zeros((0, 2))]
+    limits, narrow = [np.zeros((0, 2))], [np.zeros(0, bool)]
     for way in walkways:
         limits += [way.limits, -way.limits[::-1, ::-1]]
+        is_narrow = way.narrow
+        if is_narrow is None:
+            is_narrow = np.zeros(len(way.points), bool)
+        narrow += [is_narrow, is_narrow[::-1]]
         for line in (way.points, way.points[::-1]):
             x, y = np.diff(line[:, :2], axis=0).T
             length = np.sqrt(x * x + y * y)
             along = np.column_stack([x / length, y / length])
             points.append(line)
             tangents += [along, along[-1:]]
-    return Paths(paths, *map(np.concatenate, (points, tangents, limits)))
+    return Paths(
+        paths, *map(np.concatenate, (points, tangents, limits, narrow))
+    )
 
 
 def _place_walkers(
@@ -510,8 +518,14 @@ def _move(
                 new_x, new_y = rest_x, rest_y
             stop_x, stop_y = _stop(new_x, new_y, new_vx, new_vy)
             yaw = one.yaw
-            if speed > _GOING:
+            row = _nearest(paths, one, new_x, new_y)
+            tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
+            if paths.narrow[row] or speed > _GOING:
                 turn = np.arctan2(new_vy, new_vx) - yaw
+                if paths.narrow[row]:
+                    # Along the path, forwards or backwards.
+                    ahead = np.cos(yaw) * tx + np.sin(yaw) * ty
+                    turn = np.arctan2(ty, tx) - yaw + np.pi * (ahead < 0.0)
                 turn = (turn + np.pi) % (2 * np.pi) - np.pi
                 yaw += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
             if attempt < 2 and (
@@ -536,6 +550,20 @@ def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
 
 
 @compiled
+def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
+    """Returns the row of the point nearest to a place on a walker's path."""
+    path, points = paths.paths[walker.path], paths.points
+    best, nearest = np.inf, path.first
+    for at in range(max(walker.at - 3, 0), min(walker.at + 4, path.num_points)):
+        row = path.first + at
+        dx, dy = x - points[row, 0], y - points[row, 1]
+        distance = dx * dx + dy * dy
+        if distance < best:
+            best, nearest = distance, row
+    return nearest
+
+
+@compiled
 def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
     """Returns the distance of a place from a walker's path [m].
 
@@ -545,13 +573,8 @@ def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
         x, y: the place [m].
     """
     path, points = paths.paths[walker.path], paths.points
-    best, nearest = np.inf, 0
-    for at in range(max(walker.at - 3, 0), min(walker.at + 4, path.num_points)):
-        dx, dy = x - points[path.first + at, 0], y - points[path.first + at, 1]
-        distance = dx * dx + dy * dy
-        if distance < best:
-            best, nearest = distance, at
-    row = path.first + nearest
+    row = _nearest(paths, walker, x, y)
+    nearest = row - path.first
     low, high = paths.limits[row]
     tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
     dx, dy = x - points[row, 0], y - points[row, 1]

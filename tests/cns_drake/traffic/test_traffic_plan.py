@@ -262,22 +262,35 @@ def test_walkways_pass_things(turn):
     c, s = np.cos(turn), np.sin(turn)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     thing = shapely.affinity.rotate(
-        shapely.box(9.8, 0.5, 10.2, 3.0), turn, (0, 0), use_radians=True
+        shapely.box(9.8, 0.6, 10.2, 3.0), turn, (0, 0), use_radians=True
     )
     way = replace(straight(), points=straight().points @ R.T)
     (found,) = kept_clear([way], [thing])
     np.testing.assert_array_equal(found.points, way.points)
     low, high = found.limits.T
     assert (high == 1.0).all()
-    # 0.36 m beside the thing, rounded up to one of 20 parts.
-    assert low[20] == pytest.approx(-0.1)
+    # 0.53 m beside the thing, rounded up to one of 20 parts.
+    assert low[20] == pytest.approx(0.0)
     assert (low[19:22] == low[20]).all()
     # Walkers step aside by two parts from point to point.
-    np.testing.assert_allclose(low[22:26], [-0.3, -0.5, -0.7, -0.9])
-    np.testing.assert_allclose(low[18:14:-1], [-0.3, -0.5, -0.7, -0.9])
+    np.testing.assert_allclose(low[22:26], [-0.1, -0.3, -0.5, -0.7])
+    np.testing.assert_allclose(low[18:14:-1], [-0.1, -0.3, -0.5, -0.7])
     assert (low[:14] == -1.0).all()
     assert (low[27:] == -1.0).all()
+    assert not found.narrow.any()
     assert kept_clear([way], [])[0].limits.tolist() == [[-1.0, 1.0]] * 41
+
+
+@pytest.mark.parametrize(
+    ("edge", "low", "is_narrow"), [(0.59, 0.0, False), (0.49, -0.1, True)]
+)
+def test_walkers_face_along_where_it_is_narrow(edge, low, is_narrow):
+    """Where a box that may face anywhere has less than half of the way."""
+    hedge = shapely.box(5.0, edge, 15.0, 3.0)
+    (way,) = kept_clear([straight()], [hedge])
+    assert way.narrow[20] == is_narrow
+    np.testing.assert_allclose(way.limits[20], [low, 1.0], atol=1e-9)
+    assert not way.narrow[[0, -1]].any()
 
 
 def test_walkways_end_where_things_bar_the_way():
@@ -295,26 +308,17 @@ def test_walkways_end_where_things_bar_the_way():
     assert [way.crossing for way in found] == [-1, -1]
 
 
-def test_walkers_wait_farther_from_things():
-    """At the ends of a walkway, where they turn, their boxes' corners count."""
-    post = shapely.Point(19.5, 1.15).buffer(0.2)
-    (way,) = kept_clear([straight()], [post])
-    # 0.53 m beside it, rounded down to one of 20 parts; it is on the left.
-    np.testing.assert_allclose(way.limits[-1], [-0.4, 1.0])
-    post = shapely.Point(10.0, 1.15).buffer(0.2)
-    (way,) = kept_clear([straight()], [post])
-    np.testing.assert_allclose(way.limits[20], [-0.5, 1.0])
-    # The last four points are such places.
-    for x, row, low in ((18.5, -4, -0.4), (18.0, -5, -0.5)):
+def test_walkways_are_free_where_walkers_begin_them():
+    """They may stand two metres before the first point."""
+    for x, low in ((-1.9, -0.4), (-2.8, -1.0), (21.9, -0.4), (22.8, -1.0)):
         post = shapely.Point(x, 1.15).buffer(0.2)
         (way,) = kept_clear([straight()], [post])
+        row = 0 if x < 0.0 else -1
         np.testing.assert_allclose(way.limits[row], [low, 1.0])
-    # Nobody turns on a crossing.
-    post = shapely.Point(19.5, 1.15).buffer(0.2)
-    for number in (0, 1):
-        over = replace(straight(), crossing=number)
-        _, way = kept_clear([straight(), over], [post])
-        np.testing.assert_allclose(way.limits[-1], [-0.5, 1.0])
+    # What bars the whole way there stands behind those who wait.
+    wall = shapely.box(-1.1, -2.0, -0.9, 2.0)
+    (way,) = kept_clear([straight()], [wall])
+    np.testing.assert_allclose(way.limits[0], [-1.0, 1.0])
 
 
 def test_walkers_pass_what_stands_on_sidewalks():
@@ -347,7 +351,7 @@ def test_walkers_pass_what_stands_on_sidewalks():
         near += len(tree.query(found, "dwithin", 0.5)[0])
     assert near > 100
     # Where ways meet, a walker may touch something.
-    assert met < 1e-3 * 80 * 60
+    assert met < 2e-4 * 80 * 60
     moved = np.ptp(traffic.walkers.values[..., :2], axis=0).max(axis=1)
     assert (moved > 5.0).mean() > 0.9
 

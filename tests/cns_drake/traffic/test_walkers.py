@@ -1,5 +1,7 @@
 """Walkers of the social force model: closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -23,10 +25,11 @@ def straight(angle, half_width=3.0, length=60.0, start=0, end=1, crossing=-1):
 class Street:
     """Some walkers on a walkway, at distances along it and to its right."""
 
-    def __init__(self, angle, *places, half_width=3.0, speed=1.0):
+    def __init__(self, angle, *places, half_width=3.0, speed=1.0, narrow=False):
         self.ahead = np.array([np.cos(angle), np.sin(angle)])
         self.right = np.array([self.ahead[1], -self.ahead[0]])
         way = straight(angle, half_width)
+        way = replace(way, narrow=np.full(len(way.points), narrow))
         permits = make_permits(LaneGraph(()))
         rng = np.random.default_rng(1)
         self.crowd = Crowd(len(places), [way], permits, rng)
@@ -112,6 +115,22 @@ def test_walkers_turn_slowly_and_speed_up_within_bounds():
     for _ in range(20):
         street.step()
     assert street.walkers["yaw"][0] == pytest.approx(0.7)
+
+
+@ANGLES
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("turn", [1.4, -1.4, 1.8, -1.8])
+def test_walkers_face_along_narrow_ways(angle, way, turn):
+    """Either way, whichever is nearer; elsewhere, as they go."""
+    for narrow in (False, True):
+        street = Street(angle, (10.0, 0.0, way), narrow=narrow)
+        street.walkers["yaw"] += turn
+        for _ in range(30):
+            street.step()
+        is_back = narrow and abs(turn) > np.pi / 2
+        facing = angle + np.pi * ((way < 0) != is_back)
+        yaw = street.walkers["yaw"][0]
+        assert np.cos(yaw - facing) == pytest.approx(1.0)
 
 
 def overlap(street):
