@@ -16,8 +16,6 @@ from cns_drake.city.geometry.mesh import Mesh
 _MM = 1000.0
 # A corner or point as whole millimetres.
 _Point = tuple[int, int]
-# Fewer points than this are compared one by one: arrays of them take longer.
-_MANY = 50
 
 
 def triangulate(polygon: Polygon) -> np.ndarray:
@@ -61,20 +59,6 @@ def _with_corners_on_edges(
     ring: list[_Point], corners: list[_Point]
 ) -> list[_Point]:
     """Returns a ring with a corner wherever another ring touches it."""
-    if len(ring) * len(corners) < _MANY:
-        result = []
-        for a, b in _edges(ring):
-            on_edge = [
-                c
-                for c in corners
-                if c not in (a, b) and _cross(a, b, c) == 0
-                if _is_between(a, b, c)
-            ]
-            result += [
-                a,
-                *sorted(on_edge, key=lambda c: _square_distance(a, c)),
-            ]
-        return result
     points = np.array(corners, dtype=np.int64)
     starts = np.array(ring, dtype=np.int64)
     ways = np.roll(starts, -1, axis=0) - starts
@@ -189,11 +173,7 @@ def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
                 ring[left[k]],
                 ring[left[k + 1 - len(left)]],
             )
-            if _cross(*ear) > 0 and not (
-                any(_is_inside(ring[i], ear) for i in left)
-                if len(left) < _MANY
-                else _any_inside(points[left], ear)
-            ):
+            if _cross(*ear) > 0 and not _any_inside(points[left], ear):
                 triangles.append(ear)
                 left.pop(k)
                 # Continuing behind the ear avoids fans of thin triangles.
@@ -206,17 +186,6 @@ def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
             return triangles
     a, b, c = (ring[i] for i in left)
     return [*triangles, (a, b, c)] if _cross(a, b, c) > 0 else triangles
-
-
-def _is_inside(point: _Point, triangle: tuple[_Point, _Point, _Point]) -> bool:
-    """Returns whether a triangle has a point that is none of its corners."""
-    a, b, c = triangle
-    return (
-        point not in triangle
-        and _cross(a, b, point) >= 0
-        and _cross(b, c, point) >= 0
-        and _cross(c, a, point) >= 0
-    )
 
 
 def _any_inside(
