@@ -1,5 +1,6 @@
 """Changes of lanes (MOBIL), first places, and drawn ways: closed forms."""
 
+from helpers.vehicle_records import make_vehicles
 import numpy as np
 import pytest
 
@@ -8,7 +9,6 @@ from cns_drake.traffic.streets import EgoBox, make_streets
 from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP
 from cns_drake.traffic.vehicles import (
     CURRENT,
-    VEHICLE,
     change_lanes,
     choose_way,
     find_ahead,
@@ -46,16 +46,8 @@ STREETS = two_lanes()
 
 def vehicles(*states):
     """Returns records of vehicles: the lane, the place on it, the speed."""
-    cars = np.zeros(len(states), VEHICLE)
-    for name in ("held", "left_lane", "path"):
-        cars[name] = -1
-    cars["since"], cars["change_length"] = np.inf, 1.0
-    cars["length"], cars["top"], cars["factor"] = 4.0, 40.0, 1.0
-    cars["a"], cars["b"], cars["headway"] = A, B, T
-    for car, (lane, s, v) in zip(cars, states, strict=True):
-        car["path"][CURRENT : CURRENT + 2] = lane, 2
-        car["s"], car["v"] = s, v
-    return cars
+    states = (((lane, 2), s, v) for lane, s, v in states)
+    return make_vehicles(*states, top=40.0, a=A, b=B, headway=T)
 
 
 def changes(*states, k=0, **fields):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+from helpers.vehicle_records import make_vehicles
 import numpy as np
 import pytest
 
@@ -11,7 +12,6 @@ from cns_drake.traffic.right_of_way import grant_ways, make_permits
 from cns_drake.traffic.streets import MERGE, SPLIT, EgoBox, make_streets
 from cns_drake.traffic.vehicles import (
     CURRENT,
-    VEHICLE,
     accelerations,
     advance,
     find_occupants,
@@ -77,16 +77,9 @@ def junction(phases=(-1, -1), walkers=False):
 
 def vehicles(*states):
     """Returns records of vehicles: the lane, the place on it, the speed."""
-    cars = np.zeros(len(states), VEHICLE)
-    for name in ("held", "left_lane", "path"):
-        cars[name] = -1
-    cars["since"], cars["change_length"] = np.inf, 1.0
-    cars["length"], cars["top"], cars["factor"] = 4.0, 20.0, 1.0
-    cars["a"], cars["b"], cars["headway"] = 1.5, 2.0, 1.3
-    for car, (lane, s, v) in zip(cars, states, strict=True):
-        car["path"][CURRENT : CURRENT + 3] = lane, lane + 1, lane + 2
-        car["s"], car["v"] = s, v
-    return cars
+    return make_vehicles(
+        *((range(lane, lane + 3), s, v) for lane, s, v in states)
+    )
 
 
 def on_way(cars, i, way, s, order):

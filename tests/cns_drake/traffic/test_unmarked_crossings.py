@@ -1,5 +1,6 @@
 """Walkers who cross streets between crossings: where, when, how often."""
 
+from helpers.vehicle_records import make_vehicles
 import numpy as np
 import pytest
 import shapely
@@ -19,8 +20,6 @@ from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox, make_streets
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
 from cns_drake.traffic.vehicles import (
-    CURRENT,
-    VEHICLE,
     accelerations,
     advance,
     find_occupants,
@@ -128,15 +127,7 @@ def test_narrow_streets_alone_and_away_from_junctions():
 
 def vehicles(*states):
     """Returns vehicles in the first lane: the place on it, the speed."""
-    cars = np.zeros(len(states), VEHICLE)
-    for name in ("held", "left_lane", "path"):
-        cars[name] = -1
-    cars["since"], cars["change_length"] = np.inf, 1.0
-    cars["length"], cars["top"], cars["factor"] = 4.0, 20.0, 1.0
-    cars["a"], cars["b"], cars["headway"] = 1.5, 2.0, 1.3
-    cars["path"][:, CURRENT : CURRENT + 2] = 0, 1
-    cars["s"], cars["v"] = np.array(states, float).T
-    return cars
+    return make_vehicles(*(((0, 1), s, v) for s, v in states))
 
 
 def lane_with_crossing(marked=False, ego=1e4):
