@@ -197,7 +197,7 @@ def measure_years(
         cluster,
     )
     files = StudyFiles(output)
-    jobs: dict[str, Job] = {}
+    jobs: list[Job] = []
     found: list[tuple[Scenario, int, int, str, Part, Part, Part]] = []
     # One of each task, in the order of `found`.
     further: dict[str, list[Part]] = {}
@@ -219,8 +219,7 @@ def measure_years(
         both = DriveSimulation(drives.database), DriveSimulation(drives.query)
         for task, (file, function, arguments) in tasks.items():
             step = MakePart(file(name), function, (*both, *arguments))
-            job = f"{task} task of {name}"
-            jobs[job] = Job(job, step, cost=_MAP_COST)
+            jobs.append(Job(f"{task} task of {name}", step, cost=_MAP_COST))
             further.setdefault(task, []).append(step.part)
 
     for drive in drives:
@@ -253,8 +252,8 @@ def measure_years(
                     add_tasks(
                         f"{drive.name}_{ending} {direction}", pairs[direction]
                     )
-        jobs |= plan.jobs
-    run_jobs(jobs.values(), cluster)
+        jobs += plan.jobs.values()
+    run_jobs(jobs, cluster)
     pairs_found = [
         AgedPair(
             map_folder(drive).name,
@@ -297,12 +296,11 @@ def _values(task: str, found: Any) -> dict[tuple[str, str], tuple[float, int]]:
     }
 
 
-def _map_job(drive: Scenario, files: StudyFiles, jobs: dict[str, Job]) -> Part:
+def _map_job(drive: Scenario, files: StudyFiles, jobs: list[Job]) -> Part:
     """Adds the job that maps a city along a drive; returns its part."""
     part = files.trend_points("map", drive.name)
     step = MakePart(part, map_city, (DriveSimulation(drive), _MAP_SPACING))
-    name = f"map {drive.name}"
-    jobs[name] = Job(name, step, cost=_MAP_COST)
+    jobs.append(Job(f"map {drive.name}", step, cost=_MAP_COST))
     return part
 
 
