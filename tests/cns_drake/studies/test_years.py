@@ -12,7 +12,7 @@ class PlannedError(Exception):
 
 
 def test_each_part_has_a_job_of_its_own(tmp_path, monkeypatch):
-    """Of two jobs of one name, one would never run."""
+    """If two have one name, one of them never runs."""
     runs = []
 
     def note(jobs, cluster):
