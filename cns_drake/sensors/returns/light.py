@@ -174,10 +174,7 @@ def texture(
         if part == 0.0:
             continue
         ray, group = row[beam[k]], group_of[geometry[k]]
-        # Remainders take long.
-        place = min(ray, len(p_WSset) - 1)
-        if 1 < len(p_WSset) <= ray:
-            place = ray % len(p_WSset)
+        place = ray % len(p_WSset) if len(p_WSset) > 1 else 0
         x = y = z = 0.0
         for i in range(3):
             away = p_WSset[place, i] - p_WLset[group, i]
