@@ -333,7 +333,8 @@ def _make_paths(walkways: Sequence[Walkway]) -> Paths:
     paths["crossing"] = np.repeat([way.crossing for way in walkways], 2)
     paths["node"] = [node for way in walkways for node in (way.end, way.start)]
     points, tangents = [np.zeros((0, 3))], [np.zeros((0, 2))]
-    limits, narrow = [np.zeros((0, 2))], [np.zeros(0, bool)]
+    limits = [np.zeros((0, 2))]
+    narrow: list[np.ndarray] = [np.zeros(0, bool)]
     for way in walkways:
         limits += [way.limits, -way.limits[::-1, ::-1]]
         is_narrow = way.narrow
