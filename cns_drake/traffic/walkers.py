@@ -182,9 +182,12 @@ class Crowd:
         x, y = walkers["velocity"].T
         speed = np.sqrt(x * x + y * y)
         walkers["phase"] += gait_rate(speed) * dt
-        is_stuck = (speed < _GOING) & ~is_waiting
-        walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + dt, 0.0)
         paths = self._paths.paths[walkers["path"]]
+        # Others may push one back.
+        along = self._paths.tangents[paths["first"] + walkers["at"]]
+        gets_on = x * along[:, 0] + y * along[:, 1] > _GOING
+        is_stuck = ~gets_on & ~is_waiting
+        walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + dt, 0.0)
         back = walkers["stuck"] > _PATIENCE
         # Likewise one who waits where the other wants to leave a crossing.
         apart = walkers["xy"][back, None] - walkers["xy"][is_waiting]

@@ -133,6 +133,19 @@ def test_walkers_face_along_narrow_ways(angle, way, turn):
         assert np.cos(yaw - facing) == pytest.approx(1.0)
 
 
+@ANGLES
+@pytest.mark.parametrize(("speed", "steps"), [(-0.6, 40), (0.6, None)])
+def test_walkers_who_are_pushed_back_turn_back_after_4_s(angle, speed, steps):
+    street = Street(angle, (30.0, 0.0, 1))
+    turned = None
+    for k in range(60):
+        street.walkers["velocity"] = speed * street.ahead
+        street.step()
+        if turned is None and street.walkers["path"][0] == 1:
+            turned = k + 1
+    assert turned == steps
+
+
 def overlap(street):
     """Returns the area that two walkers share [m^2]."""
     half = np.array([WALKER_LENGTH, WALKER_WIDTH]) / 2
