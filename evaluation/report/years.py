@@ -298,13 +298,17 @@ def draw_years(rows: Sequence[YearRow], stem: Path) -> None:
         stem: path to write, without ending.
     """
     maps = list(dict.fromkeys(row.pair.map_name for row in rows))
-    figure = Figure(figsize=(4.2 * len(maps), 3.6), layout="constrained")
-    panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
-    for axes, name in zip(panels, maps, strict=True):
+    columns = min(len(maps), 2)
+    lines = math.ceil(len(maps) / columns)
+    figure = Figure((4.2 * columns, 0.6 + 3.0 * lines), layout="constrained")
+    panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
+    for axes, name in zip(panels, maps, strict=False):
         _draw_map(axes, [r for r in rows if r.pair.map_name == name])
         axes.set_title(name.capitalize())
-    panels[0].set_ylabel("share of today's AUC that is left")
-    panels[-1].legend(fontsize=7)
+    panels[0].legend(fontsize=7, loc="lower left")
+    for axes in panels[len(maps) :]:
+        axes.axis("off")
+    figure.supylabel("share of today's AUC that is left", fontsize="medium")
     save(figure, stem)
 
 
