@@ -809,8 +809,6 @@ RECIPES = {
 NOT_RUN = {
     ".venv/bin/python docs/reference_pages.py": "writes into this project; "
     "test_fields compares the pages with what is there",
-    "cns-drake import neukolln": "needs a file that is not shipped",
-    "cns-drake reproduce neukolln": "needs that import",
     "python docs/weather_pictures.py": "renders shipped cities, for minutes",
     "python docs/noise_figures.py": "runs many drives, for minutes",
     "mkdocs serve": "a server, which does not end; test_site builds the site",
