@@ -121,6 +121,13 @@ class Walkway:
             self.half_width * np.array([-1, 1]), (len(self.points), 1)
         )
 
+    @property
+    def is_narrow(self) -> np.ndarray:
+        """The (N,) bool whether walkers have to face along it."""
+        if self.narrow is not None:
+            return self.narrow
+        return np.zeros(len(self.points), bool)
+
 
 def kept_clear(
     walkways: Sequence[Walkway], things: Sequence[BaseGeometry]
@@ -342,7 +349,7 @@ def with_unmarked_crossings(
                     start=start,
                     end=end,
                     free=way.limits[part],
-                    narrow=None if way.narrow is None else way.narrow[part],
+                    narrow=way.is_narrow[part],
                 )
             )
     return LaneGraph(graph.pieces, tuple(crossings)), found

@@ -340,10 +340,7 @@ def _make_paths(walkways: Sequence[Walkway]) -> Paths:
     narrow: list[np.ndarray] = [np.zeros(0, bool)]
     for way in walkways:
         limits += [way.limits, -way.limits[::-1, ::-1]]
-        is_narrow = way.narrow
-        if is_narrow is None:
-            is_narrow = np.zeros(len(way.points), bool)
-        narrow += [is_narrow, is_narrow[::-1]]
+        narrow += [way.is_narrow, way.is_narrow[::-1]]
         for line in (way.points, way.points[::-1]):
             x, y = np.diff(line[:, :2], axis=0).T
             length = np.sqrt(x * x + y * y)
