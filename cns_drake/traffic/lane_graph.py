@@ -151,10 +151,10 @@ def kept_clear(
         right /= np.linalg.norm(right, axis=1)[:, None]
         across = np.linspace(-way.half_width, way.half_width, _ACROSS)
         places = points[:, None] + across[:, None] * right[:, None]
+        seen = shapely.points(places).ravel()
         barred, around = np.zeros((2, *places.shape[:2]), int)
         for each, reach in ((barred, _BESIDE), (around, _AROUND)):
-            near = tree.query(shapely.points(places).ravel(), "dwithin", reach)
-            each.flat[near[0]] = 1
+            each.flat[tree.query(seen, "dwithin", reach)[0]] = 1
         narrow = around.mean(axis=1) > _NARROW
         barred[~narrow] = around[~narrow]
         # What bars the whole way there stands behind those who begin it.

@@ -311,10 +311,13 @@ class Trial:
         """
         streets, occupants = self._task.streets, self._occupants
         cars, permits, crowd = self._cars, self._permits, self._crowd
-        past_cars, past_walkers = [], []
-        for k in steps:
-            past_cars.append(cars[: len(self._kinds)].copy())
-            past_walkers.append(crowd.walkers.copy())
+        past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)
+        past_walkers = np.empty(
+            (len(steps), len(crowd.walkers)), crowd.walkers.dtype
+        )
+        for row, k in enumerate(steps):
+            past_cars[row] = cars[: len(self._kinds)]
+            past_walkers[row] = crowd.walkers
             find_occupants(occupants, streets, cars, k)
             grant_ways(streets, cars, occupants, permits, k, STEP, self._seed)
             crossings = permits.crossings
@@ -325,8 +328,8 @@ class Trial:
             advance(streets, cars, wanted, STEP, self._seed)
             crowd.step(k * STEP, STEP, self._seed + 1)
         rows = slice(steps.start, steps.stop)
-        self._vehicles[rows] = vehicle_poses(streets, np.array(past_cars))
-        self._walkers[rows] = crowd.poses(np.array(past_walkers))
+        self._vehicles[rows] = vehicle_poses(streets, past_cars)
+        self._walkers[rows] = crowd.poses(past_walkers)
         # The step before, for the half step between.
         first = max(steps.start - 1, 0)
         rows = slice(first, steps.stop)
