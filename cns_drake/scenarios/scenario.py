@@ -113,14 +113,22 @@ class DriverConfig(Section):
         lane_changes: rate at which the car goes to a lane beside its own, and
             back after 15 to 270 m, where there is one [1/km].
         follows: whether the car is a vehicle among those of `traffic`.
-        seed: seed of all draws; by default the drive's name is one.
+        seed: seed of all draws, a number or a name; by default the drive's.
     """
 
     wander: float = Field(default=0.0, ge=0.0, le=1.0)
     wander_length: float = Field(default=50.0, ge=20.0, le=1000.0)
     lane_changes: float = Field(default=0.0, ge=0.0, le=10.0)
     follows: bool = False
-    seed: int | None = Field(default=None, ge=0)
+    seed: int | str | None = None
+
+    @field_validator("seed", mode="before")
+    @classmethod
+    def _check_seed(cls, seed: Any) -> Any:
+        is_number = type(seed) is int and seed >= 0
+        if is_number or seed is None or (seed and isinstance(seed, str)):
+            return seed
+        raise ValueError("give a whole number from 0 on, or a name")
 
     @property
     def departs(self) -> bool:
@@ -129,8 +137,10 @@ class DriverConfig(Section):
 
     def rng(self, name: str) -> np.random.Generator:
         """Returns what decides; without a seed, by the drive's name."""
-        seed = [*name.encode()] if self.seed is None else [self.seed]
-        return np.random.default_rng(seed)
+        seed = name if self.seed is None else self.seed
+        return np.random.default_rng(
+            [*seed.encode()] if isinstance(seed, str) else [seed]
+        )
 
 
 # Pairs of drives of Boreas and of MulRan KAIST differ by 0.5 m in a lane, and

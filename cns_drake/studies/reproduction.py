@@ -184,20 +184,25 @@ def _drives(folder: Path) -> list[Scenario]:
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     """Returns the control drives of a map's drives.
 
-    A control drive follows the route of an earlier stage in the last one. All
-    change between it and the last stage's own drive is due to the routes, and
-    not to the city.
+    A control drive follows the route of an earlier stage in the last one, with
+    the same driver. All change between it and the last stage's own drive is due
+    to the routes, and not to the city.
     """
     last = max(drives, key=lambda drive: drive.stage or "")
-    return [
-        drive.replaced(
+    controls = []
+    for drive in drives:
+        if drive is last:
+            continue
+        control = drive.replaced(
             name=f"{drive.name}_stage_{last.stage}",
             stage=last.stage,
             title=f"Control: the route of {drive.name} in stage {last.stage}",
         )
-        for drive in drives
-        if drive is not last
-    ]
+        if drive.driver.departs and drive.driver.seed is None:
+            driver = drive.driver.replaced(seed=drive.name)
+            control = control.replaced(driver=driver)
+        controls.append(control)
+    return controls
 
 
 def recording_info(

@@ -140,6 +140,8 @@ def test_a_driver_follows_from_seed_or_name_alone(small_map):
     other = scenario.model_copy(update={"name": "other"})
     moved = plan_drive(with_driver(other, wander=0.3)).positions([8, 16])
     assert np.abs(points(wander=0.3) - moved).max() > 0.02
+    named = plan_drive(with_driver(other, wander=0.3, seed=scenario.name))
+    np.testing.assert_array_equal(points(wander=0.3), named.positions([8, 16]))
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,15 @@
 import csv
 
 from helpers.small_map import write_small_map, write_town
+import numpy as np
 import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import DriverConfig
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.simulation.simulation import simulate
@@ -202,6 +205,21 @@ def test_quick_reads_existing_recordings(town, drives, planned, tmp_path):
     assert recordings["town_04"].made_by == DriveSimulation(drives[1])
     assert recordings[control.name].made_by == DriveSimulation(control)
     assert not recordings.keys() & jobs.keys()
+
+
+def test_a_control_has_the_driver_of_its_drive(drives):
+    def way(scenario):
+        return plan_drive(scenario).positions([4.0, 8.0])
+
+    wandering = [
+        drive.replaced(driver=DriverConfig(wander=0.3)) for drive in drives
+    ]
+    (control,) = control_drives(wandering)
+    np.testing.assert_array_equal(way(control), way(wandering[0]))
+    assert np.abs(way(control) - way(drives[0])).max() > 0.02
+    seeded = drives[0].replaced(driver=DriverConfig(wander=0.3, seed=3))
+    (control,) = control_drives([seeded, wandering[1]])
+    np.testing.assert_array_equal(way(control), way(seeded))
 
 
 def _rows(path):
