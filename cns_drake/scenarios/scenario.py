@@ -113,7 +113,8 @@ class DriverConfig(Section):
         lane_changes: rate at which the car goes to a lane beside its own, and
             back after 15 to 270 m, where there is one [1/km].
         follows: whether the car is a vehicle among those of `traffic`.
-        seed: seed of all draws, a number or a name; by default the drive's.
+        seed: seed of all draws, a number or a name; by default the name of the
+            drive.
     """
 
     wander: float = Field(default=0.0, ge=0.0, le=1.0)
