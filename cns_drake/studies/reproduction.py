@@ -193,14 +193,15 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     for drive in drives:
         if drive is last:
             continue
+        driver = drive.driver
+        if driver.departs and driver.seed is None:
+            driver = driver.replaced(seed=drive.name)
         control = drive.replaced(
             name=f"{drive.name}_stage_{last.stage}",
             stage=last.stage,
             title=f"Control: the route of {drive.name} in stage {last.stage}",
+            driver=driver,
         )
-        if drive.driver.departs and drive.driver.seed is None:
-            driver = drive.driver.replaced(seed=drive.name)
-            control = control.replaced(driver=driver)
         controls.append(control)
     return controls
 
