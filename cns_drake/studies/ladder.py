@@ -68,6 +68,8 @@ QUICK_EXTENT = Extent(levels=(4,), most_places=300)
 QUICK_PROTOCOL = replace(DEFAULT_PROTOCOL, query_spacing=20.0)
 # Number of causes that are crossed two by two.
 _CROSSED = 6
+# A search for places elsewhere is noted after each so many drives.
+_NOTED_DRIVES = 20
 
 # Expected seconds: to describe a drive, and for a rung.
 _DESCRIPTION_COST = 30.0
@@ -116,14 +118,13 @@ def climb_ladder(
             on_note(f"{drive.source}: {text}")
         plan = RungPlan(drive, extent.viewpoint, methods, protocol, files)
         most = max(rung.drives.num_distractors for rung in rungs)
-        if most:
-            on_note(f"{drive.name}: looking for {most} places elsewhere")
         plan.distractors = distracting_drives(
             plain_drives(drive).database,
             most,
             protocol.place_spacing,
             output / "cities",
             cluster,
+            on_note,
         )
         plans[drive.name] = plan
         planned += [(drive, rung) for rung in rungs]
@@ -348,6 +349,7 @@ def distracting_drives(
     spacing: float,
     output: Path,
     cluster: Cluster,
+    on_note: Callable[[str], None] = lambda text: None,
 ) -> list[Scenario]:
     """Returns drives through other cities with about so many places.
 
@@ -365,12 +367,17 @@ def distracting_drives(
         InputError: a shipped map cannot be used.
     """
     drives: list[Scenario] = []
+    found = 0
+    if number:
+        on_note(f"{query.name}: looking for {number} places elsewhere")
     for drive in _drives(query, output, cluster):
-        if number <= 0:
+        if found >= number:
             break
         drive = drive.replaced(lidars=query.lidars)
         drives.append(drive)
-        number -= _num_places(drive, spacing)
+        found += _num_places(drive, spacing)
+        if len(drives) % _NOTED_DRIVES == 0:
+            on_note(f"{query.name}: found {found} places elsewhere")
     return drives
 
 

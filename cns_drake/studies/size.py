@@ -72,13 +72,13 @@ def measure_sizes(
     plain = plain_drives(drive)
     files = StudyFiles(output.absolute())
     make_folder(output)
-    on_note(f"{drive.name}: looking for {numbers[-1]} places elsewhere")
     others = distracting_drives(
         plain.database,
         numbers[-1],
         protocol.place_spacing,
         output / "cities",
         cluster,
+        on_note,
     )
     jobs: list[Job] = []
 

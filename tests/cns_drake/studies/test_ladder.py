@@ -359,7 +359,15 @@ def test_many_distracting_drives_have_twin_blocks(tmp_path, monkeypatch):
     monkeypatch.setattr(ladder, "redraw_cities", redraw)
     monkeypatch.setattr(ladder, "_num_places", lambda *_: 1)
     query_drive = load_scenario("suburbia_02")
-    drives = distracting_drives(query_drive, 40, 5.0, tmp_path, Cluster())
+    notes = []
+    drives = distracting_drives(
+        query_drive, 40, 5.0, tmp_path, Cluster(), notes.append
+    )
+    assert notes == [
+        "suburbia_02: looking for 40 places elsewhere",
+        "suburbia_02: found 20 places elsewhere",
+        "suburbia_02: found 40 places elsewhere",
+    ]
     maps = [Path(drive.map).name for drive in drives]
     # Ten shipped drives of the others, two of the same streets, and so on.
     assert maps.index("suburbia_c1") == 10
