@@ -340,6 +340,13 @@ def size(
         ),
     ] = None,
     method: MethodFiles = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Measure only the method of this name; may be repeated.",
+        ),
+    ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -360,7 +367,7 @@ def size(
         places or (0, 1000, 10_000, 100_000),
         output,
         choose_cluster(jobs, scheduler),
-        choose_methods(method or ()),
+        choose_methods(method or (), only=only or ()),
         on_note=note,
     )
     typer.echo(path)

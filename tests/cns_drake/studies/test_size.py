@@ -8,10 +8,20 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import size
 from cns_drake.studies.size import measure_sizes, size_table
-from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.rungs import SizePoint
 
-METHODS = (MethodChoice("solid"),)
+METHODS = choose_methods(only=["solid"])
+
+
+def test_only_the_named_methods():
+    names = [one.name for one in choose_methods(only=["solid", "btc", "solid"])]
+    assert sorted(names) == ["btc", "solid"]
+    assert names == [
+        one.name for one in choose_methods() if one.name in ("btc", "solid")
+    ]
+    with pytest.raises(InputError, match=r"--only: no method 'bow' \(known: b"):
+        choose_methods(only=["solid", "bow"])
 
 
 def test_growth_is_the_exponent_of_the_time():

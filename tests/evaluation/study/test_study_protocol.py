@@ -16,7 +16,7 @@ pytestmark = [
     pytest.mark.usefixtures("unrendered_figures"),
 ]
 
-SOLID = tuple(one for one in choose_methods() if one.name == "solid")
+SOLID = choose_methods(only=["solid"])
 
 
 def read(path):
