@@ -1,8 +1,12 @@
 """The chart of the README shows what the table of the results says."""
 
+import csv
+import itertools
+
 from helpers import documents
 import numpy as np
 import pytest
+import scipy.stats
 
 from docs import survival_chart
 
@@ -38,3 +42,39 @@ def test_the_page_has_all_pairs_and_methods():
     assert (len(methods), len(pairs)) == (6, 18)
     assert np.isfinite(values[:, :, 0]).all()
     assert values[:, :, 0].max() == pytest.approx(1.0, abs=0.2)
+
+
+def test_fresh_rows_are_those_of_the_five_versions():
+    found = {}
+    table = documents.ROOT / "docs/notes/fresh.csv"
+    with table.open(newline="", encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            pair = f"{row['map']}, fresh {row['db']} → {row['query']}"
+            values = float(row["auc"]), float(row["auc_unchanged"])
+            found.setdefault((pair, row["method"]), []).append(values)
+    page = documents.read("docs/results.md")
+    methods, pairs, values = survival_chart.read_table(page.text)
+    names = [name.lower().replace(" ", "-") for name in methods]
+    names = ["scan-context++" if "scan" in name else name for name in names]
+    rows = [p for p, pair in enumerate(pairs) if "fresh" in pair]
+    tests = []
+    for p in rows:
+        # (methods, versions, with the change or without).
+        auc = np.array([found[pairs[p], name] for name in names])
+        assert auc.shape == (6, 5, 2)
+        mean = auc.mean(axis=1)
+        kept = mean[:, 0] / mean[:, 1]
+        np.testing.assert_allclose(values[p, :, 0], mean[:, 0], atol=0.0051)
+        np.testing.assert_allclose(values[p, :, 1], kept, atol=0.0051)
+        for a, b in itertools.combinations(range(6), 2):
+            test = scipy.stats.ttest_rel(auc[a, :, 0], auc[b, :, 0])
+            tests.append((p, a if test.statistic < 0 else b, test.pvalue))
+    bold = np.ones(values.shape[:2])
+    # Holm's method: each test in the order of p-values, until one fails.
+    tests.sort(key=lambda test: test[2])
+    for number, (p, worse, pvalue) in enumerate(tests):
+        if pvalue * (len(tests) - number) >= 0.05:
+            break
+        bold[p, worse] = 0.0
+    assert len(tests) == 120
+    assert values[rows, :, 2].tolist() == bold[rows].tolist()
