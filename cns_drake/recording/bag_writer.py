@@ -9,7 +9,7 @@ over its messages by writing them again; see PartFile."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 import io
 import json
@@ -46,42 +46,6 @@ _CHUNK_BYTES = 1024 * 1024
 # for many seconds, hence the flush by time. A kill may cost a second, with a
 # part of it reserved for frames on their way to the file.
 _FLUSH_PERIOD_NS = 800_000_000
-
-
-class MessageOrder:
-    """The stamps of the last messages on each topic."""
-
-    def __init__(self, folder: Path, topics: Iterable[Topic]):
-        """Begins without messages."""
-        self._folder = folder
-        self._latched = {topic.name for topic in topics if topic.latched}
-        self._last_ns: dict[str, int] = {}
-
-    def takes(self, topic: str, stamp_ns: int) -> bool:
-        """Returns whether the recording takes the next message.
-
-        It does not take a latched message twice.
-
-        Raises:
-            InputError: the message is not later than the one before on its
-                topic, or before the epoch.
-        """
-        last_ns = self._last_ns.get(topic)
-        if last_ns is not None and topic in self._latched:
-            return False
-        if stamp_ns < 0:
-            raise InputError(
-                f"{self._folder}: {topic}: a message at {stamp_ns / 1e9:g} s, "
-                "before the epoch; begin the recording with a later start_ns"
-            )
-        if last_ns is not None and stamp_ns <= last_ns:
-            raise InputError(
-                f"{self._folder}: {topic}: a message at {stamp_ns / 1e9:g} s "
-                f"comes after that at {last_ns / 1e9:g} s; where a simulator "
-                "begins again, or its clock goes back, begin a new recording"
-            )
-        self._last_ns[topic] = stamp_ns
-        return True
 
 
 class RecordedMessage(NamedTuple):
@@ -169,11 +133,13 @@ class BagWriter:
         self._custom_data = dict(custom_data or {})
         self._fingerprint = fingerprint
         self._part = part_path(self._files.mcap)
-        self._order = MessageOrder(folder, self._topics)
+        self._latched = {topic.name for topic in topics if topic.latched}
         self._is_open = False
         self._counts = {topic.name: 0 for topic in self._topics}
-        self._first_ns: int | None = None
-        self._last_ns: int | None = None
+        # Topic -> stamp of its last message [ns], and those of the first and
+        # the last of all messages.
+        self._latest_ns: dict[str, int] = {}
+        self._span_ns: tuple[int, int] | None = None
         self._flushed_ns = start_ns
         # False while a record is being written. After an interruption then, the
         # writer's index does not describe the file and must not be used.
@@ -277,8 +243,9 @@ class BagWriter:
                 f"{self._files.path}: the recording is not open; simulate "
                 "within its `with` block"
             )
-        if not self._order.takes(topic, stamp_ns):
+        if topic in self._latched and topic in self._latest_ns:
             return
+        self._check_order(topic, stamp_ns)
         channel_id = self._channel_ids[topic]
         # The block of `_writing`, written out: a context manager would take
         # a third of the time of a small message.
@@ -294,9 +261,26 @@ class BagWriter:
             raise file_error(self._part, error) from error
         self._intact = True
         self._counts[topic] += 1
-        if self._first_ns is None:
-            self._first_ns = stamp_ns
-        self._last_ns = stamp_ns
+        self._latest_ns[topic] = stamp_ns
+        first_ns = self._span_ns[0] if self._span_ns else stamp_ns
+        self._span_ns = (first_ns, stamp_ns)
+
+    def _check_order(self, topic: str, stamp_ns: int) -> None:
+        """Refuses a message that is not later than the last on its topic."""
+        last_ns = self._latest_ns.get(topic, -1)
+        if stamp_ns > last_ns:
+            return
+        message = f"{topic}: a message at {stamp_ns / 1e9:g} s"
+        if stamp_ns < 0:
+            raise InputError(
+                f"{self._files.path}: {message}, before the epoch; begin the "
+                "recording with a later start_ns"
+            )
+        raise InputError(
+            f"{self._files.path}: {message} comes after that at "
+            f"{last_ns / 1e9:g} s; where a simulator begins again, or its "
+            "clock goes back, begin a new recording"
+        )
 
     def _open_part(self) -> PartFile:
         """Opens the part file, empty or with messages to take over."""
@@ -308,12 +292,11 @@ class BagWriter:
             and not self._part.exists()
         ):
             # The run was interrupted between the final names of the files.
-            stream = PartFile(self._files.mcap)
-            if self._goes_on(stream, preamble):
-                os.replace(self._files.mcap, self._part)
-                return stream
-            stream.close()
-            self._refuse_other_recording()
+            with contextlib.closing(PartFile(self._files.mcap)) as stream:
+                if self._goes_on(stream, preamble):
+                    os.replace(self._files.mcap, self._part)
+                else:
+                    self._refuse_other_recording()
         stream = PartFile(self._part)
         try:
             if not self._goes_on(stream, preamble):
@@ -330,14 +313,11 @@ class BagWriter:
         """Returns whether the existing file is the start of this recording."""
         if not stream.replaying:
             return True
-        found = ""
-        for path in (
-            part_path(self._files.fingerprint),
-            self._files.fingerprint,
-        ):
-            if path.is_file():
-                found = path.read_text(encoding="utf-8", errors="replace")
-                break
+        found, path = "", self._files.fingerprint
+        if part_path(path).is_file():
+            path = part_path(path)
+        if path.is_file():
+            found = path.read_text(encoding="utf-8", errors="replace")
         return found == self._fingerprint and stream.starts_like(
             preamble.getvalue()
         )
@@ -359,7 +339,7 @@ class BagWriter:
             The writer, and topic -> channel id.
         """
         writer = Writer(
-            stream,  # type: ignore[arg-type]  # Needs tell, write, flush.
+            stream,
             chunk_size=_CHUNK_BYTES,
             compression=CompressionType.ZSTD,
         )
@@ -448,8 +428,7 @@ class BagWriter:
 
     def _information(self) -> dict:
         """Returns rosbag2's description of the file."""
-        first_ns = self._start_ns if self._first_ns is None else self._first_ns
-        last_ns = first_ns if self._last_ns is None else self._last_ns
+        first_ns, last_ns = self._span_ns or (self._start_ns, self._start_ns)
         return make_bag_information(
             self._files.mcap.name,
             [
@@ -502,6 +481,14 @@ def take_over_frames(
     last = None
     if schedule.ends.keys() >= schedule.steps.keys():
         last = max(schedule.ends.values())
+
+    def write_frame() -> None:
+        nonlocal frames
+        frames += 1
+        for message in frame:
+            bag.write(*message)
+        frame.clear()
+
     for message in bag.interrupted():
         if (
             message.topic not in missing
@@ -515,15 +502,7 @@ def take_over_frames(
             tick += 1
             missing.update(schedule.due(tick))
             if frame_topic in missing:
-                frames += _write_frame(bag, frame)
+                write_frame()
     if not missing:
-        frames += _write_frame(bag, frame)
+        write_frame()
     return frames
-
-
-def _write_frame(bag: BagWriter, frame: list[RecordedMessage]) -> int:
-    """Writes a complete frame; returns 1."""
-    for message in frame:
-        bag.write(*message)
-    frame.clear()
-    return 1

@@ -70,7 +70,7 @@ def make_bag_information(
     *,
     start_ns: int,
     end_ns: int,
-    custom_data: Mapping[str, str],
+    custom_data: Mapping[str, str] | None = None,
 ) -> dict:
     """Returns the description of a recording of one file.
 
@@ -99,7 +99,7 @@ def make_bag_information(
                 "message_count": count,
             }
         ],
-        "custom_data": dict(custom_data) or None,
+        "custom_data": dict(custom_data or {}) or None,
         "ros_distro": "humble",
     }
 
