@@ -8,14 +8,13 @@ import numpy as np
 from cns_drake.base.drives.ros_types import (
     DETECTIONS_3D,
     SCENE_UPDATE,
-    message_class,
+    make_message,
     serialize,
 )
 from cns_drake.recording.messages import (
+    EXACT_COVARIANCE,
     MAP_FRAME,
-    exact_covariance,
     make_header,
-    make_vector,
 )
 
 # Placeholders of numbers in a message: this and the following integers, which
@@ -153,27 +152,47 @@ def marked_detections(
         who: id and class of N objects.
         numbers: (N, 10) position, orientation (x, y, z, w) and size.
     """
-    return message_class(DETECTIONS_3D)(
-        header=_header(),
-        detections=[
-            _detection(instance, name, row)
-            for (instance, name), row in zip(who, numbers, strict=True)
-        ],
-    )
+    header = make_header(MAP_FRAME, _STAMP_MARK_NS)
+    detections = []
+    for (instance, semantic_class), row in zip(who, numbers, strict=True):
+        pose, size = _box(row)
+        certain = (pose, EXACT_COVARIANCE)
+        detections.append(
+            {
+                "header": header,
+                "results": [((semantic_class, 1.0), certain)],
+                "bbox": (pose, size),
+                "id": instance,
+            }
+        )
+    return make_message(DETECTIONS_3D, header=header, detections=detections)
 
 
 def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
     """Returns a SceneUpdate that replaces all boxes by those of N objects."""
-    deletion = message_class("foxglove_msgs/msg/SceneEntityDeletion")(
-        timestamp=_header().stamp, type=_DELETE_ALL, id=""
+    stamp = make_header(MAP_FRAME, _STAMP_MARK_NS).stamp
+    entities = []
+    for (instance, semantic_class), row in zip(who, numbers, strict=True):
+        color = (*_RGB.get(semantic_class, _OTHER_RGB), _OPACITY)
+        entities.append(
+            {
+                "timestamp": stamp,
+                "frame_id": MAP_FRAME,
+                "id": instance,
+                "metadata": [("class", semantic_class)],
+                "cubes": [(*_box(row), color)],
+            }
+        )
+    return make_message(
+        SCENE_UPDATE,
+        deletions=[{"timestamp": stamp, "type": _DELETE_ALL}],
+        entities=entities,
     )
-    return message_class(SCENE_UPDATE)(
-        deletions=[deletion],
-        entities=[
-            _entity(instance, name, row)
-            for (instance, name), row in zip(who, numbers, strict=True)
-        ],
-    )
+
+
+def _box(numbers: np.ndarray) -> tuple[tuple, np.ndarray]:
+    """Returns the fields of a pose, and the size."""
+    return (numbers[:3], numbers[3:7]), numbers[7:]
 
 
 def motion_table(objects: RecordedObjects) -> np.ndarray:
@@ -186,67 +205,3 @@ def motion_table(objects: RecordedObjects) -> np.ndarray:
     table["instance"] = objects.instance
     table["moving"] = objects.is_moving
     return table
-
-
-def _header() -> Any:
-    return make_header(MAP_FRAME, _STAMP_MARK_NS)
-
-
-def _pose(numbers: np.ndarray) -> Any:
-    x, y, z, w = map(float, numbers[3:])
-    return message_class("geometry_msgs/msg/Pose")(
-        position=make_vector(numbers[:3], "Point"),
-        orientation=message_class("geometry_msgs/msg/Quaternion")(
-            x=x, y=y, z=z, w=w
-        ),
-    )
-
-
-def _detection(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
-    pose = _pose(numbers[:7])
-    hypothesis = message_class("vision_msgs/msg/ObjectHypothesis")(
-        class_id=semantic_class, score=1.0
-    )
-    certain = message_class("geometry_msgs/msg/PoseWithCovariance")(
-        pose=pose, covariance=exact_covariance()
-    )
-    result = message_class("vision_msgs/msg/ObjectHypothesisWithPose")(
-        hypothesis=hypothesis, pose=certain
-    )
-    box = message_class("vision_msgs/msg/BoundingBox3D")(
-        center=pose, size=make_vector(numbers[7:])
-    )
-    return message_class("vision_msgs/msg/Detection3D")(
-        header=_header(), results=[result], bbox=box, id=str(instance)
-    )
-
-
-def _entity(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
-    r, g, b = _RGB.get(semantic_class, _OTHER_RGB)
-    cube = message_class("foxglove_msgs/msg/CubePrimitive")(
-        pose=_pose(numbers[:7]),
-        size=make_vector(numbers[7:]),
-        color=message_class("foxglove_msgs/msg/Color")(
-            r=r, g=g, b=b, a=_OPACITY
-        ),
-    )
-    named = message_class("foxglove_msgs/msg/KeyValuePair")(
-        key="class", value=semantic_class
-    )
-    forever = message_class("builtin_interfaces/msg/Duration")(sec=0, nanosec=0)
-    return message_class("foxglove_msgs/msg/SceneEntity")(
-        timestamp=_header().stamp,
-        frame_id=MAP_FRAME,
-        id=str(instance),
-        lifetime=forever,
-        frame_locked=False,
-        metadata=[named],
-        arrows=[],
-        cubes=[cube],
-        spheres=[],
-        cylinders=[],
-        lines=[],
-        triangles=[],
-        texts=[],
-        models=[],
-    )
