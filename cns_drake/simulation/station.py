@@ -103,9 +103,7 @@ def make_station(
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
     motion = builder.AddNamedSystem(
         "vehicle_motion",
-        VehicleMotion(
-            plant, world.vehicle, trajectory, period=scenario.frame_period
-        ),
+        VehicleMotion(plant, world.vehicle, trajectory),
     )
     to_pose = builder.AddNamedSystem(
         "geometry_pose", MultibodyPositionToGeometryPose(plant)
