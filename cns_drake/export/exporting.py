@@ -68,7 +68,7 @@ def export_drive(
     outer = {
         output / name: text for name, text in layout.outer_files(drive).items()
     }
-    _claim(output, format_name, layout)
+    _claim(output, format_name)
     if folder.exists():
         raise InputError(
             f"{folder}: this drive is there already; remove it or give another "
@@ -76,7 +76,13 @@ def export_drive(
         )
     if layout.shared_outer_files:
         for path, text in outer.items():
-            _check_equal(path, text)
+            with user_errors(path):
+                is_other = path.is_file() and path.read_bytes() != text.encode()
+            if is_other:
+                raise InputError(
+                    f"{path}: differs: the drives there have another sensor"
+                    " mount; give another folder"
+                )
     part = part_path(folder)
     try:
         _write_drive(drive, layout, part, on_frame)
@@ -90,12 +96,23 @@ def export_drive(
     return folder
 
 
-def _claim(output: Path, format_name: str, layout: Layout) -> None:
+def _claim(output: Path, format_name: str) -> None:
     """Makes the folder of drives, or checks that it is one of ours."""
     marker = output / _MARKER
     with user_errors(output):
         if marker.is_file():
-            _check_marker(marker, format_name)
+            values = read_yaml(marker)
+            found = values.get("format") if isinstance(values, dict) else None
+            # A list of YAML is no key.
+            if not isinstance(found, str) or found not in _LAYOUTS:
+                raise InputError(
+                    f"{marker}: not written by an export of cns-drake; give "
+                    "another folder"
+                )
+            if found != format_name:
+                raise InputError(
+                    f"{marker}: format: the folder holds {found} drives"
+                )
             return
         if output.exists() and (not output.is_dir() or any(output.iterdir())):
             raise InputError(
@@ -103,34 +120,13 @@ def _claim(output: Path, format_name: str, layout: Layout) -> None:
                 "empty one"
             )
     make_folder(output)
+    explained = read_yaml(Path(__file__).with_name("layouts.yaml"))
     values = {
         "writer": "cns-drake export",
         "format": format_name,
-        "files": layout.files,
+        "files": explained[format_name],
     }
     write_text(marker, to_yaml(values))
-
-
-def _check_marker(marker: Path, format_name: str) -> None:
-    values = read_yaml(marker)
-    found = values.get("format") if isinstance(values, dict) else None
-    # A list of YAML is no key.
-    if not isinstance(found, str) or found not in _LAYOUTS:
-        raise InputError(
-            f"{marker}: not written by an export of cns-drake; give another "
-            "folder"
-        )
-    if found != format_name:
-        raise InputError(f"{marker}: format: the folder holds {found} drives")
-
-
-def _check_equal(path: Path, text: str) -> None:
-    with user_errors(path):
-        if path.is_file() and path.read_bytes() != text.encode():
-            raise InputError(
-                f"{path}: differs: the drives there have another sensor"
-                " mount; give another folder"
-            )
 
 
 def _write_drive(
