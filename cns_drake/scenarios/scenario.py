@@ -18,9 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.errors import (
-    validated,
-)
+from cns_drake.base.errors import validated
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route

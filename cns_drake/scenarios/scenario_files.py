@@ -5,10 +5,7 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.errors import (
-    InputError,
-    validated,
-)
+from cns_drake.base.errors import InputError, validated
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
