@@ -54,8 +54,8 @@ def find_speed_profile(
     """Returns the fastest drive under bounds.
 
     It is found with stepwise constant acceleration (a forward and a backward
-    pass over v^2). Its positions at
-    even times are then the control points of a quintic B-spline: its u' is a
+    pass over v^2). Its positions at even times are then the control points of a
+    quintic B-spline: its u' is a
     weighted mean of the drive's speed, and its u'' of the acceleration, over
     at most REACH + 1 knot periods before and after. Bounds of acceleration
     therefore carry over as they are, and bounds of speed if the drive

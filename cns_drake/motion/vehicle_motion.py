@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 import functools
 from typing import NamedTuple
 
@@ -33,8 +32,7 @@ from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
 _PARALLEL = 1 - 1e-9
 
 
-@dataclass(frozen=True)
-class JointMotion:
+class JointMotion(NamedTuple):
     """An angle [rad] or a distance [m], its rate and its acceleration."""
 
     position: np.ndarray
@@ -59,11 +57,7 @@ class WheelMotion:
     """
 
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
-        """Prepares the wheel.
-
-        Args:
-            p_BC: position of the wheel's centre in the vehicle frame [m].
-        """
+        """Prepares the wheel, whose centre is at p_BC [m]."""
         self._x, self._y, self._radius = p_BC
         self._rolled = PathIntegral(
             trajectory.path, lambda jet: np.hypot(*self._ground_velocity(jet))
@@ -315,11 +309,7 @@ class VehicleSweep(LeafSystem):
     """
 
     def __init__(self, trajectory: Trajectory, offsets: np.ndarray):
-        """Declares the port.
-
-        Args:
-            offsets: (N,) times after the present one [s].
-        """
+        """Declares the port, for (N,) offsets [s]."""
         super().__init__()
         self._trajectory = trajectory
         self._offsets = np.array(offsets, dtype=float)

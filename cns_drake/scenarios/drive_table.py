@@ -5,7 +5,7 @@ row of `sequences.csv` therefore has a checksum of its input files, and is
 measured anew when they have changed.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import get_type_hints
@@ -62,7 +62,6 @@ def drive_rows(
     """Returns the rows of a map's drives whose stage is there.
 
     Args:
-        folder: the map's folder, with `sequence_NN.yaml` and `stage_NN.sdf`.
         sizes: stage -> its structures and triangles; for other stages they are
             counted in the world, which takes long to load.
 
@@ -86,7 +85,11 @@ def drive_rows(
             continue
         # A map whose drives follow waypoints has no roads.
         roads = [p for p in (its.roads,) if p.is_file()]
-        checksum = _checksum((*scenario.files, *roads, world), meshes)
+        total = 0
+        for file in (*scenario.files, *roads, world):
+            with user_errors(file):
+                total = zlib.crc32(file.read_bytes(), total)
+        checksum = f"{zlib.crc32(meshes, total):08x}"
         row = known.get(checksum)
         if row is None:
             progress(f"measuring {drive_name(path)}")
@@ -115,20 +118,8 @@ def write_table(
     write_csv(MapFolder(folder).drive_table, names, map(astuple, rows))
 
 
-def _checksum(paths: Iterable[Path], more: bytes) -> str:
-    """Returns the checksum of the contents of files, and of more values."""
-    total = 0
-    for path in paths:
-        with user_errors(path):
-            total = zlib.crc32(path.read_bytes(), total)
-    return f"{zlib.crc32(more, total):08x}"
-
-
 def _read(path: Path) -> list[DriveRow]:
-    """Returns the rows of a table; none if it cannot be used.
-
-    The rows of a bad table are measured anew.
-    """
+    """Returns the rows of a table; those of a bad one are measured anew."""
     types = get_type_hints(DriveRow)
     try:
         return [

@@ -122,10 +122,9 @@ class McapDrive(Drive):
                     f"{self._path}: {topic}: the clock goes back by {back:.3g}"
                     " s; messages are read in the order of their log times"
                 )
-        lidars = (self.scenario or {}).get("lidars")
-        lidar = (
-            lidars.get(self.lidar_name) if isinstance(lidars, dict) else None
-        )
+        lidar = (self.scenario or {}).get("lidars")
+        if isinstance(lidar, dict):
+            lidar = lidar.get(self.lidar_name)
         if isinstance(lidar, dict) and lidar.get("motion_distortion"):
             notes.append(
                 f"{self._path}: taken while the LiDAR moved, and used as taken"
@@ -291,11 +290,10 @@ class McapDrive(Drive):
 
     @cached_property
     def _transforms(self) -> StaticTransforms:
-        messages = (
-            self._message(_TF_STATIC_TOPIC, place)
-            for place in self._file.locate(_TF_STATIC_TOPIC)
-        )
-        return StaticTransforms(messages, f"{self._path}: {_TF_STATIC_TOPIC}")
+        topic = _TF_STATIC_TOPIC
+        places = self._file.locate(topic)
+        messages = (self._message(topic, place) for place in places)
+        return StaticTransforms(messages, f"{self._path}: {topic}")
 
     def _first(self, topic: str) -> Any:
         return self._message(topic, self._file.locate(topic)[0])
@@ -376,10 +374,8 @@ class McapDrive(Drive):
 
     def _json(self, name: str) -> Any:
         data = self._file.attachment(name)
-        if data is None:
-            return None
         with self._faults(f"attachment {name}"):
-            return parse_json(data)
+            return None if data is None else parse_json(data)
 
 
 def holds_mcap(path: Path) -> bool:

@@ -111,10 +111,7 @@ class StaticTransforms:
     """Poses of frames in their parents."""
 
     def __init__(self, messages: Iterable[Any], where: str):
-        """Reads the transforms.
-
-        Args:
-            messages: each of type tf2_msgs/msg/TFMessage.
+        """Reads the transforms of messages of type tf2_msgs/msg/TFMessage.
 
         Raises:
             InputError: two messages place one frame differently.
@@ -124,7 +121,18 @@ class StaticTransforms:
         self._edges: dict[str, tuple] = {}
         for message in messages:
             for edge in message.transforms:
-                self._add(edge)
+                new = (
+                    edge.header.frame_id,
+                    xyz(edge.transform.translation),
+                    xyzw(edge.transform.rotation),
+                )
+                # Nodes repeat what is fixed.
+                old = self._edges.setdefault(edge.child_frame_id, new)
+                if old != new:
+                    raise InputError(
+                        f"{where}: {edge.child_frame_id}: at"
+                        f" {stamp_ns(edge.header)} ns {new}, before {old}"
+                    )
 
     def pose(self, base: str, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a frame in another one, its ancestor.
@@ -144,22 +152,6 @@ class StaticTransforms:
             X_PC = checked_poses(np.array(p_PC), np.array(quat_PC), self._where)
             X_CF = X_PC @ X_CF
         raise InputError(f"{self._where}: no transform from {base} to {frame}")
-
-    def _add(self, edge: Any) -> None:
-        child, transform = edge.child_frame_id, edge.transform
-        new = (
-            edge.header.frame_id,
-            xyz(transform.translation),
-            xyzw(transform.rotation),
-        )
-        # Nodes repeat what is fixed.
-        old = self._edges.setdefault(child, new)
-        if old != new:
-            raise InputError(
-                f"{self._where}: {child}: at"
-                f" {stamp_ns(edge.header)} ns {new},"
-                f" before {old}"
-            )
 
 
 def checked_poses(
