@@ -78,12 +78,7 @@ def one_line(message: object) -> str:
 
 
 def validated(model: type[_Model], values: object, source: object) -> _Model:
-    """Returns values as a model of pydantic.
-
-    Args:
-        model: the class of the result.
-        values: what a file or argument holds.
-        source: the file or argument, which errors name.
+    """Returns what a file or argument, the source, holds as a model.
 
     Raises:
         InputError: a field is missing, unknown or not usable.
@@ -93,9 +88,8 @@ def validated(model: type[_Model], values: object, source: object) -> _Model:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise InputError(
-            describe_validation_error(source, error, model)
-        ) from None
+        fault = describe_validation_error(source, error, model)
+        raise InputError(fault) from None
 
 
 def describe_validation_error(
@@ -106,9 +100,7 @@ def describe_validation_error(
     """Returns one line for the first of the faults that pydantic found.
 
     An unknown field comes first, a missing one last: its name may be misspelt.
-
-    Args:
-        model: the pydantic model, used to suggest the names of misspelt fields.
+    With the model, the line suggests a name.
     """
     fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
@@ -146,9 +138,7 @@ def nearest_field(
 ) -> str | None:
     """Returns the field that is written most like an unknown one.
 
-    Args:
-        place: keys and indices that lead to the unknown field; the last is the
-            field itself.
+    The place is the keys and indices that lead to it, and itself.
     """
     names = sorted(set(_fields_at(model, place[:-1])))
     close = difflib.get_close_matches(str(place[-1]), names, n=1)

@@ -116,11 +116,9 @@ class LocalWorkers:
         self._threads.shutdown()
 
     def submit(self, name: str, job: bytes, priority: float) -> None:
-        """Lets a job run, when there is room.
+        """Lets a job run, when there is room; one with a high priority first.
 
-        Args:
-            priority: among jobs that wait, the one with the highest comes
-                first; here there is a thread for each.
+        Here there is a thread for each.
         """
         del priority
         self._threads.submit(self._run, name, job)
