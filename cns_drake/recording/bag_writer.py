@@ -20,25 +20,15 @@ from typing import Any, NamedTuple
 from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
 
+from cns_drake.base import files
 from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    complete_part,
-    file_error,
-    part_path,
-    user_errors,
-    write_part,
-)
+from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.version import __version__
+from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.recording_folder import PartFile, RecordingFolder
 from cns_drake.recording.repair import Fault, read_records
-from cns_drake.recording.rosbag2_metadata import (
-    Topic,
-    channel_metadata,
-    describe_topic,
-    make_bag_information,
-    to_yaml,
-)
+from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
 from cns_drake.recording.schedule import START_NS, Schedule
 
 _CHUNK_BYTES = 1024 * 1024
@@ -49,14 +39,7 @@ _FLUSH_PERIOD_NS = 800_000_000
 
 
 class RecordedMessage(NamedTuple):
-    """A message as `BagWriter.write` takes it.
-
-    Attributes:
-        topic: its name.
-        stamp_ns: the message's time [ns].
-        data: the serialised message.
-        sequence: the message's number on its topic.
-    """
+    """A message as `BagWriter.write` takes it."""
 
     topic: str
     stamp_ns: int
@@ -258,7 +241,7 @@ class BagWriter:
                 channel_id, stamp_ns, data, stamp_ns, sequence
             )
         except OSError as error:
-            raise file_error(self._part, error) from error
+            raise files.file_error(self._part, error) from error
         self._intact = True
         self._counts[topic] += 1
         self._latest_ns[topic] = stamp_ns
@@ -303,7 +286,7 @@ class BagWriter:
                 self._refuse_other_recording()
                 stream.clear()
             if self._fingerprint:
-                write_part(self._files.fingerprint, self._fingerprint)
+                files.write_part(self._files.fingerprint, self._fingerprint)
         except BaseException:
             stream.close()
             raise
@@ -345,28 +328,21 @@ class BagWriter:
         )
         writer.start(profile="ros2", library=f"cns-drake {__version__}")
         for name, value in self._attachments.items():
-            writer.add_attachment(
-                self._start_ns,
-                self._start_ns,
-                name,
-                *_encode(name, value),
-            )
-        schema_ids = {
-            message_type: writer.register_schema(
-                message_type,
-                "ros2msg",
-                ros_types.message_definition(message_type).encode(),
-            )
-            for message_type in dict.fromkeys(
-                topic.message_type for topic in self._topics
-            )
-        }
+            start_ns = self._start_ns
+            kind, content = _encode(name, value)
+            writer.add_attachment(start_ns, start_ns, name, kind, content)
+        schema_ids: dict[str, int] = {}
+        for topic in self._topics:
+            kind = topic.message_type
+            if kind not in schema_ids:
+                text = ros_types.message_definition(kind).encode()
+                schema_ids[kind] = writer.register_schema(kind, "ros2msg", text)
         channel_ids = {
             topic.name: writer.register_channel(
                 topic.name,
                 "cdr",
                 schema_ids[topic.message_type],
-                channel_metadata(topic),
+                rosbag2_metadata.channel_metadata(topic),
             )
             for topic in self._topics
         }
@@ -387,21 +363,21 @@ class BagWriter:
         renamed. Old ones that describe the MCAP go first: they must never
         describe the new one.
         """
-        files = self._files
+        own = self._files
         metadata = {"rosbag2_bagfile_information": self._information()}
-        write_part(files.scenario, to_yaml(self._scenario))
-        write_part(files.metadata, to_yaml(metadata))
+        files.write_part(own.scenario, to_yaml(self._scenario))
+        files.write_part(own.metadata, to_yaml(metadata))
         for path, value in self._beside.items():
-            write_part(path, to_yaml(value))
-        with user_errors(files.path):
-            files.metadata.unlink(missing_ok=True)
-            files.fingerprint.unlink(missing_ok=True)
-        complete_part(files.mcap)
-        for path in (*self._beside, files.scenario):
-            complete_part(path)
+            files.write_part(path, to_yaml(value))
+        with user_errors(own.path):
+            own.metadata.unlink(missing_ok=True)
+            own.fingerprint.unlink(missing_ok=True)
+        files.complete_part(own.mcap)
+        for path in (*self._beside, own.scenario):
+            files.complete_part(path)
         if self._fingerprint:
-            complete_part(files.fingerprint)
-        complete_part(files.metadata)
+            files.complete_part(own.fingerprint)
+        files.complete_part(own.metadata)
 
     def _close_part(self) -> None:
         """Ends an incomplete file as well as its state allows."""
@@ -429,17 +405,18 @@ class BagWriter:
     def _information(self) -> dict:
         """Returns rosbag2's description of the file."""
         first_ns, last_ns = self._span_ns or (self._start_ns, self._start_ns)
-        return make_bag_information(
+        topics = [
+            rosbag2_metadata.describe_topic(
+                topic.name,
+                topic.message_type,
+                self._counts[topic.name],
+                rosbag2_metadata.channel_metadata(topic),
+            )
+            for topic in self._topics
+        ]
+        return rosbag2_metadata.make_bag_information(
             self._files.mcap.name,
-            [
-                describe_topic(
-                    topic.name,
-                    topic.message_type,
-                    self._counts[topic.name],
-                    channel_metadata(topic),
-                )
-                for topic in self._topics
-            ],
+            topics,
             start_ns=first_ns,
             end_ns=last_ns,
             custom_data=self._custom_data,

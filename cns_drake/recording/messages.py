@@ -54,8 +54,6 @@ def encode_point_cloud(
             each becomes a point field under its own name and offset.
             Padding is written as zeros, so that equal points give equal
             bytes.
-        frame_id: the frame in which the points are expressed.
-        stamp_ns: the time of the scan [ns].
     """
     size = points.dtype.itemsize
     rows = np.ascontiguousarray(points).view(np.uint8).reshape(-1, size)
@@ -118,7 +116,6 @@ def make_imu(
         angular_velocity: w_WI_I, shape (3,) [rad/s].
         specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
             ground +9.81 along z.
-        stamp_ns: the time of the measurement [ns].
         variances: those of each axis of the specific force [m^2/s^4] and the
             angular velocity [rad^2/s^2].
 
@@ -158,12 +155,8 @@ def make_odometry(
 ) -> Any:
     """Returns an Odometry message: pose in the map, twist in the vehicle.
 
-    Args:
-        V_WB_B: its spatial velocity, expressed in B [rad/s, m/s].
-        stamp_ns: the time of both [ns].
-
-    Returns:
-        The message; the values are exact, with standard deviations of 1e-6.
+    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact,
+    with standard deviations of 1e-6.
     """
     twist = (V_WB_B.translational(), V_WB_B.rotational())
     return make_message(
@@ -178,13 +171,7 @@ def make_odometry(
 def make_tf(
     parent: str, X_PCs: dict[str, RigidTransform], stamp_ns: int
 ) -> Any:
-    """Returns a TFMessage with the poses of child frames in one parent.
-
-    Args:
-        parent: name of the parent frame P.
-        X_PCs: name of each child frame C -> its pose in P.
-        stamp_ns: the time of all of them [ns].
-    """
+    """Returns a TFMessage with the poses of child frames C in one parent P."""
     header = make_header(parent, stamp_ns)
     return make_message(
         TF,
@@ -220,7 +207,6 @@ def make_image(
         pixels: (height, width, channels), little-endian; depth in metres.
         encoding: one of `ENCODINGS`.
         frame_id: the camera's frame, z ahead and y down.
-        stamp_ns: the time of the image [ns].
     """
     height, width, _ = pixels.shape
     data = np.ascontiguousarray(pixels).view(np.uint8).reshape(-1)
@@ -238,9 +224,7 @@ def make_image(
 def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
     """Returns a CameraInfo message of a pinhole without distortion.
 
-    Args:
-        frame_id: the camera's frame, z ahead and y down.
-        stamp_ns: the time of the image [ns].
+    The camera's frame has z ahead and y down.
     """
     K = camera.intrinsic_matrix()
     return make_message(
