@@ -11,18 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.elementary import cos, product, rotated, sin
-from cns_drake.motion.path_geometry import (
-    PathIntegral,
-    PathJet,
-    PathSection,
-    SmoothPath,
-    SplineDerivatives,
-)
-from cns_drake.motion.speed_profile import (
-    drive_positions,
-    find_speed_profile,
-    make_time_scaling,
-)
+from cns_drake.motion import path_geometry, speed_profile
 from cns_drake.roads.lane_path import LanePath, Speeds
 
 
@@ -199,8 +188,8 @@ class Moments(NamedTuple):
     u: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
-    jet: PathJet
-    section: PathSection
+    jet: path_geometry.PathJet
+    section: path_geometry.PathSection
     ride: RideMoments | None
 
 
@@ -219,20 +208,29 @@ class Trajectory:
     """
 
     def __init__(self, lane_path: LanePath, speeds: Speeds):
-        self.path = SmoothPath(lane_path.points, lane_path.spacing)
-        self.speed_profile = find_speed_profile(
+        self.path = path_geometry.SmoothPath(
+            lane_path.points, lane_path.spacing
+        )
+        self.speed_profile = speed_profile.find_speed_profile(
             self.path, lane_path.speed_limits, speeds
         )
-        self._time_scaling = SplineDerivatives(
-            make_time_scaling(drive_positions(self.speed_profile)), 2
+        self._time_scaling = path_geometry.SplineDerivatives(
+            speed_profile.make_time_scaling(
+                speed_profile.drive_positions(self.speed_profile)
+            ),
+            2,
         )
-        self._travelled = PathIntegral(self.path, lambda jet: jet.speed)
+        self._travelled = path_geometry.PathIntegral(
+            self.path, lambda jet: jet.speed
+        )
         self._ride: BodyRide | None = None
 
     def with_positions(self, positions: np.ndarray) -> Trajectory:
         """Returns a drive along the same path; see `make_time_scaling`."""
         drive = copy.copy(self)
-        drive._time_scaling = SplineDerivatives(make_time_scaling(positions), 2)
+        drive._time_scaling = path_geometry.SplineDerivatives(
+            speed_profile.make_time_scaling(positions), 2
+        )
         return drive
 
     def with_ride(self, ride: BodyRide) -> Trajectory:
@@ -324,14 +322,14 @@ def poses_and_motion(
     return X_WBs, motion
 
 
-def _rotations(jet: PathJet) -> np.ndarray:
+def _rotations(jet: path_geometry.PathJet) -> np.ndarray:
     yaw_pitch = np.stack([jet.yaw, -jet.climb], axis=1)
     # Capital letters: about the axes of the vehicle in turn.
     return Rotation.from_euler("ZY", yaw_pitch).as_matrix()
 
 
 def _path_motion(
-    jet: PathJet, rate: np.ndarray, acceleration: np.ndarray
+    jet: path_geometry.PathJet, rate: np.ndarray, acceleration: np.ndarray
 ) -> FrameMotion:
     """Returns the motion of F in the world; see `Moments`."""
     yaw_rate, pitch_rate = jet.dyaw * rate, -jet.dclimb * rate

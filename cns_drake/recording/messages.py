@@ -15,13 +15,6 @@ from pydrake.systems.sensors import CameraInfo
 
 from cns_drake.base.drives import ros_types
 from cns_drake.base.drives.point_layouts import point_field_datatype
-from cns_drake.base.drives.ros_types import (
-    IMU,
-    ODOMETRY,
-    POINT_CLOUD,
-    TF,
-    make_message,
-)
 
 MAP_FRAME = "map"
 BASE_FRAME = "base_link"
@@ -76,8 +69,8 @@ def encode_point_cloud(
 def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
     """Returns what is about the stamp, the width and the data of a cloud."""
     data = ros_types.serialize(
-        make_message(
-            POINT_CLOUD,
+        ros_types.make_message(
+            ros_types.POINT_CLOUD,
             header=make_header(frame_id, _MARK * _NS_PER_S + _MARK),
             height=1,
             width=_MARK,
@@ -124,8 +117,8 @@ def make_imu(
         The covariance of a value that is None begins with -1 (REP 145).
     """
     force_variance, turn_variance = variances
-    return make_message(
-        IMU,
+    return ros_types.make_message(
+        ros_types.IMU,
         header=make_header(IMU_FRAME, stamp_ns),
         orientation=(0.0, 0.0, 0.0, 1.0) if quat_xyzw is None else quat_xyzw,
         orientation_covariance=_covariance(quat_xyzw, 0.0),
@@ -159,8 +152,8 @@ def make_odometry(
     with standard deviations of 1e-6.
     """
     twist = (V_WB_B.translational(), V_WB_B.rotational())
-    return make_message(
-        ODOMETRY,
+    return ros_types.make_message(
+        ros_types.ODOMETRY,
         header=make_header(MAP_FRAME, stamp_ns),
         child_frame_id=BASE_FRAME,
         pose=(_place(X_WB), EXACT_COVARIANCE),
@@ -173,8 +166,8 @@ def make_tf(
 ) -> Any:
     """Returns a TFMessage with the poses of child frames C in one parent P."""
     header = make_header(parent, stamp_ns)
-    return make_message(
-        TF,
+    return ros_types.make_message(
+        ros_types.TF,
         transforms=[
             (header, child, _place(X_PC)) for child, X_PC in X_PCs.items()
         ],
@@ -195,7 +188,9 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
 def make_header(frame_id: str, stamp_ns: int) -> Any:
     """Returns the header of a message."""
     stamp = divmod(stamp_ns, _NS_PER_S)
-    return make_message("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id)
+    return ros_types.make_message(
+        "std_msgs/msg/Header", stamp=stamp, frame_id=frame_id
+    )
 
 
 def make_image(
@@ -210,7 +205,7 @@ def make_image(
     """
     height, width, _ = pixels.shape
     data = np.ascontiguousarray(pixels).view(np.uint8).reshape(-1)
-    return make_message(
+    return ros_types.make_message(
         IMAGE,
         header=make_header(frame_id, stamp_ns),
         height=height,
@@ -227,7 +222,7 @@ def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
     The camera's frame has z ahead and y down.
     """
     K = camera.intrinsic_matrix()
-    return make_message(
+    return ros_types.make_message(
         CAMERA_INFO,
         header=make_header(frame_id, stamp_ns),
         height=camera.height(),

@@ -5,17 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.drives.ros_types import (
-    DETECTIONS_3D,
-    SCENE_UPDATE,
-    make_message,
-    serialize,
-)
-from cns_drake.recording.messages import (
-    EXACT_COVARIANCE,
-    MAP_FRAME,
-    make_header,
-)
+from cns_drake.base.drives import ros_types
+from cns_drake.recording import messages
 
 # Placeholders of numbers in a message: this and the following integers, which
 # are exact in double precision and larger than any measurement.
@@ -118,7 +109,7 @@ class BoxMessages:
             objects.instance.tolist(), objects.semantic_classes, strict=True
         )
         message = self._make(list(who), marks)
-        self._data = np.frombuffer(serialize(message), np.uint8)
+        self._data = np.frombuffer(ros_types.serialize(message), np.uint8)
         floats, words = _views(self._data)
         with np.errstate(invalid="ignore"):
             which = floats - _FIRST_MARK
@@ -152,11 +143,11 @@ def marked_detections(
         who: id and class of N objects.
         numbers: (N, 10) position, orientation (x, y, z, w) and size.
     """
-    header = make_header(MAP_FRAME, _STAMP_MARK_NS)
+    header = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS)
     detections = []
     for (instance, semantic_class), row in zip(who, numbers, strict=True):
         pose, size = _box(row)
-        certain = (pose, EXACT_COVARIANCE)
+        certain = (pose, messages.EXACT_COVARIANCE)
         detections.append(
             {
                 "header": header,
@@ -165,26 +156,28 @@ def marked_detections(
                 "id": instance,
             }
         )
-    return make_message(DETECTIONS_3D, header=header, detections=detections)
+    return ros_types.make_message(
+        ros_types.DETECTIONS_3D, header=header, detections=detections
+    )
 
 
 def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
     """Returns a SceneUpdate that replaces all boxes by those of N objects."""
-    stamp = make_header(MAP_FRAME, _STAMP_MARK_NS).stamp
+    stamp = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS).stamp
     entities = []
     for (instance, semantic_class), row in zip(who, numbers, strict=True):
         color = (*_RGB.get(semantic_class, _OTHER_RGB), _OPACITY)
         entities.append(
             {
                 "timestamp": stamp,
-                "frame_id": MAP_FRAME,
+                "frame_id": messages.MAP_FRAME,
                 "id": instance,
                 "metadata": [("class", semantic_class)],
                 "cubes": [(*_box(row), color)],
             }
         )
-    return make_message(
-        SCENE_UPDATE,
+    return ros_types.make_message(
+        ros_types.SCENE_UPDATE,
         deletions=[{"timestamp": stamp, "type": _DELETE_ALL}],
         entities=entities,
     )

@@ -41,11 +41,7 @@ from cns_drake.base.drives.mcap_file import (
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, completing, user_errors
 from cns_drake.base.version import __version__
-from cns_drake.recording.rosbag2_metadata import (
-    describe_topic,
-    make_bag_information,
-    to_yaml,
-)
+from cns_drake.recording import rosbag2_metadata
 
 _LAST_OPCODE = max(Opcode)
 # The beginning of a chunk: the record's opcode and length, two times, size and
@@ -406,7 +402,7 @@ def _copy(
             first_fault = first_fault or fault
     if profile == "ros2":
         topics = [
-            describe_topic(
+            rosbag2_metadata.describe_topic(
                 channel.topic,
                 schemas[channel.schema_id].name
                 if channel.schema_id in schemas
@@ -417,11 +413,12 @@ def _copy(
             )
             for number, channel in channels.items()
         ]
-        information = make_bag_information(
+        information = rosbag2_metadata.make_bag_information(
             output.name, topics, start_ns=start_ns, end_ns=end_ns
         )
         writer.add_metadata(
-            _ROSBAG2, {"serialized_metadata": to_yaml(information)}
+            _ROSBAG2,
+            {"serialized_metadata": rosbag2_metadata.to_yaml(information)},
         )
     writer.finish()
     seconds = (end_ns - start_ns) / 1e9

@@ -16,13 +16,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.recording.schedule import frames_within
+from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-    map_folder,
-    read_scenario_file,
-    world_file,
-)
 
 
 @dataclass(frozen=True)
@@ -79,8 +74,8 @@ def drive_rows(
     ).encode()
     rows = []
     for path in its.drives():
-        scenario = read_scenario_file(path)
-        world = world_file(scenario)
+        scenario = scenario_files.read_scenario_file(path)
+        world = scenario_files.world_file(scenario)
         if not world.is_file():
             continue
         # A map whose drives follow waypoints has no roads.
@@ -136,13 +131,13 @@ def _measure(
     # Slow to import, and rarely needed.
     from cns_drake.scenarios.planning import plan_drive
 
-    check_files(scenario)
+    scenario_files.check_files(scenario)
     trajectory = plan_drive(scenario)
     frames = frames_within(trajectory.duration, scenario.frame_period)
     structures, triangles = size or _size(scenario)
     return DriveRow(
         sequence=scenario.name,
-        map=map_folder(scenario).path.resolve().name,
+        map=scenario_files.map_folder(scenario).path.resolve().name,
         stage=str(scenario.stage),
         title=scenario.title,
         checksum=checksum,
@@ -160,7 +155,9 @@ def _size(scenario: Scenario) -> tuple[int, int]:
     from cns_drake.scene.surfaces import TriangleSurface
     from cns_drake.scene.world import load_world
 
-    world = load_world(world_file(scenario), without=scenario.without)
+    world = load_world(
+        scenario_files.world_file(scenario), without=scenario.without
+    )
     geometries = read_perception_geometry(world.scene_graph.model_inspector())
     return len({geometry.structure for geometry in geometries}), sum(
         len(geometry.surface.triangles)

@@ -9,12 +9,7 @@ import shapely
 from shapely import STRtree
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.suspension import (
-    Suspension,
-    load_car_masses,
-    load_suspension_rates,
-    ride_on_springs,
-)
+from cns_drake.motion import suspension
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.schedule import frames_within
@@ -109,11 +104,11 @@ def plan_drive(
     profile = scenario.ride.profile()
     if profile is None:
         return trajectory
-    suspension = Suspension(
-        load_car_masses(vehicle_file()),
-        load_suspension_rates(suspension_file()),
+    springs = suspension.Suspension(
+        suspension.load_car_masses(vehicle_file()),
+        suspension.load_suspension_rates(suspension_file()),
     )
-    return ride_on_springs(trajectory, suspension, profile)
+    return suspension.ride_on_springs(trajectory, springs, profile)
 
 
 def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:

@@ -135,7 +135,8 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     found = referenced_files(path, watch or FileWatch())
     named = [(f"{n} {size}\n", one) for n, (one, size) in sorted(found.items())]
     # The file itself comes last, without its name.
-    for line, file in [*named, ("", path)]:
+    files: list[tuple[str, Path | str]] = [*named, ("", path)]
+    for line, file in files:
         digest.update(line.encode())
         with user_errors(file), open(file, "rb") as stream:
             while block := stream.read(_BLOCK_BYTES):  # Of a mesh of any size.

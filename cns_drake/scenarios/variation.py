@@ -25,14 +25,8 @@ from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, draw_route
+from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import RideConfig, Scenario
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-    find_files,
-    load_scenario,
-    map_folder,
-    world_file,
-)
 from cns_drake.scenarios.shipped import shipped_drives
 from cns_drake.scene.world import load_world, structures_in
 from cns_drake.sensors.imu.config import ImuSection
@@ -143,12 +137,12 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     """
     values = read_yaml(path)
     if isinstance(values, dict):
-        find_files(values, path)
+        scenario_files.find_files(values, path)
     family = validated(Family, values, path)
     base: str | Path = family.base
     if base not in shipped_drives():
         base = path.parent / base
-    return _vary(load_scenario(base), family, path, redraw)
+    return _vary(scenario_files.load_scenario(base), family, path, redraw)
 
 
 def _vary(
@@ -162,8 +156,8 @@ def _vary(
         )
     sections = {"ride": family.ride, "imu": family.imu}
     base = base.replaced(**{n: one for n, one in sections.items() if one})
-    check_files(base, source)
-    last = max(map_folder(base).stages())
+    scenario_files.check_files(base, source)
+    last = max(scenario_files.map_folder(base).stages())
     stage = family.stage or last
     if family.city_seeds:
         _check_redrawable(base, family, last, source)
@@ -174,7 +168,7 @@ def _vary(
         removable = _difference(base, stage, family.towards, source)
     routes: dict[str | None, Route | None] = {None: None}
     if family.routes is not None:
-        network = load_road_network(map_folder(base).roads)
+        network = load_road_network(scenario_files.map_folder(base).roads)
         rngs = [
             np.random.default_rng([family.routes.seed, k])
             for k in range(family.routes.count)
@@ -183,7 +177,7 @@ def _vary(
             f"r{k}": draw_route(network, family.routes.length, rng)
             for k, rng in enumerate(rngs)
         }
-    units = {None: base.lidars}
+    units: dict[str | None, dict] = {None: base.lidars}
     if family.lidars:
         units = {
             preset: base.with_lidar_preset(preset).lidars
@@ -193,14 +187,16 @@ def _vary(
     if family.city_seeds:
         if redraw is None:
             raise ValueError("a family with city_seeds needs `redraw`")
-        folders = redraw(map_folder(base).path, stage, family.city_seeds)
+        folders = redraw(
+            scenario_files.map_folder(base).path, stage, family.city_seeds
+        )
         cities = {
             seed: base.replaced(map=str(folder))
             for seed, folder in folders.items()
         }
     drawn = {}
     for city_seed, seed in product(cities, family.seeds):
-        table = map_folder(cities[city_seed]).structures
+        table = scenario_files.map_folder(cities[city_seed]).structures
         drawn[city_seed, seed] = (
             _decay_order(table, seed, removable),
             _draw_losses(table, family.scattered, seed, source),
@@ -228,7 +224,7 @@ def _vary(
         )
         if routes[route] is not None:
             member = member.replaced(route=routes[route], waypoints=None)
-        check_files(member, source)
+        scenario_files.check_files(member, source)
         members.append(member)
     return members
 
@@ -267,7 +263,7 @@ def _check_redrawable(
         raise InputError(f"{source}: towards: {why}")
     if family.stage not in (None, last):
         raise InputError(f"{source}: stage: {why}")
-    folder = map_folder(base)
+    folder = scenario_files.map_folder(base)
     for file in (folder.plan, folder.roads):
         if not os.path.isfile(file):
             raise InputError(
@@ -283,8 +279,10 @@ def _difference(
     names = []
     for one in (stage, other):
         scenario = base.replaced(stage=one)
-        check_files(scenario, source)
-        names.append(structures_in(load_world(world_file(scenario))))
+        scenario_files.check_files(scenario, source)
+        names.append(
+            structures_in(load_world(scenario_files.world_file(scenario)))
+        )
     difference = names[0] - names[1]
     if not difference:
         raise InputError(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import points as point_arrays
-from cns_drake.base.drives import mcap_messages, ros_types
+from cns_drake.base.drives import mcap_messages, point_layouts, ros_types
 from cns_drake.base.drives.drive import (
     IMU_DTYPE,
     ODOMETRY_DTYPE,
@@ -18,11 +18,6 @@ from cns_drake.base.drives.drive import (
 )
 from cns_drake.base.drives.mcap_file import McapFile
 from cns_drake.base.drives.mcap_messages import StaticTransforms, checked_poses
-from cns_drake.base.drives.point_layouts import (
-    from_layout,
-    to_points,
-    to_records,
-)
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import parse_json
 
@@ -158,9 +153,11 @@ class McapDrive(Drive):
         with self._faults(
             f"{self._lidar_topic}: scan {index} at {stamp_ns} ns"
         ):
-            points = to_points(message)
+            points = point_layouts.to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
-            return from_layout(points, self._labels(index, message))
+            return point_layouts.from_layout(
+                points, self._labels(index, message)
+            )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
         """Returns the labels of a scan that has a topic for them."""
@@ -175,7 +172,7 @@ class McapDrive(Drive):
             raise ValueError(
                 f"{topic}: number {index} has another stamp than the scan"
             )
-        return to_records(message)
+        return point_layouts.to_records(message)
 
     @property
     def kalibr(self) -> str | None:

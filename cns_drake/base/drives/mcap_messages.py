@@ -7,18 +7,16 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.drives.ros_types import (
-    IMU,
-    ODOMETRY,
-    POINT_CLOUD,
-    TF,
-    deserialize,
-)
+from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
 
 # More bytes than a message of each type can need [bytes]. A few compressed
 # kilobytes can hold gigabytes of padding. A cloud fills a chunk at most.
-_LONGEST = {ODOMETRY: 1 << 12, IMU: 1 << 12, TF: 1 << 20}
+_LONGEST = {
+    ros_types.ODOMETRY: 1 << 12,
+    ros_types.IMU: 1 << 12,
+    ros_types.TF: 1 << 20,
+}
 _MOST_FIELDS = 256
 _LONGEST_NAME = 1 << 10
 # The header of CDR that gives the order of bytes.
@@ -35,10 +33,10 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
         raise ValueError(
             f"a message of {len(data)} bytes, more than one of its type holds"
         )
-    if message_type == POINT_CLOUD:
+    if message_type == ros_types.POINT_CLOUD:
         read_cloud_header(data)
     try:
-        return deserialize(data, message_type)
+        return ros_types.deserialize(data, message_type)
     except Exception as error:
         # rosbags raises any error of its generated code.
         raise ValueError(

@@ -12,13 +12,8 @@ import time
 from typing import TYPE_CHECKING
 
 from cns_drake.base.errors import FailedJobsError, InputError, one_line
+from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.cluster import Cluster, LostSchedulerError, Workers
-from cns_drake.base.jobs.processes import (
-    PATIENCE,
-    JobError,
-    ProcessDiedError,
-    nothing_left,
-)
 from cns_drake.base.jobs.step import Step
 
 if TYPE_CHECKING:
@@ -70,7 +65,9 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
             urgency[need] = max(urgency[need], cost)
     done: set[str] = set()
     for name in order:
-        if done.issuperset(needs[name]) and nothing_left(by_name[name].step):
+        if done.issuperset(needs[name]) and processes.nothing_left(
+            by_name[name].step
+        ):
             done.add(name)
     left = {name: by_name[name] for name in by_name if name not in done}
     if not left:
@@ -156,7 +153,7 @@ class _Run:
             name = max(ready, key=lambda one: self._urgency[one])
             job = self._waiting.pop(name)
             # The jobs it needs may have left it nothing to do.
-            if job.needs and nothing_left(job.step):
+            if job.needs and processes.nothing_left(job.step):
                 self._done.add(name)
                 self._shown.end(name)
             else:
@@ -198,7 +195,7 @@ class _Run:
         if isinstance(error, LostSchedulerError):
             raise error
         if (
-            isinstance(error, ProcessDiedError)
+            isinstance(error, processes.ProcessDiedError)
             and self._deaths[name] < _RETRIES
         ):
             self._deaths[name] += 1
@@ -206,7 +203,9 @@ class _Run:
             self._submit(name)
             return
         fault = str(error)
-        if not isinstance(error, InputError | JobError | ProcessDiedError):
+        if not isinstance(
+            error, InputError | processes.JobError | processes.ProcessDiedError
+        ):
             fault = one_line(f"{type(error).__name__}: {error}")
         self._faults[name] = fault
         self._shown.end(name, fault=True)
@@ -218,6 +217,6 @@ class _Run:
         """Ends what is running, and waits until it has closed its files."""
         self._submitted.clear()
         self._workers.stop()
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + processes.PATIENCE
         while self._running and (left := deadline - time.monotonic()) > 0:
             self._take_in(min(left, _REFRESH_INTERVAL))
