@@ -78,12 +78,7 @@ def one_line(message: object) -> str:
 
 
 def validated(model: type[_Model], values: object, source: object) -> _Model:
-    """Returns values as a model of pydantic.
-
-    Args:
-        model: the class of the result.
-        values: what a file or argument holds.
-        source: the file or argument, which errors name.
+    """Returns what a file or argument, the source, holds as a model.
 
     Raises:
         InputError: a field is missing, unknown or not usable.
@@ -93,9 +88,8 @@ def validated(model: type[_Model], values: object, source: object) -> _Model:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise InputError(
-            describe_validation_error(source, error, model)
-        ) from None
+        fault = describe_validation_error(source, error, model)
+        raise InputError(fault) from None
 
 
 def describe_validation_error(
@@ -106,9 +100,7 @@ def describe_validation_error(
     """Returns one line for the first of the faults that pydantic found.
 
     An unknown field comes first, a missing one last: its name may be misspelt.
-
-    Args:
-        model: the pydantic model, used to suggest the names of misspelt fields.
+    With the model, the line suggests a name.
     """
     fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
@@ -146,50 +138,30 @@ def nearest_field(
 ) -> str | None:
     """Returns the field that is written most like an unknown one.
 
-    Args:
-        place: keys and indices that lead to the unknown field; the last is the
-            field itself.
+    The place is the keys and indices that lead to it, and itself.
     """
-    kinds: list[object] = [model]
-    for part in place[:-1]:
-        kinds = [inner for kind in kinds for inner in _inside(kind, part)]
-    names = {
-        field.alias or name
-        for kind in kinds
-        for one in _models(kind)
-        for name, field in one.model_fields.items()
-    }
-    close = difflib.get_close_matches(str(place[-1]), sorted(names), n=1)
+    names = sorted(set(_fields_at(model, place[:-1])))
+    close = difflib.get_close_matches(str(place[-1]), names, n=1)
     return close[0] if close else None
 
 
-def _models(kind: Any) -> Iterator[type[BaseModel]]:
-    """Yields the models that an annotation names at its top level."""
-    if hasattr(kind, "model_fields"):
-        yield kind
-    elif typing.get_origin(kind) not in (list, dict, tuple):
-        for inner in typing.get_args(kind):
-            yield from _models(inner)
-
-
-def _inside(kind: Any, part: str | int) -> Iterator[object]:
-    """Yields what an annotation has at a key or index."""
+def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
+    """Yields the fields of the models at a place in an annotation."""
     if hasattr(kind, "model_fields"):
         for name, field in kind.model_fields.items():
-            if part in (name, field.alias):
-                yield field.annotation
+            if not place:
+                yield field.alias or name
+            elif place[0] in (name, field.alias):
+                yield from _fields_at(field.annotation, place[1:])
         # The place has the name of one of the models to choose from.
-        if part == kind.__name__:
-            yield kind
-        return
-    arguments = typing.get_args(kind)
-    if typing.get_origin(kind) is dict:
-        yield arguments[1]
-    elif typing.get_origin(kind) in (list, tuple):
-        yield from arguments
-    else:
-        for inner in arguments:
-            yield from _inside(inner, part)
+        if place and place[0] == kind.__name__:
+            yield from _fields_at(kind, place[1:])
+    elif typing.get_origin(kind) not in (list, dict, tuple):
+        for inner in typing.get_args(kind):
+            yield from _fields_at(inner, place)
+    elif place:
+        for inner in typing.get_args(kind):
+            yield from _fields_at(inner, place[1:])
 
 
 def shows_traceback() -> bool:

@@ -75,11 +75,8 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     """Yields a draft of a folder, of the same name; it takes its place at last.
 
     The draft lies in a folder of its own, since files may name their folder. On
-    an exception it is removed.
-
-    Args:
-        folder: not there, or empty.
-        replaces: whether it may be there; the draft then takes its place.
+    an exception it is removed. The folder may be there, with files, only if the
+    draft `replaces` it.
 
     Raises:
         InputError: if it cannot be written.
@@ -114,11 +111,9 @@ def check_regular(path: Path) -> None:
 
 
 def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
-    """Reads a whole file, unless it is too large.
+    """Reads a whole file, unless it is larger than a limit [bytes].
 
-    Args:
-        limit: greatest size [bytes]; the default is ample for files written by
-            hand.
+    The default is ample for files written by hand.
 
     Raises:
         InputError: if it cannot be read, does not exist or is too large.
@@ -228,36 +223,27 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
 
     The file `<path>.lock` is locked meanwhile, also for other machines if
     the file system has locks. It is unlocked however the process ends.
-
-    Args:
-        path: what the block works on, a file or a folder.
-        on_wait: is called before waiting for another process.
+    Before waiting for another process, `on_wait` is called.
 
     Raises:
         InputError: if the lock cannot be written.
     """
-    lock = _lock_file(path)
+    lock = path.with_name(f"{path.name}.lock")
     make_folder(path.parent)
     with contextlib.ExitStack() as stack:
-        try:
+        with user_errors(lock):
             while not _lock(lock, stack, on_wait):
                 pass
-        except OSError as error:
-            raise InputError(f"{lock}: {error.strerror or error}") from error
         yield
 
 
 def remove_lock(path: Path) -> None:
     """Removes the lock of a killed process, unless another one holds it."""
-    lock = _lock_file(path)
+    lock = path.with_name(f"{path.name}.lock")
     if lock.is_file():
         # What cannot be locked is in use, or no lock of ours.
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
             _lock(lock, stack, _refuse_to_wait)
-
-
-def _lock_file(path: Path) -> Path:
-    return path.with_name(f"{path.name}.lock")
 
 
 def _refuse_to_wait() -> None:

@@ -18,9 +18,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 def interrupt_on_termination(once: bool = False) -> None:
     """Makes SIGTERM an exception, so that open files are closed.
 
-    Args:
-        once: ignore later signals, so that they cannot interrupt the closing;
-            for a process that another process can still kill.
+    Later signals may interrupt the closing, unless it comes `once`: that is for
+    a process that another process can still kill.
     """
 
     def interrupt(signal_number: int, frame: FrameType | None) -> None:
@@ -112,10 +111,9 @@ def end_interrupted() -> NoReturn:
     interpreter's shutdown is left out: it can fail after a library was
     interrupted in a computation.
     """
-    with contextlib.suppress(OSError, ValueError):
-        sys.stdout.flush()
-    with contextlib.suppress(OSError, ValueError):
-        sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
     # Nothing of `multiprocessing` is left in the temporary folder.
     if util := sys.modules.get("multiprocessing.util"):
         with contextlib.suppress(Exception):

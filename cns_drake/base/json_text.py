@@ -20,10 +20,7 @@ def json_number(value: float) -> float | None:
 
 
 def parse_json(data: bytes) -> Any:
-    """Returns the value of a text in JSON.
-
-    Args:
-        data: in UTF-8.
+    """Returns the value of a text in JSON, in UTF-8.
 
     Raises:
         ValueError: if it is not JSON, is nested too deep, has a key twice, or

@@ -1,6 +1,5 @@
 """The files in the folder of a map."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 ROADS_NAME = "roads.yaml"
@@ -16,60 +15,33 @@ def stage_name(stage: str) -> str:
     return f"stage_{stage}.sdf"
 
 
-@dataclass(frozen=True)
 class MapFolder:
     """The folder of a map, of which any file may be missing.
 
     Attributes:
         path: the folder.
+        name: the name of the map.
+        roads: the road network.
+        lanes: lanes and walkways of an imported map, for traffic.
+        plan: the plan from which the city is generated.
+        stage_plan: the table of the structures that each stage lacks.
+        structures: the table of structures.
+        drive_table: the table of drives and their figures.
+        meshes: the folder of the meshes that the stages name.
+        views: the views of which pictures are made.
     """
 
-    path: Path
-
-    @property
-    def name(self) -> str:
-        """The name of the map."""
-        return self.path.name
-
-    @property
-    def roads(self) -> Path:
-        """The road network."""
-        return self.path / ROADS_NAME
-
-    @property
-    def lanes(self) -> Path:
-        """Lanes and walkways of an imported map, for traffic."""
-        return self.path / LANES_NAME
-
-    @property
-    def plan(self) -> Path:
-        """The plan from which the city is generated."""
-        return self.path / PLAN_NAME
-
-    @property
-    def stage_plan(self) -> Path:
-        """The table of the structures that each stage lacks."""
-        return self.path / STAGES_NAME
-
-    @property
-    def structures(self) -> Path:
-        """The table of structures."""
-        return self.path / STRUCTURES_NAME
-
-    @property
-    def drive_table(self) -> Path:
-        """The table of drives and their figures."""
-        return self.path / "sequences.csv"
-
-    @property
-    def meshes(self) -> Path:
-        """The folder of the meshes that the stages name."""
-        return self.path / MESH_FOLDER
-
-    @property
-    def views(self) -> Path:
-        """The views of which pictures are made."""
-        return self.path / "views.yaml"
+    def __init__(self, path: Path):
+        self.path = path
+        self.name = path.name
+        self.roads = path / ROADS_NAME
+        self.lanes = path / LANES_NAME
+        self.plan = path / PLAN_NAME
+        self.stage_plan = path / STAGES_NAME
+        self.structures = path / STRUCTURES_NAME
+        self.drive_table = path / "sequences.csv"
+        self.meshes = path / MESH_FOLDER
+        self.views = path / "views.yaml"
 
     def stage(self, stage: str) -> Path:
         """Returns the SDF file of a stage."""

@@ -14,12 +14,9 @@ _ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "../.."))
 
 
 def leave_out_folder(search_path: list[str]) -> None:
-    """Takes the current folder off the search path of a program.
+    """Takes the current folder off the search path of a program, `sys.path`.
 
     `python -m` puts it there. It stays if it holds this package.
-
-    Args:
-        search_path: `sys.path`, which is changed.
     """
     here = os.path.realpath(os.curdir)
     if here != _ROOT:

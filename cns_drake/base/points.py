@@ -13,11 +13,7 @@ _XYZI = ("x", "y", "z", "intensity")
 
 
 def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
-    """Returns the coordinates of a cloud as a new (N, 3) array.
-
-    Args:
-        points: structured array of shape (N,) with fields `x`, `y`, `z`.
-    """
+    """Returns the coordinates of a cloud of N points as a new (N, 3) array."""
     coordinates = np.empty((len(points), 3), dtype=dtype)
     # NumPy warns when it converts some NaN.
     with np.errstate(invalid="ignore"):
@@ -61,7 +57,7 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
     Returns:
         Structured array of shape (N,), a view where memory order allows.
     """
-    names = ("x", "y", "z", "intensity")[: coordinates.shape[1]]
+    names = _XYZI[: coordinates.shape[1]]
     contiguous = np.ascontiguousarray(coordinates)
     dtype = np.dtype([(name, contiguous.dtype) for name in names])
     return contiguous.view(dtype).reshape(len(coordinates))
@@ -70,9 +66,7 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
 def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
     """Stores numbers that were written as text in a field of points.
 
-    Args:
-        points: (N,) structured array.
-        values: (N,) or (N, K) float64.
+    The values are (N,) or (N, K) float64.
 
     Raises:
         ValueError: if a number does not fit the field's type.

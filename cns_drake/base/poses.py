@@ -8,12 +8,7 @@ FARTHEST = 1e8
 
 
 def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Returns poses X, shape (..., 4, 4).
-
-    Args:
-        R: rotations, shape (..., 3, 3).
-        p: positions, shape (..., 3) [m].
-    """
+    """Returns poses X (..., 4, 4) of R (..., 3, 3) and p (..., 3) [m]."""
     X = np.zeros((*R.shape[:-2], 4, 4))
     X[..., :3, :3] = R
     X[..., :3, 3] = p
@@ -22,13 +17,9 @@ def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 def rotation_from_quaternion(quat_xyzw: np.ndarray) -> np.ndarray:
-    """Returns rotation matrices of quaternions, scaled to unit length.
+    """Returns rotation matrices (..., 3, 3) of quaternions (..., 4).
 
-    Args:
-        quat_xyzw: shape (..., 4), scalar last.
-
-    Returns:
-        Shape (..., 3, 3).
+    They are scaled to unit length.
 
     Raises:
         ValueError: if a quaternion has no direction (its norm is zero or
@@ -60,8 +51,7 @@ def interpolate(
     """Returns poses between pairs of poses: turns by SLERP, moves linearly.
 
     Args:
-        X_0: (N, 4, 4).
-        X_1: (N, 4, 4).
+        X_0, X_1: (N, 4, 4).
         fraction: (N,) share of the way from the one to the other.
 
     Returns:

@@ -9,26 +9,14 @@ from rich.progress import (
     BarColumn,
     Progress,
     ProgressColumn,
-    Task,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.table import Column
-from rich.text import Text
 
 from cns_drake.base.progress import LINE_INTERVAL
-
-
-class _ShortenedColumn(TextColumn):
-    """Text that is shortened in a narrow terminal instead of wrapped."""
-
-    def render(self, task: Task) -> Text:
-        text = super().render(task)
-        text.no_wrap = True
-        text.overflow = "ellipsis"
-        return text
 
 
 def fixed_column() -> Column:
@@ -53,7 +41,11 @@ def show_bars(
         BarColumn(table_column=Column(max_width=40)),
         TextColumn("{task.percentage:>3.0f} %", table_column=fixed_column()),
         *columns,
-        _ShortenedColumn("{task.fields[note]}", table_column=Column()),
+        # In a narrow terminal it is shortened instead of wrapped.
+        TextColumn(
+            "{task.fields[note]}",
+            table_column=Column(no_wrap=True, overflow="ellipsis"),
+        ),
         console=console or Console(stderr=True),
         refresh_per_second=2,
     )

@@ -11,17 +11,12 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from cns_drake.base import interrupts
 from cns_drake.base.errors import (
     TRACEBACK_OPTION,
     InputError,
     missing_library,
     shows_traceback,
-)
-from cns_drake.base.interrupts import (
-    INTERRUPTED,
-    end_interrupted,
-    ignore_interrupts,
-    interrupt_on_termination,
 )
 from cns_drake.base.process import look_seldom
 from cns_drake.base.version import __version__
@@ -93,7 +88,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     look_seldom()
     _open_standard_streams()
     try:
-        interrupt_on_termination()
+        interrupts.interrupt_on_termination()
         _check_arguments()
         # This option may stand anywhere.
         words = [word for word in sys.argv[1:] if word != TRACEBACK_OPTION]
@@ -103,7 +98,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
             if shows_traceback():
                 traceback.print_exc()
             raise
-        if status == INTERRUPTED:  # Typer has caught it already.
+        if status == interrupts.INTERRUPTED:  # Typer has caught it already.
             message = "interrupted"
         sys.stdout.flush()
     except _UsageError as error:
@@ -111,7 +106,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     except InputError as error:
         message, status = f"error: {error}", error.exit_status
     except (KeyboardInterrupt, typer.Abort):
-        message, status = "interrupted", INTERRUPTED
+        message, status = "interrupted", interrupts.INTERRUPTED
     except BrokenPipeError:
         # The reader of the results has closed the pipe.
         _forget_results()
@@ -137,11 +132,11 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     except UnicodeError as error:
         message, status = f"error: a name that is no text ({error})", 2
     # The command has done its work; nothing is left to interrupt.
-    ignore_interrupts()
+    interrupts.ignore_interrupts()
     if message is not None:
         print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
-    if status == INTERRUPTED:
-        end_interrupted()
+    if status == interrupts.INTERRUPTED:
+        interrupts.end_interrupted()
     raise SystemExit(status)
 
 

@@ -10,14 +10,9 @@ import os
 from pathlib import Path
 import shutil
 
+from cns_drake.base import files
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    make_folder,
-    part_path,
-    user_errors,
-    write_text,
-)
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.export.layouts import CNS, KITTI, TUM, Layout
 from cns_drake.recording.rosbag2_metadata import to_yaml
@@ -68,7 +63,7 @@ def export_drive(
     outer = {
         output / name: text for name, text in layout.outer_files(drive).items()
     }
-    _claim(output, format_name, layout)
+    _claim(output, format_name)
     if folder.exists():
         raise InputError(
             f"{folder}: this drive is there already; remove it or give another "
@@ -76,61 +71,57 @@ def export_drive(
         )
     if layout.shared_outer_files:
         for path, text in outer.items():
-            _check_equal(path, text)
-    part = part_path(folder)
+            with files.user_errors(path):
+                is_other = path.is_file() and path.read_bytes() != text.encode()
+            if is_other:
+                raise InputError(
+                    f"{path}: differs: the drives there have another sensor"
+                    " mount; give another folder"
+                )
+    part = files.part_path(folder)
     try:
         _write_drive(drive, layout, part, on_frame)
         for path, text in outer.items():
-            make_folder(path.parent)
-            write_text(path, text)
-        with user_errors(folder):
+            files.make_folder(path.parent)
+            files.write_text(path, text)
+        with files.user_errors(folder):
             os.replace(part, folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return folder
 
 
-def _claim(output: Path, format_name: str, layout: Layout) -> None:
+def _claim(output: Path, format_name: str) -> None:
     """Makes the folder of drives, or checks that it is one of ours."""
     marker = output / _MARKER
-    with user_errors(output):
+    with files.user_errors(output):
         if marker.is_file():
-            _check_marker(marker, format_name)
+            values = read_yaml(marker)
+            found = values.get("format") if isinstance(values, dict) else None
+            # A list of YAML is no key.
+            if not isinstance(found, str) or found not in _LAYOUTS:
+                raise InputError(
+                    f"{marker}: not written by an export of cns-drake; give "
+                    "another folder"
+                )
+            if found != format_name:
+                raise InputError(
+                    f"{marker}: format: the folder holds {found} drives"
+                )
             return
         if output.exists() and (not output.is_dir() or any(output.iterdir())):
             raise InputError(
                 f"{output}: the folder holds other files; give a new or an "
                 "empty one"
             )
-    make_folder(output)
+    files.make_folder(output)
+    explained = read_yaml(Path(__file__).with_name("layouts.yaml"))
     values = {
         "writer": "cns-drake export",
         "format": format_name,
-        "files": layout.files,
+        "files": explained[format_name],
     }
-    write_text(marker, to_yaml(values))
-
-
-def _check_marker(marker: Path, format_name: str) -> None:
-    values = read_yaml(marker)
-    found = values.get("format") if isinstance(values, dict) else None
-    # A list of YAML is no key.
-    if not isinstance(found, str) or found not in _LAYOUTS:
-        raise InputError(
-            f"{marker}: not written by an export of cns-drake; give another "
-            "folder"
-        )
-    if found != format_name:
-        raise InputError(f"{marker}: format: the folder holds {found} drives")
-
-
-def _check_equal(path: Path, text: str) -> None:
-    with user_errors(path):
-        if path.is_file() and path.read_bytes() != text.encode():
-            raise InputError(
-                f"{path}: differs: the drives there have another sensor"
-                " mount; give another folder"
-            )
+    files.write_text(marker, to_yaml(values))
 
 
 def _write_drive(
@@ -139,7 +130,7 @@ def _write_drive(
     folder: Path,
     on_frame: Callable[[int, int], None],
 ) -> None:
-    with user_errors(folder):
+    with files.user_errors(folder):
         # Left behind by an export that was killed.
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
@@ -152,12 +143,12 @@ def _write_drive(
             zip(drive.stamps_ns.tolist(), drive, strict=True)
         ):
             try:
-                files = layout.scan_files(frame, stamp_ns, scan)
+                made = layout.scan_files(frame, stamp_ns, scan)
             except ValueError as error:
                 raise InputError(
                     f"{drive.name}: scan {frame}: {error}"
                 ) from error
-            for name, content in files.items():
+            for name, content in made.items():
                 path = folder / name
                 if frame == 0:
                     path.parent.mkdir()

@@ -2,7 +2,7 @@
 
 Frames: world W, vehicle B on the ground, LiDAR S, IMU I."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path, PurePosixPath
@@ -40,11 +40,10 @@ class Layout:
     Paths are relative to the folder of all drives.
 
     Attributes:
-        files: path (with `<place holders>`) -> its content in words.
         drive_folder: drive -> its folder.
-        outer_files: drive -> path -> text of the files outside that folder.
-        inner_files: likewise inside that folder, relative to it, without the
-            scans.
+        inner_files: drive -> path -> text of the files in that folder, relative
+            to it, without the scans.
+        outer_files: likewise outside that folder.
         scan_files: frame number, stamp [ns] and scan -> its files: path in the
             drive's folder -> content. None for layouts without scans.
         shared_outer_files: whether all drives share the outer files, which must
@@ -52,13 +51,12 @@ class Layout:
         has_labels: whether points have labels.
     """
 
-    files: dict[str, str]
     drive_folder: Callable[[McapDrive], PurePosixPath]
-    outer_files: Callable[[McapDrive], dict[str, str]]
     inner_files: Callable[[McapDrive], dict[str, str]]
-    scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]] | None
-    shared_outer_files: bool
-    has_labels: bool
+    outer_files: Callable[[McapDrive], dict[str, str]] = lambda drive: {}
+    scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]] | None = None
+    shared_outer_files: bool = False
+    has_labels: bool = False
 
 
 def checked_name(drive: McapDrive, text: str) -> str:
@@ -132,9 +130,15 @@ def seconds(stamp_ns: int) -> str:
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
-def join_rows(rows: Iterable[Iterable[object]], separator: str) -> str:
-    """Returns a table as text; floats keep all their digits."""
-    return "".join(f"{separator.join(map(repr, row))}\n" for row in rows)
+def stamped_rows(
+    stamps: Iterable[object], columns: Sequence[np.ndarray], separator: str
+) -> str:
+    """Returns N stamps and (N, K) numbers as text; all digits are kept."""
+    rows = zip(stamps, np.hstack(columns).tolist(), strict=True)
+    return "".join(
+        f"{separator.join([str(stamp), *map(repr, row)])}\n"
+        for stamp, row in rows
+    )
 
 
 def _cns_folder(drive: McapDrive) -> PurePosixPath:
@@ -157,30 +161,13 @@ def _cns_outer_files(drive: McapDrive) -> dict[str, str]:
 
 
 def _cns_inner_files(drive: McapDrive) -> dict[str, str]:
-    poses = drive.odometry
-    files = {
-        "gt.csv": join_rows(
-            zip(
-                poses["stamp_ns"].tolist(),
-                *poses["position"].T.tolist(),
-                *unit_quaternions(drive).T.tolist(),
-                strict=True,
-            ),
-            ",",
-        )
-    }
-    imu = drive.imu
+    odometry, imu = drive.odometry, drive.imu
+    columns = [odometry["position"], unit_quaternions(drive)]
+    files = {"gt.csv": stamped_rows(odometry["stamp_ns"], columns, ",")}
     if imu is not None:
-        files["imu.csv"] = join_rows(
-            zip(
-                imu["stamp_ns"].tolist(),
-                *imu["quat_xyzw"].T.tolist(),
-                *imu["angular_velocity"].T.tolist(),
-                *imu["specific_force"].T.tolist(),
-                strict=True,
-            ),
-            ",",
-        )
+        names = ("quat_xyzw", "angular_velocity", "specific_force")
+        columns = [imu[name] for name in names]
+        files["imu.csv"] = stamped_rows(imu["stamp_ns"], columns, ",")
     return files | imu_files(drive) | scenario_files(drive)
 
 
@@ -195,30 +182,13 @@ def _mount(X_BC: np.ndarray) -> str:
 
 
 CNS = Layout(
-    files={
-        "transformation_lidar.yaml": "pose of the LiDAR in the vehicle's"
-        " frame: translation [m] and rotation (quaternion x y z w)",
-        "transformation_imu.yaml": "pose of the IMU, likewise",
-        "<Map>/<Sequence>/gt.csv": "t, x, y, z, qx, qy, qz, qw: pose of the"
-        " vehicle's frame (on the ground, under the LiDAR; forward, left,"
-        " up) in the world; t in nanoseconds",
-        "<Map>/<Sequence>/imu.csv": "t, qx, qy, qz, qw, wx, wy, wz, ax, ay,"
-        " az: orientation of the IMU in the world, angular velocity [rad/s]"
-        " and specific force [m/s^2] in its own axes",
-        "<Map>/<Sequence>/pcd/<t>.pcd": "x, y, z [m] and intensity, float32,"
-        " in the LiDAR's frame",
-        "<Map>/<Sequence>/imu.yaml": "noise of the IMU, if it has noise, as"
-        " Kalibr has it",
-        "<Map>/<Sequence>/scenario.yaml": "what was simulated",
-    },
-    drive_folder=_cns_folder,
+    _cns_folder,
+    _cns_inner_files,
     outer_files=_cns_outer_files,
-    inner_files=_cns_inner_files,
     scan_files=lambda _, stamp_ns, scan: {
         f"pcd/{stamp_ns}.pcd": encode_pcd(scan)
     },
     shared_outer_files=True,
-    has_labels=False,
 )
 
 
@@ -276,91 +246,40 @@ def _kitti_poses(drive: McapDrive) -> str:
 
 def _kitti_rows(X: np.ndarray) -> str:
     """Returns the upper 3 x 4 of each pose (N, 4, 4) as a row of text."""
-    return join_rows(X[:, :3].reshape(-1, 12).tolist(), " ")
+    rows = X[:, :3].reshape(-1, 12).tolist()
+    return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
 
 
 KITTI = Layout(
-    files={
-        "<NN>": "the drive's number, plus 100 for the second LiDAR of its"
-        " recording, plus 200 for the third",
-        "poses/<NN>.txt": "upper 3 x 4 of the camera's pose in its frame at"
-        " the first scan, a row a scan",
-        "sequences/<NN>/poses.txt": "the same, at the place where tools for "
-        "SemanticKITTI look",
-        "sequences/<NN>/calib.txt": "Tr: upper 3 x 4 of the LiDAR's pose in"
-        " the camera's frame. There is no camera: its axes (right, down,"
-        " forward) are put into the LiDAR, and P0 to P3 are the identity",
-        "sequences/<NN>/times.txt": "seconds since the first scan",
-        "sequences/<NN>/velodyne/<frame>.bin": "x, y, z [m] and intensity,"
-        " float32, in the LiDAR's frame",
-        "sequences/<NN>/labels/<frame>.label": "uint32 a point: class (id of "
-        "SemanticKITTI) + 65536 * "
-        "instance; 252 to 259 for "
-        "structures that are absent "
-        "in another stage (absent_in "
-        "in structures.json)",
-        "sequences/<NN>/first_pose.txt": "upper 3 x 4 of the LiDAR's pose in"
-        " the world at the first scan, the same world for all drives of a"
-        " map",
-        "sequences/<NN>/structures.json": "the table of instances, and the "
-        "other stage in which they are "
-        "absent, if asked for",
-        "sequences/<NN>/imu.yaml": "noise of the IMU, if it has noise, as"
-        " Kalibr has it",
-        "sequences/<NN>/scenario.yaml": "what was simulated",
-    },
-    drive_folder=lambda drive: PurePosixPath("sequences", _kitti_number(drive)),
+    lambda drive: PurePosixPath("sequences", _kitti_number(drive)),
+    _kitti_inner_files,
     outer_files=lambda drive: {
         f"poses/{_kitti_number(drive)}.txt": _kitti_poses(drive)
     },
-    inner_files=_kitti_inner_files,
     scan_files=_kitti_scan_files,
-    shared_outer_files=False,
     has_labels=True,
 )
 
 
 def _tum_inner_files(drive: McapDrive) -> dict[str, str]:
-    X_WB = drive.odometry
-    X_WS = drive.X_WS
-    R_WS = Rotation.from_matrix(X_WS[:, :3, :3])
+    X_WB, X_WS = drive.odometry, drive.X_WS
+    quat_WS = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat(canonical=True)
     return {
-        "base_link.tum": _tum_rows(
-            X_WB["stamp_ns"], X_WB["position"], unit_quaternions(drive)
+        "base_link.tum": stamped_rows(
+            map(seconds, X_WB["stamp_ns"].tolist()),
+            [X_WB["position"], unit_quaternions(drive)],
+            " ",
         ),
-        "lidar.tum": _tum_rows(
-            drive.stamps_ns, X_WS[:, :3, 3], R_WS.as_quat(canonical=True)
+        "lidar.tum": stamped_rows(
+            map(seconds, drive.stamps_ns.tolist()),
+            [X_WS[:, :3, 3], quat_WS],
+            " ",
         ),
         **imu_files(drive),
     }
 
 
-def _tum_rows(
-    stamps_ns: np.ndarray, position: np.ndarray, quat_xyzw: np.ndarray
-) -> str:
-    """Returns N poses as rows; (N,) [ns], (N, 3) [m] and (N, 4)."""
-    numbers = np.hstack([position, quat_xyzw]).tolist()
-    return "".join(
-        f"{seconds(stamp_ns)} {' '.join(map(repr, row))}\n"
-        for stamp_ns, row in zip(stamps_ns.tolist(), numbers, strict=True)
-    )
-
-
 TUM = Layout(
-    files={
-        "<drive>/base_link.tum": "timestamp tx ty tz qx qy qz qw: pose of"
-        " the vehicle's frame (on the ground, under the LiDAR; forward, left,"
-        " up) in the world, a row for each message of the odometry; seconds"
-        " and metres",
-        "<drive>/lidar.tum": "pose of the LiDAR in the world, likewise, a"
-        " row a scan",
-        "<drive>/imu.yaml": "noise of the IMU, if it has noise, as Kalibr"
-        " has it",
-    },
-    drive_folder=lambda drive: PurePosixPath(checked_name(drive, drive.name)),
-    outer_files=lambda drive: {},
-    inner_files=_tum_inner_files,
-    scan_files=None,
-    shared_outer_files=False,
-    has_labels=False,
+    lambda drive: PurePosixPath(checked_name(drive, drive.name)),
+    _tum_inner_files,
 )

@@ -142,12 +142,7 @@ class SmoothPath:
     """
 
     def __init__(self, points: np.ndarray, spacing: float):
-        """Makes the path.
-
-        Args:
-            points: (N, 3) evenly spaced positions [m].
-            spacing: their distance [m].
-        """
+        """Makes the path of (N, 3) points at even distances [m]."""
         self.spacing = spacing
         self._spline = SplineDerivatives(
             make_uniform_spline(points, spacing), 4
@@ -225,8 +220,7 @@ class SmoothPath:
     ) -> tuple[PathJet, PathSection]:
         """Returns the path at (N,) parameters u, and the sections before them.
 
-        In one evaluation, which costs little more than that of one
-        parameter.
+        One evaluation costs little more than that of one parameter.
         """
         wanted = np.atleast_1d(np.asarray(u, dtype=float))
         wanted = np.clip(wanted, 0.0, self.end)
@@ -263,20 +257,13 @@ class PathIntegral:
     def __init__(
         self, path: SmoothPath, integrand: Callable[[PathJet], np.ndarray]
     ):
-        """Tabulates the integral at the knots.
-
-        Args:
-            integrand: function of a `PathJet` that returns (N,) values.
-        """
+        """Tabulates the integral at the knots."""
         self._integrand = integrand
         whole = path.intervals()
         steps = whole.integrate(integrand(whole.jet))
         self._table = np.concatenate([[0.0], np.cumsum(steps)])
-
-    @property
-    def total(self) -> float:
-        """The integral over the whole path."""
-        return float(self._table[-1])
+        # The integral over the whole path.
+        self.total = float(self._table[-1])
 
     def evaluate(self, section: PathSection) -> np.ndarray:
         """Returns the (N,) integrals up to the ends of N sections."""

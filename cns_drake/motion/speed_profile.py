@@ -5,11 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.trajectories import BsplineTrajectory
 
-from cns_drake.motion.path_geometry import (
-    REACH,
-    SmoothPath,
-    make_uniform_spline,
-)
+from cns_drake.motion import path_geometry
 from cns_drake.roads.lane_path import Speeds
 
 # Distance of the knots of the time scaling [s]; acceleration changes within
@@ -45,17 +41,17 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
         positions: (N,) places at each `KNOT_PERIOD`, at rest for REACH of them
             at both ends [m].
     """
-    return make_uniform_spline(positions[:, None], KNOT_PERIOD)
+    return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
 
 def find_speed_profile(
-    path: SmoothPath, speed_limits: np.ndarray, speeds: Speeds
+    path: path_geometry.SmoothPath, speed_limits: np.ndarray, speeds: Speeds
 ) -> SpeedProfile:
     """Returns the fastest drive under bounds.
 
     It is found with stepwise constant acceleration (a forward and a backward
-    pass over v^2). Its positions at
-    even times are then the control points of a quintic B-spline: its u' is a
+    pass over v^2). Its positions at even times are then the control points of a
+    quintic B-spline: its u' is a
     weighted mean of the drive's speed, and its u'' of the acceleration, over
     at most REACH + 1 knot periods before and after. Bounds of acceleration
     therefore carry over as they are, and bounds of speed if the drive
@@ -90,13 +86,13 @@ def drive_positions(profile: SpeedProfile) -> np.ndarray:
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]
     )
     # With REACH knots of rest at both ends the spline too is at rest there.
-    knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * REACH
-    drive_times = (np.arange(knots + 1) - REACH) * KNOT_PERIOD
+    knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * path_geometry.REACH
+    drive_times = (np.arange(knots + 1) - path_geometry.REACH) * KNOT_PERIOD
     return _drive(drive_times, times, u, speed)
 
 
 def _at_knots(
-    path: SmoothPath, speed_limits: np.ndarray, u: np.ndarray
+    path: path_geometry.SmoothPath, speed_limits: np.ndarray, u: np.ndarray
 ) -> np.ndarray:
     """Returns the lower one of the limits at both ends of the interval."""
     index = (u / path.spacing).astype(int).clip(0, len(speed_limits) - 2)
@@ -109,7 +105,7 @@ def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:
     A drive that keeps to limit v within T * v of a place passes the place
     with at most v during at least T before and after.
     """
-    period = (REACH + 1) * KNOT_PERIOD
+    period = (path_geometry.REACH + 1) * KNOT_PERIOD
     reach = np.ceil((period * limit + _SMOOTHING_SLACK) / step).astype(int)
     result = limit.copy()
     for shift in range(1, int(reach.max()) + 1):

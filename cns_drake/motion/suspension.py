@@ -12,9 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint
 
 from cns_drake.base.elementary import product, rotated
-from cns_drake.base.errors import (
-    validated,
-)
+from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.trajectory import NUM_COORDINATES, BodyRide, Trajectory

@@ -11,18 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.elementary import cos, product, rotated, sin
-from cns_drake.motion.path_geometry import (
-    PathIntegral,
-    PathJet,
-    PathSection,
-    SmoothPath,
-    SplineDerivatives,
-)
-from cns_drake.motion.speed_profile import (
-    drive_positions,
-    find_speed_profile,
-    make_time_scaling,
-)
+from cns_drake.motion import path_geometry, speed_profile
 from cns_drake.roads.lane_path import LanePath, Speeds
 
 
@@ -199,8 +188,8 @@ class Moments(NamedTuple):
     u: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
-    jet: PathJet
-    section: PathSection
+    jet: path_geometry.PathJet
+    section: path_geometry.PathSection
     ride: RideMoments | None
 
 
@@ -212,24 +201,36 @@ class Trajectory:
     the road; there is no roll. The vehicle frame B is F, unless a ride on
     springs moves it against F. The motion is exact: derivatives are taken of
     the splines, not of samples. It starts and ends at rest.
+
+    Attributes:
+        path: the path.
+        speed_profile: the fastest drive along it.
     """
 
     def __init__(self, lane_path: LanePath, speeds: Speeds):
-        """Makes the trajectory."""
-        self._path = SmoothPath(lane_path.points, lane_path.spacing)
-        self.speed_profile = find_speed_profile(
-            self._path, lane_path.speed_limits, speeds
+        self.path = path_geometry.SmoothPath(
+            lane_path.points, lane_path.spacing
         )
-        self._time_scaling = SplineDerivatives(
-            make_time_scaling(drive_positions(self.speed_profile)), 2
+        self.speed_profile = speed_profile.find_speed_profile(
+            self.path, lane_path.speed_limits, speeds
         )
-        self._travelled = PathIntegral(self._path, lambda jet: jet.speed)
+        self._time_scaling = path_geometry.SplineDerivatives(
+            speed_profile.make_time_scaling(
+                speed_profile.drive_positions(self.speed_profile)
+            ),
+            2,
+        )
+        self._travelled = path_geometry.PathIntegral(
+            self.path, lambda jet: jet.speed
+        )
         self._ride: BodyRide | None = None
 
     def with_positions(self, positions: np.ndarray) -> Trajectory:
         """Returns a drive along the same path; see `make_time_scaling`."""
         drive = copy.copy(self)
-        drive._time_scaling = SplineDerivatives(make_time_scaling(positions), 2)
+        drive._time_scaling = path_geometry.SplineDerivatives(
+            speed_profile.make_time_scaling(positions), 2
+        )
         return drive
 
     def with_ride(self, ride: BodyRide) -> Trajectory:
@@ -248,11 +249,6 @@ class Trajectory:
         """The length of the path [m]."""
         return self._travelled.total
 
-    @property
-    def path(self) -> SmoothPath:
-        """The path."""
-        return self._path
-
     def path_parameter(self, t: ArrayLike) -> list[np.ndarray]:
         """Returns the path parameter u and its rates u', u'' at (N,) times."""
         values = self._time_scaling.evaluate(np.atleast_1d(t))
@@ -261,14 +257,14 @@ class Trajectory:
     def at(self, t: ArrayLike) -> Moments:
         """Returns the path at (N,) times."""
         u, rate, acceleration = self.path_parameter(t)
-        jet, section = self._path.evaluate_with_section(u)
+        jet, section = self.path.evaluate_with_section(u)
         ride = None if self._ride is None else self._ride.at(t)
         return Moments(u, rate, acceleration, jet, section, ride)
 
     def path_motion(self, t: ArrayLike) -> FrameMotion:
         """Returns the path frame F's motion in the world at (N,) times."""
         u, rate, acceleration = self.path_parameter(t)
-        return _path_motion(self._path.evaluate(u), rate, acceleration)
+        return _path_motion(self.path.evaluate(u), rate, acceleration)
 
     def body_motion(self, t: ArrayLike) -> FrameMotion:
         """Returns the vehicle frame B's motion in the world at (N,) times."""
@@ -283,7 +279,7 @@ class Trajectory:
 
     def positions(self, t: ArrayLike) -> np.ndarray:
         """Returns the (N, 3) positions p_WF on the path at (N,) times [m]."""
-        return self._path.evaluate(self.path_parameter(t)[0]).p
+        return self.path.evaluate(self.path_parameter(t)[0]).p
 
     def pose(self, t: float) -> RigidTransform:
         """Returns X_WB at a time."""
@@ -291,7 +287,7 @@ class Trajectory:
 
     def poses(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Returns R_WB (N, 3, 3) and p_WB (N, 3) [m] at (N,) times."""
-        jet = self._path.evaluate(self.path_parameter(t)[0])
+        jet = self.path.evaluate(self.path_parameter(t)[0])
         R_WF = _rotations(jet)
         if self._ride is None:
             return R_WF, jet.p
@@ -326,21 +322,16 @@ def poses_and_motion(
     return X_WBs, motion
 
 
-def _rotations(jet: PathJet) -> np.ndarray:
+def _rotations(jet: path_geometry.PathJet) -> np.ndarray:
     yaw_pitch = np.stack([jet.yaw, -jet.climb], axis=1)
     # Capital letters: about the axes of the vehicle in turn.
     return Rotation.from_euler("ZY", yaw_pitch).as_matrix()
 
 
 def _path_motion(
-    jet: PathJet, rate: np.ndarray, acceleration: np.ndarray
+    jet: path_geometry.PathJet, rate: np.ndarray, acceleration: np.ndarray
 ) -> FrameMotion:
-    """Returns the motion of the path's frame F in the world.
-
-    Args:
-        rate: (N,) rates of its parameter [1/s].
-        acceleration: (N,) their rates [1/s^2].
-    """
+    """Returns the motion of F in the world; see `Moments`."""
     yaw_rate, pitch_rate = jet.dyaw * rate, -jet.dclimb * rate
     ddyaw = jet.ddyaw * rate**2 + jet.dyaw * acceleration
     ddclimb = jet.ddclimb * rate**2 + jet.dclimb * acceleration

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 import functools
 from typing import NamedTuple
 
@@ -29,14 +28,11 @@ from cns_drake.base.elementary import arctan2, product, rotated
 from cns_drake.motion.path_geometry import PathIntegral, PathJet
 from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
 
-# States computed at a time.
-_BLOCK = 64
 # Two directions are equal if the cosine of their angle is at least this.
 _PARALLEL = 1 - 1e-9
 
 
-@dataclass(frozen=True)
-class JointMotion:
+class JointMotion(NamedTuple):
     """An angle [rad] or a distance [m], its rate and its acceleration."""
 
     position: np.ndarray
@@ -61,11 +57,7 @@ class WheelMotion:
     """
 
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
-        """Prepares the wheel.
-
-        Args:
-            p_BC: position of the wheel's centre in the vehicle frame [m].
-        """
+        """Prepares the wheel, whose centre is at p_BC [m]."""
         self._x, self._y, self._radius = p_BC
         self._rolled = PathIntegral(
             trajectory.path, lambda jet: np.hypot(*self._ground_velocity(jet))
@@ -129,10 +121,7 @@ class WheelMotion:
 
 
 class _State(NamedTuple):
-    """Positions, velocities and accelerations of the whole plant.
-
-    Arrays of one more dimension are those of many times.
-    """
+    """Positions, velocities and accelerations of the whole plant."""
 
     q: np.ndarray
     v: np.ndarray
@@ -172,8 +161,6 @@ class VehicleMotion(LeafSystem):
         plant: MultibodyPlant,
         vehicle: ModelInstanceIndex,
         trajectory: Trajectory,
-        *,
-        period: float | None = None,
     ):
         """Prepares the motion.
 
@@ -181,8 +168,6 @@ class VehicleMotion(LeafSystem):
             plant: a finalized plant; only its model is used.
             vehicle: the model instance that moves.
             trajectory: motion of its base.
-            period: distance of the times at which states are mostly wanted;
-                many are computed at once, which takes a tenth of the time [s].
 
         Raises:
             ValueError: a joint of the vehicle is of another kind.
@@ -190,9 +175,6 @@ class VehicleMotion(LeafSystem):
         super().__init__()
         self._plant = plant
         self._trajectory = trajectory
-        self._period = period
-        # The last block of states, and its number.
-        self._block: tuple[int, _State] | None = None
         self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
         # Scratch to compute the motion of bodies from q and v; every use sets
         # all values that it reads.
@@ -254,39 +236,23 @@ class VehicleMotion(LeafSystem):
         )
 
     def _calc_state(self, context: Context, value: AbstractValue) -> None:
-        time, period = context.get_time(), self._period
-        tick = round(time / period) if period else 0
-        if period is None or tick * period != time:
-            states, row = self._states(np.array([time])), 0
-        else:
-            number, row = divmod(tick, _BLOCK)
-            if self._block is None or self._block[0] != number:
-                ticks = number * _BLOCK + np.arange(_BLOCK)
-                self._block = number, self._states(ticks * period)
-            states = self._block[1]
-        value.set_value(_State(*(values[row] for values in states)))
-
-    def _states(self, times: np.ndarray) -> _State:
-        """Returns the states at (N,) times; each depends on its time alone."""
-        plant, base = self._plant, self._base
-        moments = self._trajectory.at(times)
-        X_WBs, motion = poses_and_motion(moments)
-        q = np.empty((len(times), plant.num_positions()))
-        plant.SetPositions(self._plant_context, self._default_q)
-        for k, X_WB in enumerate(X_WBs):
-            plant.SetFreeBodyPose(self._plant_context, base, X_WB)
-            q[k] = plant.GetPositions(self._plant_context)
-        v, vdot = np.zeros((2, len(times), plant.num_velocities()))
+        plant, scratch, base = self._plant, self._plant_context, self._base
+        moments = self._trajectory.at(context.get_time())
+        (X_WB,), motion = poses_and_motion(moments)
+        plant.SetPositions(scratch, self._default_q)
+        plant.SetFreeBodyPose(scratch, base, X_WB)
+        q = plant.GetPositions(scratch).copy()
+        v, vdot = np.zeros((2, plant.num_velocities()))
         # A floating base's velocities are V_WB, expressed in the world.
         start = base.floating_velocities_start_in_v()
-        v[:, start : start + 6] = np.hstack([motion.w, motion.v])
-        vdot[:, start : start + 6] = np.hstack([motion.alpha, motion.a])
+        v[start : start + 6] = *motion.w[0], *motion.v[0]
+        vdot[start : start + 6] = *motion.alpha[0], *motion.a[0]
         for joint, move, sign in self._joints:
             wheel = move(moments)
-            q[:, joint.position_start()] = sign * wheel.position
-            v[:, joint.velocity_start()] = sign * wheel.rate
-            vdot[:, joint.velocity_start()] = sign * wheel.acceleration
-        return _State(q, v, vdot)
+            q[joint.position_start()] = sign * wheel.position[0]
+            v[joint.velocity_start()] = sign * wheel.rate[0]
+            vdot[joint.velocity_start()] = sign * wheel.acceleration[0]
+        value.set_value(_State(q, v, vdot))
 
     def _calc_position(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._state.Eval(context).q)
@@ -343,11 +309,7 @@ class VehicleSweep(LeafSystem):
     """
 
     def __init__(self, trajectory: Trajectory, offsets: np.ndarray):
-        """Declares the port.
-
-        Args:
-            offsets: (N,) times after the present one [s].
-        """
+        """Declares the port, for (N,) offsets [s]."""
         super().__init__()
         self._trajectory = trajectory
         self._offsets = np.array(offsets, dtype=float)

@@ -30,11 +30,7 @@ class BackgroundWriter:
     """
 
     def __init__(self, write: Callable[..., None]):
-        """Starts nothing yet.
-
-        Args:
-            write: takes each message, in a thread of its own.
-        """
+        """Starts nothing yet; `write` is called in a thread of its own."""
         self._write = write
         self._messages: queue.Queue = queue.Queue(_WAITING)
         self._held: list[tuple[Any, ...]] = []

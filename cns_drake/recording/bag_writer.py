@@ -9,7 +9,7 @@ over its messages by writing them again; see PartFile."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 import io
 import json
@@ -20,25 +20,15 @@ from typing import Any, NamedTuple
 from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
 
+from cns_drake.base import files
 from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    complete_part,
-    file_error,
-    part_path,
-    user_errors,
-    write_part,
-)
+from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.version import __version__
+from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.recording_folder import PartFile, RecordingFolder
 from cns_drake.recording.repair import Fault, read_records
-from cns_drake.recording.rosbag2_metadata import (
-    Topic,
-    channel_metadata,
-    describe_topic,
-    make_bag_information,
-    to_yaml,
-)
+from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
 from cns_drake.recording.schedule import START_NS, Schedule
 
 _CHUNK_BYTES = 1024 * 1024
@@ -48,51 +38,8 @@ _CHUNK_BYTES = 1024 * 1024
 _FLUSH_PERIOD_NS = 800_000_000
 
 
-class MessageOrder:
-    """The stamps of the last messages on each topic."""
-
-    def __init__(self, folder: Path, topics: Iterable[Topic]):
-        """Begins without messages."""
-        self._folder = folder
-        self._latched = {topic.name for topic in topics if topic.latched}
-        self._last_ns: dict[str, int] = {}
-
-    def takes(self, topic: str, stamp_ns: int) -> bool:
-        """Returns whether the recording takes the next message.
-
-        It does not take a latched message twice.
-
-        Raises:
-            InputError: the message is not later than the one before on its
-                topic, or before the epoch.
-        """
-        last_ns = self._last_ns.get(topic)
-        if last_ns is not None and topic in self._latched:
-            return False
-        if stamp_ns < 0:
-            raise InputError(
-                f"{self._folder}: {topic}: a message at {stamp_ns / 1e9:g} s, "
-                "before the epoch; begin the recording with a later start_ns"
-            )
-        if last_ns is not None and stamp_ns <= last_ns:
-            raise InputError(
-                f"{self._folder}: {topic}: a message at {stamp_ns / 1e9:g} s "
-                f"comes after that at {last_ns / 1e9:g} s; where a simulator "
-                "begins again, or its clock goes back, begin a new recording"
-            )
-        self._last_ns[topic] = stamp_ns
-        return True
-
-
 class RecordedMessage(NamedTuple):
-    """A message as `BagWriter.write` takes it.
-
-    Attributes:
-        topic: its name.
-        stamp_ns: the message's time [ns].
-        data: the serialised message.
-        sequence: the message's number on its topic.
-    """
+    """A message as `BagWriter.write` takes it."""
 
     topic: str
     stamp_ns: int
@@ -169,11 +116,13 @@ class BagWriter:
         self._custom_data = dict(custom_data or {})
         self._fingerprint = fingerprint
         self._part = part_path(self._files.mcap)
-        self._order = MessageOrder(folder, self._topics)
+        self._latched = {topic.name for topic in topics if topic.latched}
         self._is_open = False
         self._counts = {topic.name: 0 for topic in self._topics}
-        self._first_ns: int | None = None
-        self._last_ns: int | None = None
+        # Topic -> stamp of its last message [ns], and those of the first and
+        # the last of all messages.
+        self._latest_ns: dict[str, int] = {}
+        self._span_ns: tuple[int, int] | None = None
         self._flushed_ns = start_ns
         # False while a record is being written. After an interruption then, the
         # writer's index does not describe the file and must not be used.
@@ -277,8 +226,9 @@ class BagWriter:
                 f"{self._files.path}: the recording is not open; simulate "
                 "within its `with` block"
             )
-        if not self._order.takes(topic, stamp_ns):
+        if topic in self._latched and topic in self._latest_ns:
             return
+        self._check_order(topic, stamp_ns)
         channel_id = self._channel_ids[topic]
         # The block of `_writing`, written out: a context manager would take
         # a third of the time of a small message.
@@ -291,12 +241,29 @@ class BagWriter:
                 channel_id, stamp_ns, data, stamp_ns, sequence
             )
         except OSError as error:
-            raise file_error(self._part, error) from error
+            raise files.file_error(self._part, error) from error
         self._intact = True
         self._counts[topic] += 1
-        if self._first_ns is None:
-            self._first_ns = stamp_ns
-        self._last_ns = stamp_ns
+        self._latest_ns[topic] = stamp_ns
+        first_ns = self._span_ns[0] if self._span_ns else stamp_ns
+        self._span_ns = (first_ns, stamp_ns)
+
+    def _check_order(self, topic: str, stamp_ns: int) -> None:
+        """Refuses a message that is not later than the last on its topic."""
+        last_ns = self._latest_ns.get(topic, -1)
+        if stamp_ns > last_ns:
+            return
+        message = f"{topic}: a message at {stamp_ns / 1e9:g} s"
+        if stamp_ns < 0:
+            raise InputError(
+                f"{self._files.path}: {message}, before the epoch; begin the "
+                "recording with a later start_ns"
+            )
+        raise InputError(
+            f"{self._files.path}: {message} comes after that at "
+            f"{last_ns / 1e9:g} s; where a simulator begins again, or its "
+            "clock goes back, begin a new recording"
+        )
 
     def _open_part(self) -> PartFile:
         """Opens the part file, empty or with messages to take over."""
@@ -308,19 +275,18 @@ class BagWriter:
             and not self._part.exists()
         ):
             # The run was interrupted between the final names of the files.
-            stream = PartFile(self._files.mcap)
-            if self._goes_on(stream, preamble):
-                os.replace(self._files.mcap, self._part)
-                return stream
-            stream.close()
-            self._refuse_other_recording()
+            with contextlib.closing(PartFile(self._files.mcap)) as stream:
+                if self._goes_on(stream, preamble):
+                    os.replace(self._files.mcap, self._part)
+                else:
+                    self._refuse_other_recording()
         stream = PartFile(self._part)
         try:
             if not self._goes_on(stream, preamble):
                 self._refuse_other_recording()
                 stream.clear()
             if self._fingerprint:
-                write_part(self._files.fingerprint, self._fingerprint)
+                files.write_part(self._files.fingerprint, self._fingerprint)
         except BaseException:
             stream.close()
             raise
@@ -330,14 +296,11 @@ class BagWriter:
         """Returns whether the existing file is the start of this recording."""
         if not stream.replaying:
             return True
-        found = ""
-        for path in (
-            part_path(self._files.fingerprint),
-            self._files.fingerprint,
-        ):
-            if path.is_file():
-                found = path.read_text(encoding="utf-8", errors="replace")
-                break
+        found, path = "", self._files.fingerprint
+        if part_path(path).is_file():
+            path = part_path(path)
+        if path.is_file():
+            found = path.read_text(encoding="utf-8", errors="replace")
         return found == self._fingerprint and stream.starts_like(
             preamble.getvalue()
         )
@@ -359,34 +322,27 @@ class BagWriter:
             The writer, and topic -> channel id.
         """
         writer = Writer(
-            stream,  # type: ignore[arg-type]  # Needs tell, write, flush.
+            stream,
             chunk_size=_CHUNK_BYTES,
             compression=CompressionType.ZSTD,
         )
         writer.start(profile="ros2", library=f"cns-drake {__version__}")
         for name, value in self._attachments.items():
-            writer.add_attachment(
-                self._start_ns,
-                self._start_ns,
-                name,
-                *_encode(name, value),
-            )
-        schema_ids = {
-            message_type: writer.register_schema(
-                message_type,
-                "ros2msg",
-                ros_types.message_definition(message_type).encode(),
-            )
-            for message_type in dict.fromkeys(
-                topic.message_type for topic in self._topics
-            )
-        }
+            start_ns = self._start_ns
+            kind, content = _encode(name, value)
+            writer.add_attachment(start_ns, start_ns, name, kind, content)
+        schema_ids: dict[str, int] = {}
+        for topic in self._topics:
+            kind = topic.message_type
+            if kind not in schema_ids:
+                text = ros_types.message_definition(kind).encode()
+                schema_ids[kind] = writer.register_schema(kind, "ros2msg", text)
         channel_ids = {
             topic.name: writer.register_channel(
                 topic.name,
                 "cdr",
                 schema_ids[topic.message_type],
-                channel_metadata(topic),
+                rosbag2_metadata.channel_metadata(topic),
             )
             for topic in self._topics
         }
@@ -407,21 +363,21 @@ class BagWriter:
         renamed. Old ones that describe the MCAP go first: they must never
         describe the new one.
         """
-        files = self._files
+        own = self._files
         metadata = {"rosbag2_bagfile_information": self._information()}
-        write_part(files.scenario, to_yaml(self._scenario))
-        write_part(files.metadata, to_yaml(metadata))
+        files.write_part(own.scenario, to_yaml(self._scenario))
+        files.write_part(own.metadata, to_yaml(metadata))
         for path, value in self._beside.items():
-            write_part(path, to_yaml(value))
-        with user_errors(files.path):
-            files.metadata.unlink(missing_ok=True)
-            files.fingerprint.unlink(missing_ok=True)
-        complete_part(files.mcap)
-        for path in (*self._beside, files.scenario):
-            complete_part(path)
+            files.write_part(path, to_yaml(value))
+        with user_errors(own.path):
+            own.metadata.unlink(missing_ok=True)
+            own.fingerprint.unlink(missing_ok=True)
+        files.complete_part(own.mcap)
+        for path in (*self._beside, own.scenario):
+            files.complete_part(path)
         if self._fingerprint:
-            complete_part(files.fingerprint)
-        complete_part(files.metadata)
+            files.complete_part(own.fingerprint)
+        files.complete_part(own.metadata)
 
     def _close_part(self) -> None:
         """Ends an incomplete file as well as its state allows."""
@@ -448,19 +404,19 @@ class BagWriter:
 
     def _information(self) -> dict:
         """Returns rosbag2's description of the file."""
-        first_ns = self._start_ns if self._first_ns is None else self._first_ns
-        last_ns = first_ns if self._last_ns is None else self._last_ns
-        return make_bag_information(
+        first_ns, last_ns = self._span_ns or (self._start_ns, self._start_ns)
+        topics = [
+            rosbag2_metadata.describe_topic(
+                topic.name,
+                topic.message_type,
+                self._counts[topic.name],
+                rosbag2_metadata.channel_metadata(topic),
+            )
+            for topic in self._topics
+        ]
+        return rosbag2_metadata.make_bag_information(
             self._files.mcap.name,
-            [
-                describe_topic(
-                    topic.name,
-                    topic.message_type,
-                    self._counts[topic.name],
-                    channel_metadata(topic),
-                )
-                for topic in self._topics
-            ],
+            topics,
             start_ns=first_ns,
             end_ns=last_ns,
             custom_data=self._custom_data,
@@ -502,6 +458,14 @@ def take_over_frames(
     last = None
     if schedule.ends.keys() >= schedule.steps.keys():
         last = max(schedule.ends.values())
+
+    def write_frame() -> None:
+        nonlocal frames
+        frames += 1
+        for message in frame:
+            bag.write(*message)
+        frame.clear()
+
     for message in bag.interrupted():
         if (
             message.topic not in missing
@@ -515,15 +479,7 @@ def take_over_frames(
             tick += 1
             missing.update(schedule.due(tick))
             if frame_topic in missing:
-                frames += _write_frame(bag, frame)
+                write_frame()
     if not missing:
-        frames += _write_frame(bag, frame)
+        write_frame()
     return frames
-
-
-def _write_frame(bag: BagWriter, frame: list[RecordedMessage]) -> int:
-    """Writes a complete frame; returns 1."""
-    for message in frame:
-        bag.write(*message)
-    frame.clear()
-    return 1

@@ -1,15 +1,29 @@
 """Recording the sensors of a Diagram as ROS 2 messages."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import math
-from typing import Any
+from typing import Any, NamedTuple
 import warnings
 
+import numpy as np
+from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    EventStatus,
+    InputPort,
+    LeafSystem,
+)
+from pydrake.systems.sensors import (
+    CameraInfo,
+    ImageDepth32F,
+    ImageLabel16I,
+    ImageRgba8U,
+)
 
 from cns_drake.base.drives import ros_types
-from cns_drake.recording import messages
+from cns_drake.base.drives.point_layouts import to_labels, to_layout
+from cns_drake.recording import messages, object_messages, recorded_topics
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import (
@@ -17,26 +31,47 @@ from cns_drake.recording.recorded_topics import (
     ODOMETRY_TOPIC,
     TF_STATIC_TOPIC,
     TF_TOPIC,
-    recording_topics,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.recording.sensor_ports import (
-    CameraPorts,
-    ImuPorts,
-    ImuSamplesPort,
-    MotionPorts,
-    RecordedCamera,
-    RecordedSensor,
-    ValuePort,
-    objects_port,
-    scan_port,
-    sensor_port,
-)
 
 # Events of a periodic schedule come at multiples of the period. Their times
 # differ from a tick's only by rounding, at most this [ticks].
 _TICK_TOLERANCE = 1e-3
+_IMAGES = {
+    "color": ImageRgba8U,
+    "depth": ImageDepth32F,
+    "label": ImageLabel16I,
+}
+
+
+class RecordedCamera(NamedTuple):
+    """A camera of a recording.
+
+    Attributes:
+        info: its intrinsics.
+        X_BC: pose of its optical frame C (z ahead, y down) in the sensor's
+            frame B, whose pose is on the port `<camera>_pose`.
+    """
+
+    info: CameraInfo
+    X_BC: RigidTransform
+
+
+class RecordedSensor(NamedTuple):
+    """A further sensor of a recording, with a port of its name.
+
+    Attributes:
+        topic: where its messages go.
+        X_BC: pose of its frame C in the vehicle's frame B; the frame has the
+            sensor's name.
+        make_message: makes the message of a value of the port, from the value,
+            the name of the frame and the time [ns].
+    """
+
+    topic: Topic
+    X_BC: RigidTransform
+    make_message: Callable[[Any, str, int], Any]
 
 
 class McapRecorder(LeafSystem):
@@ -131,22 +166,11 @@ class McapRecorder(LeafSystem):
             ValueError: period and schedule are both given, or neither is.
         """
         super().__init__()
-        self._bag = bag
-        self._X_BCs = {name: X for name, X in X_BSs.items() if X is not None}
-        if X_BI is not None:
-            self._X_BCs[messages.IMU_FRAME] = X_BI
-        self._X_BI = X_BI
-        further = further or {}
-        self._X_BCs |= {name: sensor.X_BC for name, sensor in further.items()}
-        cameras = cameras or {}
-        layouts = layouts or {}
-        self._start_ns = start_ns
-        # The tick of the last event; there was none so far.
-        self._last_tick: int | None = None
+        cameras, further, layouts = cameras or {}, further or {}, layouts or {}
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
         if period is not None:
-            topics = recording_topics(
+            topics = recorded_topics.recording_topics(
                 X_BSs,
                 camera_names=cameras,
                 layouts=layouts,
@@ -155,32 +179,134 @@ class McapRecorder(LeafSystem):
             schedule = make_schedule({topic.name: period for topic in topics})
         assert schedule is not None
         self._schedule = schedule
-        self._period = schedule.period
+        self._bag = bag
+        self._start_ns = start_ns
+        self._X_BI = X_BI
+        self._imu_variances = imu_variances
+        # Frame of a sensor with a fixed place -> its pose on the vehicle.
+        self._X_BCs = {name: X for name, X in X_BSs.items() if X is not None}
+        if X_BI is not None:
+            self._X_BCs[messages.IMU_FRAME] = X_BI
+        self._X_BCs |= {name: sensor.X_BC for name, sensor in further.items()}
+        # Frame on the map -> the port with its pose, and the pose from there.
+        self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
+        # A topic, and what makes the messages at its times, on others as well.
+        self._streams: list[
+            tuple[Topic, Callable[[Context, int], dict[Topic, Any]]]
+        ] = []
+        # The tick of the last event; there was none so far.
+        self._last_tick: int | None = None
 
         # The order of the ports is that of these lines.
-        self._motion = MotionPorts(self)
-        self._imu = self._imu_samples = None
+        self._odometry = self._declare("odometry", object())
+        self._imu_samples: InputPort | None = None
         if with_imu_samples:
-            self._imu_samples = ImuSamplesPort(self, imu_variances)
+            self._imu_samples = self._declare("imu_samples", object())
         else:
-            self._imu = ImuPorts(self, imu_variances)
-        self._scenery: list[CameraPorts | ValuePort] = []
+            self._specific_force, self._angular_velocity = (
+                self.DeclareVectorInputPort(name, 3)
+                for name in ("specific_force", "angular_velocity")
+            )
         if with_objects:
-            self._scenery.append(objects_port(self))
+            self._add_objects()
         for name in X_BSs:
-            layout = layouts.get(name, "cns")
-            self._scenery.append(scan_port(self, name, layout))
+            self._add_lidar(name, layouts.get(name, "cns"))
         for name, X_BS in X_BSs.items():
             if X_BS is None:
-                self._motion.add(self, name, RigidTransform())
+                self._add_pose(name, RigidTransform())
         for name, camera in cameras.items():
-            self._scenery.append(CameraPorts(self, name, camera))
-            self._motion.add(self, name, camera.X_BC)
+            self._add_camera(name, camera.info)
+            self._add_pose(name, camera.X_BC)
         for name, sensor in further.items():
-            self._scenery.append(sensor_port(self, name, sensor))
+            self._add_sensor(name, sensor)
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
         self._declare_events()
         self.DeclareForcedPublishEvent(self._publish)
+
+    def _declare(self, name: str, example: object) -> InputPort:
+        """Declares an abstract port, for any value if that is an object."""
+        return self.DeclareAbstractInputPort(name, Value(example))
+
+    def _add_pose(self, name: str, X_PC: RigidTransform) -> None:
+        """Declares the port of a frame P, in which a sensor has a pose."""
+        port = self._declare(f"{name}_pose", RigidTransform())
+        self._poses[name] = (port, X_PC)
+
+    def _add_port(
+        self, name: str, topic: Topic, make: Callable[[Any, int], dict]
+    ) -> None:
+        """Declares a port; `make` takes its value and the time [ns]."""
+        port = self._declare(name, object())
+
+        def make_all(context: Context, stamp_ns: int) -> dict[Topic, Any]:
+            value = _value_of(port, context)
+            return {} if value is None else make(value, stamp_ns)
+
+        self._streams.append((topic, make_all))
+
+    def _add_objects(self) -> None:
+        detections = object_messages.BoxMessages(
+            object_messages.marked_detections
+        )
+        boxes = object_messages.BoxMessages(object_messages.marked_boxes)
+
+        def make(objects: object_messages.RecordedObjects, ns: int) -> dict:
+            table = object_messages.motion_table(objects)
+            return {
+                recorded_topics.OBJECTS_TOPIC: detections.encode(objects, ns),
+                recorded_topics.BOXES_TOPIC: boxes.encode(objects, ns),
+                recorded_topics.MOTION_TOPIC: messages.encode_point_cloud(
+                    table, messages.MAP_FRAME, ns
+                ),
+            }
+
+        self._add_port("objects", recorded_topics.OBJECTS_TOPIC, make)
+
+    def _add_lidar(self, name: str, layout: str) -> None:
+        topic = recorded_topics.points_topic(name)
+        encode = messages.encode_point_cloud
+
+        def make(scan: np.ndarray, stamp_ns: int) -> dict:
+            made = {topic: encode(to_layout(scan, layout), name, stamp_ns)}
+            if layout != "cns":
+                labels = encode(to_labels(scan), name, stamp_ns)
+                made[recorded_topics.labels_topic(name)] = labels
+            return made
+
+        self._add_port(f"{name}_scan", topic, make)
+
+    def _add_sensor(self, name: str, sensor: RecordedSensor) -> None:
+        self._add_port(
+            name,
+            sensor.topic,
+            lambda value, stamp_ns: {
+                sensor.topic: sensor.make_message(value, name, stamp_ns)
+            },
+        )
+
+    def _add_camera(self, name: str, info: CameraInfo) -> None:
+        topic = recorded_topics.camera_info_topic(name)
+        ports = {
+            kind: self._declare(f"{name}_{kind}", image())
+            for kind, image in _IMAGES.items()
+        }
+
+        def make_all(context: Context, stamp_ns: int) -> dict[Topic, Any]:
+            made = {}
+            for kind, port in ports.items():
+                image = _value_of(port, context)
+                if image is not None:
+                    encoding = messages.ENCODINGS[kind]
+                    made[recorded_topics.image_topic(name, kind)] = (
+                        messages.make_image(
+                            image.data, encoding, name, stamp_ns
+                        )
+                    )
+            if made:
+                made[topic] = messages.make_camera_info(info, name, stamp_ns)
+            return made
+
+        self._streams.append((topic, make_all))
 
     def _declare_events(self) -> None:
         """Declares an event for each tick that needs one."""
@@ -200,8 +326,8 @@ class McapRecorder(LeafSystem):
         if waits and end % step:
             # The last samples come after all else.
             self.DeclarePeriodicPublishEvent(
-                period_sec=end * self._period,
-                offset_sec=end * self._period,
+                period_sec=end * self._schedule.period,
+                offset_sec=end * self._schedule.period,
                 publish=self._publish,
             )
 
@@ -216,59 +342,113 @@ class McapRecorder(LeafSystem):
             self._write(TF_STATIC_TOPIC, tf, stamp_ns, 0)
         outgoing: dict[Topic, Any] = {}
         if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
-            outgoing |= self._motion.messages(context, stamp_ns)
-        if IMU_TOPIC.name in due or self._imu_samples is not None:
-            outgoing |= self._imu_messages(context, tick, stamp_ns)
+            outgoing |= self._motion_messages(context, stamp_ns)
+        if self._imu_samples is not None:
+            outgoing |= self._write_samples(context, tick)
+        elif IMU_TOPIC.name in due:
+            outgoing |= self._imu_message(context, stamp_ns)
         self._last_tick = tick
-        for ports in self._scenery:
-            if ports.due_topic.name in due:
-                outgoing |= ports.messages(context, stamp_ns)
+        for topic, make in self._streams:
+            if topic.name in due:
+                outgoing |= make(context, stamp_ns)
         for topic, message in outgoing.items():
             if topic.name in due:
                 number = tick // self._schedule.steps[topic.name]
                 self._write(topic, message, stamp_ns, number)
         return EventStatus.Succeeded()
 
-    def _imu_messages(
-        self, context: Context, tick: int, stamp_ns: int
+    def _motion_messages(
+        self, context: Context, stamp_ns: int
     ) -> dict[Topic, Any]:
-        """Writes samples of earlier ticks; returns the message of this one."""
-        if self._imu is not None:
-            R_WB = self._motion.orientation(context)
-            R_WI = None
-            if R_WB is not None and self._X_BI is not None:
-                R_WI = R_WB @ self._X_BI.rotation()
-            message = self._imu.message(context, R_WI, stamp_ns)
-            return {} if message is None else {IMU_TOPIC: message}
-        assert self._imu_samples is not None
+        """Returns the messages of odometry and transforms."""
+        odometry = _value_of(self._odometry, context)
+        X_WCs = {}
+        if odometry is not None:
+            X_WCs[messages.BASE_FRAME] = odometry.X_WB
+        for name, (port, X_PC) in self._poses.items():
+            if port.HasValue(context):
+                X_WCs[name] = port.Eval(context) @ X_PC
+        made = {}
+        if X_WCs:
+            made[TF_TOPIC] = messages.make_tf(
+                messages.MAP_FRAME, X_WCs, stamp_ns
+            )
+        if odometry is not None:
+            made[ODOMETRY_TOPIC] = messages.make_odometry(
+                odometry.X_WB, odometry.V_WB_B, stamp_ns
+            )
+        return made
+
+    def _imu_message(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
+        """Returns the message of the ports with the present sample, if any."""
+        turn = _value_of(self._angular_velocity, context)
+        force = _value_of(self._specific_force, context)
+        if turn is None and force is None:
+            return {}
+        odometry, quat_xyzw = _value_of(self._odometry, context), None
+        if odometry is not None and self._X_BI is not None:
+            R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
+            quat_xyzw = messages.to_quat_xyzw(R_WI)
+        message = messages.make_imu(
+            quat_xyzw, turn, force, stamp_ns, self._imu_variances
+        )
+        return {IMU_TOPIC: message}
+
+    def _write_samples(self, context: Context, tick: int) -> dict[Topic, Any]:
+        """Writes samples of earlier ticks; returns the message of this one.
+
+        Raises:
+            ValueError: the port shows too few samples.
+        """
+        step = self._schedule.steps[IMU_TOPIC.name]
+        last = min(tick, self._schedule.ends.get(IMU_TOPIC.name, tick))
         since = tick - 1 if self._last_tick is None else self._last_tick
-        outgoing = {}
-        for number, sample_ns, message in self._imu_samples.messages(
-            context, self._schedule, since, tick, self._start_ns
-        ):
-            if number * self._schedule.steps[IMU_TOPIC.name] == tick:
-                outgoing[IMU_TOPIC] = message
+        numbers = range(since // step + 1, last // step + 1)
+        assert self._imu_samples is not None
+        samples = _value_of(self._imu_samples, context)
+        if samples is None or not numbers:
+            return {}
+        if numbers[0] < samples.first:
+            raise ValueError("imu_samples: the oldest samples are missing")
+        made = {}
+        for number in numbers:
+            row = number - samples.first
+            stamp_ns = self._start_ns + self._schedule.time_ns(number * step)
+            message = messages.make_imu(
+                samples.quat_xyzw[row],
+                samples.angular_velocity[row],
+                samples.specific_force[row],
+                stamp_ns,
+                self._imu_variances,
+            )
+            if number * step == tick:
+                made[IMU_TOPIC] = message
             else:
-                self._write(IMU_TOPIC, message, sample_ns, number)
-        return outgoing
+                self._write(IMU_TOPIC, message, stamp_ns, number)
+        return made
 
     def _write(
         self, topic: Topic, message: Any, stamp_ns: int, sequence: int
     ) -> None:
-        data = message
         if not isinstance(message, bytes):
-            data = ros_types.serialize(message)
-        self._bag.write(topic.name, stamp_ns, data, sequence)
+            message = ros_types.serialize(message)
+        self._bag.write(topic.name, stamp_ns, message, sequence)
 
     def _tick(self, time: float) -> int:
-        ticks = time / self._period
+        period = self._schedule.period
+        ticks = time / period
         if abs(ticks - round(ticks)) > _TICK_TOLERANCE:
             raise ValueError(
-                f"time {time} s is no multiple of the period {self._period} s"
+                f"time {time} s is no multiple of the period {period} s"
             )
         if round(ticks) < 0:
             raise ValueError(f"time {time} s: a recording starts at time zero")
         return round(ticks)
+
+
+def _value_of(port: InputPort, context: Context) -> Any:
+    """Returns the value of a port; None if it is not connected."""
+    return port.Eval(context) if port.HasValue(context) else None
 
 
 def _warn_of_early_start(context: Context) -> EventStatus:

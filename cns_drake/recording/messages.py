@@ -15,13 +15,6 @@ from pydrake.systems.sensors import CameraInfo
 
 from cns_drake.base.drives import ros_types
 from cns_drake.base.drives.point_layouts import point_field_datatype
-from cns_drake.base.drives.ros_types import (
-    IMU,
-    ODOMETRY,
-    POINT_CLOUD,
-    TF,
-    message_class,
-)
 
 MAP_FRAME = "map"
 BASE_FRAME = "base_link"
@@ -30,6 +23,8 @@ _NS_PER_S = 1_000_000_000
 # The variance of a value without noise, in the square of its unit: its error is
 # below a millionth. ROS takes a covariance of zeros for an unknown one.
 _EXACT = 1e-12
+# The covariance of an exact pose or twist, row by row: (36,).
+EXACT_COVARIANCE = _EXACT * np.eye(6).ravel()
 # Stands for numbers that change, in a message that is made once. It can be the
 # nanoseconds of a stamp, and no part of a text.
 _MARK = 0x3A17C0DE
@@ -52,8 +47,6 @@ def encode_point_cloud(
             each becomes a point field under its own name and offset.
             Padding is written as zeros, so that equal points give equal
             bytes.
-        frame_id: the frame in which the points are expressed.
-        stamp_ns: the time of the scan [ns].
     """
     size = points.dtype.itemsize
     rows = np.ascontiguousarray(points).view(np.uint8).reshape(-1, size)
@@ -76,15 +69,14 @@ def encode_point_cloud(
 def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
     """Returns what is about the stamp, the width and the data of a cloud."""
     data = ros_types.serialize(
-        message_class(POINT_CLOUD)(
+        ros_types.make_message(
+            ros_types.POINT_CLOUD,
             header=make_header(frame_id, _MARK * _NS_PER_S + _MARK),
             height=1,
             width=_MARK,
-            fields=list(_point_fields(dtype)[0]),
-            is_bigendian=False,
+            fields=_point_fields(dtype)[0],
             point_step=dtype.itemsize,
             row_step=_MARK,
-            data=np.zeros(0, np.uint8),
             is_dense=True,
         )
     )
@@ -94,21 +86,13 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
 
 
 @functools.cache
-def _point_fields(dtype: np.dtype) -> tuple[tuple[Any, ...], list[int]]:
+def _point_fields(dtype: np.dtype) -> tuple[list[tuple], list[int]]:
     """Returns the PointFields of records, and the bytes that none has."""
-    point_field = message_class("sensor_msgs/msg/PointField")
     fields, padding = [], set(range(dtype.itemsize))
     for name, (scalar, offset, *_) in (dtype.fields or {}).items():
         padding.difference_update(range(offset, offset + scalar.itemsize))
-        fields.append(
-            point_field(
-                name=name,
-                offset=offset,
-                datatype=point_field_datatype(scalar),
-                count=1,
-            )
-        )
-    return tuple(fields), sorted(padding)
+        fields.append((name, offset, point_field_datatype(scalar), 1))
+    return fields, sorted(padding)
 
 
 def make_imu(
@@ -125,7 +109,6 @@ def make_imu(
         angular_velocity: w_WI_I, shape (3,) [rad/s].
         specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
             ground +9.81 along z.
-        stamp_ns: the time of the measurement [ns].
         variances: those of each axis of the specific force [m^2/s^4] and the
             angular velocity [rad^2/s^2].
 
@@ -133,23 +116,19 @@ def make_imu(
         The message. A value without noise has a standard deviation of 1e-6.
         The covariance of a value that is None begins with -1 (REP 145).
     """
-    zero = np.zeros(3)
-    x, y, z, w = (0.0, 0.0, 0.0, 1.0) if quat_xyzw is None else quat_xyzw
-    return message_class(IMU)(
+    force_variance, turn_variance = variances
+    return ros_types.make_message(
+        ros_types.IMU,
         header=make_header(IMU_FRAME, stamp_ns),
-        orientation=message_class("geometry_msgs/msg/Quaternion")(
-            x=x, y=y, z=z, w=w
-        ),
+        orientation=(0.0, 0.0, 0.0, 1.0) if quat_xyzw is None else quat_xyzw,
         orientation_covariance=_covariance(quat_xyzw, 0.0),
-        angular_velocity=make_vector(
-            zero if angular_velocity is None else angular_velocity
+        angular_velocity=angular_velocity,
+        angular_velocity_covariance=_covariance(
+            angular_velocity, turn_variance
         ),
-        angular_velocity_covariance=_covariance(angular_velocity, variances[1]),
-        linear_acceleration=make_vector(
-            zero if specific_force is None else specific_force
-        ),
+        linear_acceleration=specific_force,
         linear_acceleration_covariance=_covariance(
-            specific_force, variances[0]
+            specific_force, force_variance
         ),
     )
 
@@ -164,65 +143,40 @@ def _covariance(value: object, variance: float) -> np.ndarray:
     return covariance
 
 
-def exact_covariance() -> np.ndarray:
-    """Returns the covariance of an exact pose or twist, row by row: (36,)."""
-    return _EXACT * np.eye(6).ravel()
-
-
 def make_odometry(
     X_WB: RigidTransform, V_WB_B: SpatialVelocity, stamp_ns: int
 ) -> Any:
     """Returns an Odometry message: pose in the map, twist in the vehicle.
 
-    Args:
-        V_WB_B: its spatial velocity, expressed in B [rad/s, m/s].
-        stamp_ns: the time of both [ns].
-
-    Returns:
-        The message; the values are exact, with standard deviations of 1e-6.
+    The velocity V_WB_B is expressed in B [rad/s, m/s]. The values are exact,
+    with standard deviations of 1e-6.
     """
-    pose = make_pose(X_WB)
-    twist = message_class("geometry_msgs/msg/Twist")(
-        linear=make_vector(V_WB_B.translational()),
-        angular=make_vector(V_WB_B.rotational()),
-    )
-    return message_class(ODOMETRY)(
+    twist = (V_WB_B.translational(), V_WB_B.rotational())
+    return ros_types.make_message(
+        ros_types.ODOMETRY,
         header=make_header(MAP_FRAME, stamp_ns),
         child_frame_id=BASE_FRAME,
-        pose=message_class("geometry_msgs/msg/PoseWithCovariance")(
-            pose=pose, covariance=exact_covariance()
-        ),
-        twist=message_class("geometry_msgs/msg/TwistWithCovariance")(
-            twist=twist, covariance=exact_covariance()
-        ),
+        pose=(_place(X_WB), EXACT_COVARIANCE),
+        twist=(twist, EXACT_COVARIANCE),
     )
 
 
 def make_tf(
     parent: str, X_PCs: dict[str, RigidTransform], stamp_ns: int
 ) -> Any:
-    """Returns a TFMessage with the poses of child frames in one parent.
-
-    Args:
-        parent: name of the parent frame P.
-        X_PCs: name of each child frame C -> its pose in P.
-        stamp_ns: the time of all of them [ns].
-    """
-    transform = message_class("geometry_msgs/msg/Transform")
-    transform_stamped = message_class("geometry_msgs/msg/TransformStamped")
-    return message_class(TF)(
+    """Returns a TFMessage with the poses of child frames C in one parent P."""
+    header = make_header(parent, stamp_ns)
+    return ros_types.make_message(
+        ros_types.TF,
         transforms=[
-            transform_stamped(
-                header=make_header(parent, stamp_ns),
-                child_frame_id=child,
-                transform=transform(
-                    translation=make_vector(X_PC.translation()),
-                    rotation=_make_quaternion(X_PC.rotation()),
-                ),
-            )
-            for child, X_PC in X_PCs.items()
-        ]
+            (header, child, _place(X_PC)) for child, X_PC in X_PCs.items()
+        ],
     )
+
+
+def _place(X: RigidTransform) -> tuple[np.ndarray, tuple[float, ...]]:
+    """Returns the fields of a Pose, or of a Transform."""
+    return X.translation(), to_quat_xyzw(X.rotation())
 
 
 def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
@@ -233,30 +187,9 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
 
 def make_header(frame_id: str, stamp_ns: int) -> Any:
     """Returns the header of a message."""
-    sec, nanosec = divmod(stamp_ns, _NS_PER_S)
-    time = message_class("builtin_interfaces/msg/Time")
-    return message_class("std_msgs/msg/Header")(
-        stamp=time(sec=sec, nanosec=nanosec), frame_id=frame_id
-    )
-
-
-def make_pose(X: RigidTransform) -> Any:
-    """Returns a pose."""
-    return message_class("geometry_msgs/msg/Pose")(
-        position=make_vector(X.translation(), "Point"),
-        orientation=_make_quaternion(X.rotation()),
-    )
-
-
-def _make_quaternion(R: RotationMatrix) -> Any:
-    x, y, z, w = to_quat_xyzw(R)
-    return message_class("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w)
-
-
-def make_vector(xyz: np.ndarray, kind: str = "Vector3") -> Any:
-    """Returns a vector of three numbers, or a `Point`."""
-    return message_class(f"geometry_msgs/msg/{kind}")(
-        x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
+    stamp = divmod(stamp_ns, _NS_PER_S)
+    return ros_types.make_message(
+        "std_msgs/msg/Header", stamp=stamp, frame_id=frame_id
     )
 
 
@@ -269,16 +202,15 @@ def make_image(
         pixels: (height, width, channels), little-endian; depth in metres.
         encoding: one of `ENCODINGS`.
         frame_id: the camera's frame, z ahead and y down.
-        stamp_ns: the time of the image [ns].
     """
     height, width, _ = pixels.shape
     data = np.ascontiguousarray(pixels).view(np.uint8).reshape(-1)
-    return message_class(IMAGE)(
+    return ros_types.make_message(
+        IMAGE,
         header=make_header(frame_id, stamp_ns),
         height=height,
         width=width,
         encoding=encoding,
-        is_bigendian=0,
         step=len(data) // height,
         data=data,
     )
@@ -287,13 +219,11 @@ def make_image(
 def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
     """Returns a CameraInfo message of a pinhole without distortion.
 
-    Args:
-        frame_id: the camera's frame, z ahead and y down.
-        stamp_ns: the time of the image [ns].
+    The camera's frame has z ahead and y down.
     """
     K = camera.intrinsic_matrix()
-    region = message_class("sensor_msgs/msg/RegionOfInterest")
-    return message_class(CAMERA_INFO)(
+    return ros_types.make_message(
+        CAMERA_INFO,
         header=make_header(frame_id, stamp_ns),
         height=camera.height(),
         width=camera.width(),
@@ -302,7 +232,4 @@ def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
         k=K.ravel(),
         r=np.eye(3).ravel(),
         p=np.column_stack([K, np.zeros(3)]).ravel(),
-        binning_x=0,
-        binning_y=0,
-        roi=region(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
     )

@@ -32,10 +32,6 @@ def recording_topics(
     """Returns the topics of a recording.
 
     Args:
-        lidar_names: names of its LiDARs.
-        camera_names: names of its cameras.
-        with_imu: whether it has an IMU.
-        with_odometry: whether it has odometry.
         layouts: LiDAR name -> layout of its points, if not `cns`.
         with_objects: whether it has boxes of moving objects.
         further: topics of further sensors.
@@ -63,11 +59,7 @@ def recording_topics(
 def make_calibration(
     X_BSs: Mapping[str, RigidTransform], X_BI: RigidTransform | None
 ) -> dict:
-    """Returns the sensor frames as a JSON value, for an attachment.
-
-    Args:
-        X_BSs: LiDAR name -> pose of its frame S in the vehicle frame B.
-        X_BI: pose of the imu frame I in B, None if there is none.
+    """Returns the frames of LiDARs S and the IMU I as a JSON value.
 
     Returns:
         Frame name -> parent frame, `translation` [m] and `quat_xyzw`.

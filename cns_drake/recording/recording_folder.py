@@ -2,6 +2,7 @@
 
 import contextlib
 import fcntl
+import io
 import os
 from pathlib import Path
 
@@ -67,7 +68,7 @@ class RecordingFolder:
             )
 
 
-class PartFile:
+class PartFile(io.BufferedRandom):
     """A binary file for one writer at a time.
 
     A process that resumes an interrupted file writes it again from its start.
@@ -77,6 +78,9 @@ class PartFile:
     in an empty file.
 
     The file is locked until it is closed or its process ends in any way.
+
+    Attributes:
+        replaying: whether all bytes written so far were there already.
     """
 
     def __init__(self, path: Path):
@@ -87,74 +91,57 @@ class PartFile:
             InputError: another process is writing it.
         """
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        self._stream = os.fdopen(descriptor, "r+b")
+        super().__init__(io.FileIO(descriptor, "r+b"))
         try:
             self._lock(path)
         except BaseException:
-            self._stream.close()
+            self.close()
             raise
-        self._replaying = os.fstat(descriptor).st_size > 0
-
-    @property
-    def replaying(self) -> bool:
-        """Whether all bytes written so far were there already."""
-        return self._replaying
+        self.replaying = os.fstat(descriptor).st_size > 0
 
     def starts_like(self, content: bytes) -> bool:
         """Returns whether the existing file starts with this content.
 
         A file that ends within the content counts, too.
         """
-        self._stream.seek(0)
-        found = self._stream.read(len(content))
-        self._stream.seek(0)
+        self.seek(0)
+        found = self.read(len(content))
+        self.seek(0)
         return content.startswith(found)
 
     def clear(self) -> None:
         """Empties the file."""
-        self._stream.seek(0)
-        self._stream.truncate()
-        self._replaying = False
+        self.seek(0)
+        self.truncate()
+        self.replaying = False
 
-    def tell(self) -> int:
-        """Returns the position of the next byte."""
-        return self._stream.tell()
-
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> int:  # type: ignore[override]
         """Writes the next bytes."""
-        if self._replaying:
-            start = self._stream.tell()
-            if self._stream.read(len(data)) == data:
-                return
-            self._stream.seek(start)
-            self._stream.truncate()
-            self._replaying = False
-        self._stream.write(data)
-
-    def flush(self) -> None:
-        """Hands everything to the operating system."""
-        self._stream.flush()
+        if self.replaying:
+            start = self.tell()
+            if self.read(len(data)) == data:
+                return len(data)
+            self.seek(start)
+            self.truncate()
+            self.replaying = False
+        return super().write(data)
 
     def finish(self) -> None:
         """Ends the file here and flushes it to the disk."""
-        self._stream.truncate()
-        self._stream.flush()
-        os.fsync(self._stream.fileno())
-
-    def close(self) -> None:
-        """Closes the file and releases the lock."""
-        self._stream.close()
+        self.truncate()
+        self.flush()
+        os.fsync(self.fileno())
 
     def _lock(self, path: Path) -> None:
         # Some network file systems have no locks; then there is none.
         with contextlib.suppress(OSError):
             try:
-                fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(self, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise InputError(
                     f"{path}: another process is writing this file"
                 ) from None
         # Between opening and locking, that process may have completed the
         # file and given it another name.
-        if not os.path.samestat(os.stat(path), os.fstat(self._stream.fileno())):
+        if not os.path.samestat(os.stat(path), os.fstat(self.fileno())):
             raise InputError(f"{path}: another process has completed this file")

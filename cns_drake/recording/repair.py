@@ -6,15 +6,14 @@ index. It checks every size against the file and a limit before it reserves
 memory, checks every checksum, and finds the next intact chunk behind damage."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-import contextlib
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 import itertools
 import os
 from pathlib import Path
 import re
 import struct
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -40,19 +39,9 @@ from cns_drake.base.drives.mcap_file import (
     uncompress,
 )
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    check_regular,
-    check_writable,
-    complete_part,
-    part_path,
-    user_errors,
-)
+from cns_drake.base.files import check_writable, completing, user_errors
 from cns_drake.base.version import __version__
-from cns_drake.recording.rosbag2_metadata import (
-    describe_topic,
-    make_bag_information,
-    to_yaml,
-)
+from cns_drake.recording import rosbag2_metadata
 
 _LAST_OPCODE = max(Opcode)
 # The beginning of a chunk: the record's opcode and length, two times, size and
@@ -77,6 +66,20 @@ _FAULTS = (
     struct.error,
     zstandard.ZstdError,
 )
+# Opcode -> what reads the content of a record; those of chunks first.
+_IN_CHUNKS: dict[int, Callable[[bytes], McapRecord]] = {
+    Opcode.MESSAGE: lambda content: Message.read(
+        RecordContent(content), len(content)
+    ),
+    Opcode.SCHEMA: lambda content: Schema.read(RecordContent(content)),
+    Opcode.CHANNEL: lambda content: Channel.read(RecordContent(content)),
+}
+_READERS = {
+    **_IN_CHUNKS,
+    Opcode.HEADER: lambda content: Header.read(RecordContent(content)),
+    Opcode.METADATA: lambda content: Metadata.read(RecordContent(content)),
+    Opcode.ATTACHMENT: parse_attachment,
+}
 # Schemas and channels are kept in memory; more of them is no recording.
 _DEFINITIONS_LIMIT = 64 * 1024 * 1024
 _ROSBAG2 = "rosbag2"
@@ -195,33 +198,17 @@ def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
 
 def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
     """Yields the records of interest that a record is or contains."""
-    stream = RecordContent(content)
     if opcode == Opcode.CHUNK:
-        inner = RecordContent(uncompress(Chunk.read(stream)))
+        inner = RecordContent(uncompress(Chunk.read(RecordContent(content))))
         while inner.left:
             opcode, length = RECORD_HEADER.unpack(
                 inner.read(RECORD_HEADER.size)
             )
-            yield from _parse_content(opcode, inner.read(length))
-    elif opcode == Opcode.HEADER:
-        yield Header.read(stream)
-    elif opcode == Opcode.METADATA:
-        yield Metadata.read(stream)
-    elif opcode == Opcode.ATTACHMENT:
-        yield parse_attachment(content)
-    else:
-        yield from _parse_content(opcode, content)
-
-
-def _parse_content(opcode: int, content: bytes) -> Iterator[McapRecord]:
-    """Like `_parse`, for the records that a chunk may contain."""
-    stream = RecordContent(content)
-    if opcode == Opcode.MESSAGE:
-        yield Message.read(stream, len(content))
-    elif opcode == Opcode.SCHEMA:
-        yield Schema.read(stream)
-    elif opcode == Opcode.CHANNEL:
-        yield Channel.read(stream)
+            content = inner.read(length)
+            if opcode in _IN_CHUNKS:
+                yield _IN_CHUNKS[opcode](content)
+    elif opcode in _READERS:
+        yield _READERS[opcode](content)
 
 
 @dataclass(frozen=True)
@@ -275,147 +262,117 @@ def repair_mcap(
                 f"{output}: the file already exists; remove it or give "
                 "another one"
             )
+
+    def read(before: int) -> Iterator[McapRecord | Fault]:
+        """Reads the file, after so many bytes of the work [bytes]."""
+        with user_errors(path), open(path, "rb") as stream:
+            for record in read_records(stream):
+                on_bytes(before + stream.tell(), 2 * size)
+                yield record
+
     # Definitions may come behind messages that need them.
-    definitions = _Definitions()
-    for record in _read(path, lambda done: on_bytes(done, 2 * size)):
-        definitions.take(record, path)
-    if definitions.header is None and not definitions.channels:
-        raise InputError(f"{path}: nothing of an MCAP file can be read")
+    definitions = _find_definitions(read(0), path)
     check_writable(output)
-    part = part_path(output)
-    try:
-        with user_errors(part), open(part, "wb") as stream:
-            copy = _Copy(stream, definitions)
-            for record in _read(
-                path, lambda done: on_bytes(size + done, 2 * size)
-            ):
-                copy.take(record)
-            copy.finish(output.name)
-            stream.flush()
-            os.fsync(stream.fileno())
-        complete_part(output)
-        on_bytes(2 * size, 2 * size)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        raise
-    return Repair(
-        output=output,
-        num_messages=sum(copy.counts.values()),
-        seconds=(copy.end_ns - copy.start_ns) / 1e9,
-        num_faults=copy.num_faults,
-        first_fault=copy.first_fault,
-    )
+    with (
+        completing(output) as part,
+        user_errors(part),
+        open(part, "wb") as stream,
+    ):
+        repair = _copy(read(size), stream, definitions, output)
+    on_bytes(2 * size, 2 * size)
+    return repair
 
 
-def _read(
-    path: Path, on_position: Callable[[int], None]
-) -> Iterator[McapRecord | Fault]:
-    check_regular(path)
-    with user_errors(path), open(path, "rb") as stream:
-        for record in read_records(stream):
-            on_position(stream.tell())
-            yield record
-
-
-class _Definitions:
-    """Definitions that messages refer to.
+class _Definitions(NamedTuple):
+    """What messages refer to.
 
     Attributes:
-        header: the file's header, if readable.
+        profile: of the file's header, if readable.
         schemas: by id; the first one of an id counts.
         channels: likewise, but only those whose schema is known.
     """
 
-    def __init__(self) -> None:
-        self.header: Header | None = None
-        self.schemas: dict[int, Schema] = {}
-        self._all_channels: dict[int, Channel] = {}
-        self._kept_bytes = 0
+    profile: str
+    schemas: dict[int, Schema]
+    channels: dict[int, Channel]
 
-    @property
-    def channels(self) -> dict[int, Channel]:
-        return {
-            number: channel
-            for number, channel in self._all_channels.items()
-            if channel.schema_id == 0 or channel.schema_id in self.schemas
-        }
 
-    def take(self, record: McapRecord | Fault, path: Path) -> None:
-        """Keeps what a record defines."""
-        if isinstance(record, Header) and self.header is None:
-            self.header = record
+def _find_definitions(
+    records: Iterable[McapRecord | Fault], path: Path
+) -> _Definitions:
+    """Returns what records define.
+
+    Raises:
+        InputError: they define nothing, or too much.
+    """
+    header: Header | None = None
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    kept_bytes = 0
+    for record in records:
+        if isinstance(record, Header) and header is None:
+            header = record
             kept: tuple = (record.profile,)
-        elif isinstance(record, Schema) and record.id not in self.schemas:
-            self.schemas[record.id] = record
+        elif isinstance(record, Schema) and record.id not in schemas:
+            schemas[record.id] = record
             kept = (record.name, record.encoding, record.data)
-        elif (
-            isinstance(record, Channel) and record.id not in self._all_channels
-        ):
-            self._all_channels[record.id] = record
+        elif isinstance(record, Channel) and record.id not in channels:
+            channels[record.id] = record
             kept = (record.topic, *itertools.chain(*record.metadata.items()))
         elif isinstance(record, Attachment):  # Names go into an index.
             kept = (record.name, record.media_type)
         elif isinstance(record, Metadata):
             kept = (record.name,)
         else:
-            return
-        self._kept_bytes += 100 + sum(map(len, kept))
-        if self._kept_bytes > _DEFINITIONS_LIMIT:
+            continue
+        kept_bytes += 100 + sum(map(len, kept))
+        if kept_bytes > _DEFINITIONS_LIMIT:
             raise InputError(
                 f"{path}: more topics, types and attachments than any "
                 "recording has"
             )
+    channels = {
+        number: channel
+        for number, channel in channels.items()
+        if channel.schema_id == 0 or channel.schema_id in schemas
+    }
+    if header is None and not channels:
+        raise InputError(f"{path}: nothing of an MCAP file can be read")
+    return _Definitions(header.profile if header else "", schemas, channels)
 
 
-class _Copy:
-    """A whole MCAP file in the making.
-
-    Attributes:
-        counts: messages by the channel id of the source.
-        start_ns: time of the earliest message [ns].
-        end_ns: time of the latest message [ns].
-        num_faults: places that could not be read.
-        first_fault: the first of them, in words.
-    """
-
-    def __init__(self, stream: BinaryIO, definitions: _Definitions):
-        self.counts: Counter[int] = Counter()
-        self.start_ns = 0
-        self.end_ns = 0
-        self.num_faults = 0
-        self.first_fault = ""
-        self._channels = definitions.channels
-        self._schemas = definitions.schemas
-        self._profile = ""
-        if definitions.header is not None:
-            self._profile = definitions.header.profile
-        self._writer = Writer(stream, compression=CompressionType.ZSTD)
-        self._writer.start(
-            profile=self._profile, library=f"cns-drake {__version__} repair"
+def _copy(
+    records: Iterable[McapRecord | Fault],
+    stream: BinaryIO,
+    definitions: _Definitions,
+    output: Path,
+) -> Repair:
+    """Writes records as a whole MCAP file, which will be `output`."""
+    profile, schemas, channels = definitions
+    writer = Writer(stream, compression=CompressionType.ZSTD)
+    writer.start(profile=profile, library=f"cns-drake {__version__} repair")
+    schema_ids = {0: 0} | {
+        number: writer.register_schema(
+            schema.name, schema.encoding, schema.data
         )
-        schema_ids = {0: 0} | {
-            number: self._writer.register_schema(
-                schema.name, schema.encoding, schema.data
-            )
-            for number, schema in self._schemas.items()
-        }
-        self._channel_ids = {
-            number: self._writer.register_channel(
-                channel.topic,
-                channel.message_encoding,
-                schema_ids[channel.schema_id],
-                channel.metadata,
-            )
-            for number, channel in self._channels.items()
-        }
-
-    def take(self, record: McapRecord | Fault) -> None:
-        """Writes a record."""
-        if isinstance(record, Message):
-            self._take_message(record)
-        elif isinstance(record, Attachment):
-            self._writer.add_attachment(
+        for number, schema in schemas.items()
+    }
+    channel_ids = {
+        number: writer.register_channel(
+            channel.topic,
+            channel.message_encoding,
+            schema_ids[channel.schema_id],
+            channel.metadata,
+        )
+        for number, channel in channels.items()
+    }
+    counts: Counter[int] = Counter()
+    start_ns = end_ns = num_faults = 0
+    first_fault = ""
+    for record in records:
+        fault = str(record) if isinstance(record, Fault) else ""
+        if isinstance(record, Attachment):
+            writer.add_attachment(
                 record.create_time,
                 record.log_time,
                 record.name,
@@ -423,55 +380,47 @@ class _Copy:
                 record.data,
             )
         elif isinstance(record, Metadata) and record.name != _ROSBAG2:
-            self._writer.add_metadata(record.name, record.metadata)
-        elif isinstance(record, Fault):
-            self._fault(str(record))
-
-    def finish(self, file_name: str) -> None:
-        """Writes the records behind the messages."""
-        if self._profile == "ros2":
-            information = make_bag_information(
-                file_name,
-                [
-                    describe_topic(
-                        channel.topic,
-                        self._type(channel),
-                        self.counts[number],
-                        channel.metadata,
-                        channel.message_encoding,
-                    )
-                    for number, channel in self._channels.items()
-                ],
-                start_ns=self.start_ns,
-                end_ns=self.end_ns,
-                custom_data={},
+            writer.add_metadata(record.name, record.metadata)
+        elif isinstance(record, Message):
+            if record.channel_id in channel_ids:
+                if not counts:
+                    start_ns = end_ns = record.log_time
+                start_ns = min(start_ns, record.log_time)
+                end_ns = max(end_ns, record.log_time)
+                counts[record.channel_id] += 1
+                writer.add_message(
+                    channel_ids[record.channel_id],
+                    record.log_time,
+                    record.data,
+                    record.publish_time,
+                    record.sequence,
+                )
+            else:
+                fault = "messages of an unknown topic"
+        if fault:
+            num_faults += 1
+            first_fault = first_fault or fault
+    if profile == "ros2":
+        topics = [
+            rosbag2_metadata.describe_topic(
+                channel.topic,
+                schemas[channel.schema_id].name
+                if channel.schema_id in schemas
+                else "",
+                counts[number],
+                channel.metadata,
+                channel.message_encoding,
             )
-            self._writer.add_metadata(
-                _ROSBAG2, {"serialized_metadata": to_yaml(information)}
-            )
-        self._writer.finish()
-
-    def _take_message(self, message: Message) -> None:
-        if message.channel_id not in self._channel_ids:
-            self._fault("messages of an unknown topic")
-            return
-        if not self.counts:
-            self.start_ns = self.end_ns = message.log_time
-        self.start_ns = min(self.start_ns, message.log_time)
-        self.end_ns = max(self.end_ns, message.log_time)
-        self.counts[message.channel_id] += 1
-        self._writer.add_message(
-            self._channel_ids[message.channel_id],
-            message.log_time,
-            message.data,
-            message.publish_time,
-            message.sequence,
+            for number, channel in channels.items()
+        ]
+        information = rosbag2_metadata.make_bag_information(
+            output.name, topics, start_ns=start_ns, end_ns=end_ns
         )
-
-    def _fault(self, text: str) -> None:
-        self.num_faults += 1
-        self.first_fault = self.first_fault or text
-
-    def _type(self, channel: Channel) -> str:
-        schema = self._schemas.get(channel.schema_id)
-        return schema.name if schema else ""
+        writer.add_metadata(
+            _ROSBAG2,
+            {"serialized_metadata": rosbag2_metadata.to_yaml(information)},
+        )
+    writer.finish()
+    seconds = (end_ns - start_ns) / 1e9
+    total = sum(counts.values())
+    return Repair(output, total, seconds, num_faults, first_fault)

@@ -46,12 +46,7 @@ def describe_topic(
     metadata: Mapping[str, str],
     encoding: str = "cdr",
 ) -> dict:
-    """Returns the description of a topic and its messages.
-
-    Args:
-        message_type: e.g. `sensor_msgs/msg/PointCloud2`.
-        encoding: how the messages are serialised.
-    """
+    """Returns the description of a topic and its messages."""
     return {
         "topic_metadata": {
             "name": name,
@@ -70,36 +65,35 @@ def make_bag_information(
     *,
     start_ns: int,
     end_ns: int,
-    custom_data: Mapping[str, str],
+    custom_data: Mapping[str, str] | None = None,
 ) -> dict:
     """Returns the description of a recording of one file.
 
     Args:
         file_name: name of the MCAP file within its folder.
+        topics: as `describe_topic` gives them.
         start_ns: time of the first message [ns].
         end_ns: time of the last message [ns].
         custom_data: key -> text for `ros2 bag info`.
     """
     count = sum(topic["message_count"] for topic in topics)
+    span = {
+        "starting_time": {"nanoseconds_since_epoch": start_ns},
+        "duration": {"nanoseconds": end_ns - start_ns},
+        "message_count": count,
+    }
     return {
         "version": _VERSION,
         "storage_identifier": "mcap",
-        "duration": {"nanoseconds": end_ns - start_ns},
-        "starting_time": {"nanoseconds_since_epoch": start_ns},
+        "duration": span["duration"],
+        "starting_time": span["starting_time"],
         "message_count": count,
         "topics_with_message_count": list(topics),
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file_name],
-        "files": [
-            {
-                "path": file_name,
-                "starting_time": {"nanoseconds_since_epoch": start_ns},
-                "duration": {"nanoseconds": end_ns - start_ns},
-                "message_count": count,
-            }
-        ],
-        "custom_data": dict(custom_data) or None,
+        "files": [{"path": file_name, **span}],
+        "custom_data": dict(custom_data or {}) or None,
         "ros_distro": "humble",
     }
 

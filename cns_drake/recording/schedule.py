@@ -23,14 +23,7 @@ def frame_stamp_ns(
 
 
 def frames_within(duration: float, period: float = FRAME_PERIOD) -> int:
-    """Returns the number of frames of a drive.
-
-    The first frame is taken at its start.
-
-    Args:
-        duration: how long the drive takes [s].
-        period: time between frames [s].
-    """
+    """Returns the number of frames of a drive; the first is at its start."""
     return math.floor(duration / period) + 1
 
 

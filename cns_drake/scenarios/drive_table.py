@@ -5,7 +5,7 @@ row of `sequences.csv` therefore has a checksum of its input files, and is
 measured anew when they have changed.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import get_type_hints
@@ -16,13 +16,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.recording.schedule import frames_within
+from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-    map_folder,
-    read_scenario_file,
-    world_file,
-)
 
 
 @dataclass(frozen=True)
@@ -62,7 +57,6 @@ def drive_rows(
     """Returns the rows of a map's drives whose stage is there.
 
     Args:
-        folder: the map's folder, with `sequence_NN.yaml` and `stage_NN.sdf`.
         sizes: stage -> its structures and triangles; for other stages they are
             counted in the world, which takes long to load.
 
@@ -80,13 +74,17 @@ def drive_rows(
     ).encode()
     rows = []
     for path in its.drives():
-        scenario = read_scenario_file(path)
-        world = world_file(scenario)
+        scenario = scenario_files.read_scenario_file(path)
+        world = scenario_files.world_file(scenario)
         if not world.is_file():
             continue
         # A map whose drives follow waypoints has no roads.
         roads = [p for p in (its.roads,) if p.is_file()]
-        checksum = _checksum((*scenario.files, *roads, world), meshes)
+        total = 0
+        for file in (*scenario.files, *roads, world):
+            with user_errors(file):
+                total = zlib.crc32(file.read_bytes(), total)
+        checksum = f"{zlib.crc32(meshes, total):08x}"
         row = known.get(checksum)
         if row is None:
             progress(f"measuring {drive_name(path)}")
@@ -115,20 +113,8 @@ def write_table(
     write_csv(MapFolder(folder).drive_table, names, map(astuple, rows))
 
 
-def _checksum(paths: Iterable[Path], more: bytes) -> str:
-    """Returns the checksum of the contents of files, and of more values."""
-    total = 0
-    for path in paths:
-        with user_errors(path):
-            total = zlib.crc32(path.read_bytes(), total)
-    return f"{zlib.crc32(more, total):08x}"
-
-
 def _read(path: Path) -> list[DriveRow]:
-    """Returns the rows of a table; none if it cannot be used.
-
-    The rows of a bad table are measured anew.
-    """
+    """Returns the rows of a table; those of a bad one are measured anew."""
     types = get_type_hints(DriveRow)
     try:
         return [
@@ -145,13 +131,13 @@ def _measure(
     # Slow to import, and rarely needed.
     from cns_drake.scenarios.planning import plan_drive
 
-    check_files(scenario)
+    scenario_files.check_files(scenario)
     trajectory = plan_drive(scenario)
     frames = frames_within(trajectory.duration, scenario.frame_period)
     structures, triangles = size or _size(scenario)
     return DriveRow(
         sequence=scenario.name,
-        map=map_folder(scenario).path.resolve().name,
+        map=scenario_files.map_folder(scenario).path.resolve().name,
         stage=str(scenario.stage),
         title=scenario.title,
         checksum=checksum,
@@ -169,7 +155,9 @@ def _size(scenario: Scenario) -> tuple[int, int]:
     from cns_drake.scene.surfaces import TriangleSurface
     from cns_drake.scene.world import load_world
 
-    world = load_world(world_file(scenario), without=scenario.without)
+    world = load_world(
+        scenario_files.world_file(scenario), without=scenario.without
+    )
     geometries = read_perception_geometry(world.scene_graph.model_inspector())
     return len({geometry.structure for geometry in geometries}), sum(
         len(geometry.surface.triangles)

@@ -9,12 +9,7 @@ import shapely
 from shapely import STRtree
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.suspension import (
-    Suspension,
-    load_car_masses,
-    load_suspension_rates,
-    ride_on_springs,
-)
+from cns_drake.motion import suspension
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.schedule import frames_within
@@ -51,7 +46,6 @@ def plan_drive(
     """Plans the drive of a scenario, along its route or its waypoints.
 
     Args:
-        scenario: the scenario to plan.
         positions: places on the path at even times, of a car that follows
             others; see `TrafficPlan`. By default it is as fast as it may be.
 
@@ -101,25 +95,28 @@ def plan_drive(
     trajectory = Trajectory(path, scenario.speeds)
     if positions is not None:
         trajectory = trajectory.with_positions(positions)
-    _check_steering(trajectory, source, cure)
+    radius, (x, y, _) = trajectory.path.tightest_bend()
+    if radius < TIGHTEST_RADIUS:
+        raise InputError(
+            f"{source}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f} "
+            f"is too tight: the car needs {TIGHTEST_RADIUS:.2f} m; {cure}"
+        )
     profile = scenario.ride.profile()
     if profile is None:
         return trajectory
-    suspension = Suspension(
-        load_car_masses(vehicle_file()),
-        load_suspension_rates(suspension_file()),
+    springs = suspension.Suspension(
+        suspension.load_car_masses(vehicle_file()),
+        suspension.load_suspension_rates(suspension_file()),
     )
-    return ride_on_springs(trajectory, suspension, profile)
+    return suspension.ride_on_springs(trajectory, springs, profile)
 
 
 def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     """Returns what stands beside a path in the world, seen from above.
 
     Rays in all directions, from near the ground to the height of the car, find
-    kerbs and walls. An edge at which the ground only falls is not found.
-
-    Args:
-        points: (N, 3) of the path, close together [m].
+    kerbs and walls. An edge at which the ground only falls is not found. The
+    points (N, 3) of the path are close together [m].
     """
     world = load_world(world_file(scenario), without=scenario.without)
     context = world.plant.CreateDefaultContext()
@@ -148,16 +145,6 @@ def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     # One for each centimetre is enough.
     xy = np.unique(np.round(p_WQ[:, :2], 2), axis=0)
     return STRtree(np.asarray(shapely.points(xy)))
-
-
-def _check_steering(trajectory: Trajectory, source: str, cure: str) -> None:
-    """Checks that no bend of a drive is too tight for the car."""
-    radius, (x, y, _) = trajectory.path.tightest_bend()
-    if radius < TIGHTEST_RADIUS:
-        raise InputError(
-            f"{source}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f} "
-            f"is too tight: the car needs {TIGHTEST_RADIUS:.2f} m; {cure}"
-        )
 
 
 def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:

@@ -1,6 +1,5 @@
 """The inputs and libraries of a recording, besides its scenario."""
 
-from collections.abc import Callable
 import hashlib
 import json
 from pathlib import Path
@@ -17,16 +16,9 @@ from cns_drake.sensors.imu.config import KALIBR_FILE
 
 # Packages that can influence a message's bytes.
 _PACKAGES = (
-    "drake",
-    "embreex",
-    "llvmlite",
-    "numba",
-    "numpy",
-    "scipy",
-    "mcap",
-    "rosbags",
-    "zstandard",
-)
+    "drake", "embreex", "llvmlite", "numba", "numpy", "scipy", "mcap",
+    "rosbags", "zstandard",
+)  # fmt: skip
 _BLOCK_BYTES = 1 << 20
 # The key of the inputs' combined digest in a recording's metadata.
 INPUTS_KEY = "inputs_sha256"
@@ -134,7 +126,6 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
 
     Args:
-        path: the model's file.
         watch: also notes each file, before it is read.
 
     Raises:
@@ -142,16 +133,12 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """
     digest = hashlib.sha256()
     found = referenced_files(path, watch or FileWatch())
-    for name, (file, size) in sorted(found.items()):
-        digest.update(f"{name} {size}\n".encode())
-        _take(file, digest.update)
+    named = [(f"{n} {size}\n", one) for n, (one, size) in sorted(found.items())]
     # The file itself comes last, without its name.
-    _take(path, digest.update)
+    files: list[tuple[str, Path | str]] = [*named, ("", path)]
+    for line, file in files:
+        digest.update(line.encode())
+        with user_errors(file), open(file, "rb") as stream:
+            while block := stream.read(_BLOCK_BYTES):  # Of a mesh of any size.
+                digest.update(block)
     return digest.hexdigest()
-
-
-def _take(path: Path | str, update: Callable[[bytes], None]) -> None:
-    """Updates a digest with a file, block by block for meshes of any size."""
-    with user_errors(path), open(path, "rb") as stream:
-        while block := stream.read(_BLOCK_BYTES):
-            update(block)

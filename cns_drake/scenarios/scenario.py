@@ -18,9 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.errors import (
-    validated,
-)
+from cns_drake.base.errors import validated
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
@@ -400,10 +398,7 @@ class Scenario(Section):
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
         """Sensors besides LiDARs, IMU and odometry, by the field's name."""
-        values = (
-            (name, getattr(self, name)) for name in type(self).model_fields
-        )
-        return {n: one for n, one in values if isinstance(one, SensorConfig)}
+        return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(
         self,
@@ -450,11 +445,7 @@ class Scenario(Section):
         return scenario
 
     def with_traffic(self, number: int) -> Scenario:
-        """Returns the scenario with other traffic, of the same seed.
-
-        Args:
-            number: number of vehicles, and of walkers.
-        """
+        """Returns the scenario with so many vehicles, and walkers."""
         seed = self.traffic.seed
         return self.replaced(
             traffic=TrafficConfig(vehicles=number, walkers=number, seed=seed)
@@ -475,12 +466,11 @@ class Scenario(Section):
             driver: `real` for the values of published drives; along waypoints,
                 which have no lanes, without changes of lane.
         """
-        update: dict = {"seed": self.driver.seed}
+        if driver == "none":
+            return self.replaced(driver=DriverConfig())
+        chosen = REAL_DRIVER.replaced(seed=self.driver.seed)
         if self.waypoints is not None:
-            update["lane_changes"] = 0.0
-        chosen = DriverConfig()
-        if driver == "real":
-            chosen = REAL_DRIVER.replaced(**update)
+            chosen = chosen.replaced(lane_changes=0.0)
         return self.replaced(driver=chosen)
 
     def with_lidar_preset(self, preset: str) -> Scenario:

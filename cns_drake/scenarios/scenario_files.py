@@ -5,10 +5,7 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.errors import (
-    InputError,
-    validated,
-)
+from cns_drake.base.errors import InputError, validated
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
@@ -17,11 +14,7 @@ from cns_drake.sensors.imu.config import KALIBR_FILE
 
 
 def make_scenario(values: dict, source: object) -> Scenario:
-    """Validates a scenario.
-
-    Args:
-        values: the fields.
-        source: the file or argument that errors name.
+    """Validates a scenario's fields; errors name their source.
 
     Raises:
         InputError: a field is missing, unknown or not usable.
@@ -132,10 +125,9 @@ def _find_base(
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Makes the paths in fields absolute.
+    """Makes the paths in fields of a scenario or a family absolute.
 
     Args:
-        values: fields of a scenario or a family, to change.
         path: the file of these fields; paths are relative to it.
 
     Raises:
@@ -179,10 +171,8 @@ def world_file(scenario: Scenario) -> Path:
 def check_files(scenario: Scenario, source: object = None) -> None:
     """Checks that the map and its stage, or the other files, exist.
 
-    With traffic the map needs roads.
-
-    Args:
-        source: the file at the beginning of errors; by default the scenario's.
+    With traffic the map needs roads. Errors name the source, by default the
+    scenario's file.
 
     Raises:
         InputError: one of them does not exist.

@@ -16,39 +16,21 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-)
+from pydantic import AfterValidator, BeforeValidator, Field
 import yaml
 
 from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import (
-    InputError,
-    validated,
-)
-from cns_drake.base.files import (
-    make_folder,
-    write_text,
-)
+from cns_drake.base.errors import InputError, validated
+from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, draw_route
+from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import RideConfig, Scenario
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-    find_files,
-    load_scenario,
-    map_folder,
-    world_file,
-)
 from cns_drake.scenarios.shipped import shipped_drives
 from cns_drake.scene.world import load_world, structures_in
 from cns_drake.sensors.imu.config import ImuSection
-from cns_drake.sensors.lidar.config import LidarSection
+from cns_drake.sensors.sensor_config import Section
 
 # Tags of structures that can be missing; streets, ground and furniture stay.
 _REMOVABLE = ("building", "vegetation")
@@ -60,10 +42,6 @@ _Seed = Annotated[int, Field(ge=0)]
 # Draws the city of a map anew: the map's folder, the name of the stage, which
 # is the whole city, and seeds -> seed -> map folder of that city.
 Redraw = Callable[[Path, str, Sequence[int]], Mapping[int, Path]]
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _spread(value: Any) -> Any:
@@ -82,13 +60,13 @@ def _without_doubles(seeds: tuple[int, ...]) -> tuple[int, ...]:
     return seeds
 
 
-class _Steps(_Model):
+class _Steps(Section):
     first: _Part = Field(alias="from")
     last: _Part = Field(alias="to")
     count: int = Field(ge=1, le=10_000)
 
 
-class DrawnRoutes(_Model):
+class DrawnRoutes(Section):
     """Random routes.
 
     Attributes:
@@ -102,7 +80,7 @@ class DrawnRoutes(_Model):
     seed: _Seed = 0
 
 
-class Family(_Model):
+class Family(Section):
     """The base of a family of scenarios, and its variations.
 
     Attributes:
@@ -148,34 +126,29 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     A member's name consists of base, seed of the city if that varies, missing
     part in per mille, seed, and route and LiDAR if they vary.
 
-    Raises:
-        InputError: the file, or one that it names, cannot be used.
-    """
-    values = read_yaml(path)
-    if isinstance(values, dict):
-        find_files(values, path)
-    family = validated(Family, values, path)
-    base: str | Path = family.base
-    if base not in shipped_drives():
-        base = path.parent / base
-    return vary(load_scenario(base), family, path, redraw)
-
-
-def vary(
-    base: Scenario, family: Family, source: object, redraw: Redraw | None = None
-) -> list[Scenario]:
-    """Returns the members of a family.
-
     Args:
-        source: the file that errors name.
         redraw: draws cities; only a family with `city_seeds` needs it. It is
             called last, when all else is checked.
 
     Raises:
-        InputError: the base has no map, or a stage, class or LiDAR of the
-            family does not exist.
+        InputError: the file, or one that it names, cannot be used, the base has
+            no map, or a stage, class or LiDAR of the family does not exist.
         ValueError: it has `city_seeds`, and there is no `redraw`.
     """
+    values = read_yaml(path)
+    if isinstance(values, dict):
+        scenario_files.find_files(values, path)
+    family = validated(Family, values, path)
+    base: str | Path = family.base
+    if base not in shipped_drives():
+        base = path.parent / base
+    return _vary(scenario_files.load_scenario(base), family, path, redraw)
+
+
+def _vary(
+    base: Scenario, family: Family, source: Path, redraw: Redraw | None
+) -> list[Scenario]:
+    """Returns the members of a family; `source` is its file."""
     if base.map is None:
         raise InputError(
             f"{source}: base: {base.name} has no map to vary; give a scenario "
@@ -183,8 +156,8 @@ def vary(
         )
     sections = {"ride": family.ride, "imu": family.imu}
     base = base.replaced(**{n: one for n, one in sections.items() if one})
-    check_files(base, source)
-    last = max(map_folder(base).stages())
+    scenario_files.check_files(base, source)
+    last = max(scenario_files.map_folder(base).stages())
     stage = family.stage or last
     if family.city_seeds:
         _check_redrawable(base, family, last, source)
@@ -193,38 +166,47 @@ def vary(
     if family.towards is not None:
         text = f"what stage {family.towards} lacks"
         removable = _difference(base, stage, family.towards, source)
-    routes = _routes(base, family)
-    units: list[tuple[str | None, dict[str, LidarSection]]]
-    units = [(None, base.lidars)]
-    if family.lidars:
-        units = [
-            (preset, base.with_lidar_preset(preset).lidars)
-            for preset in family.lidars
+    routes: dict[str | None, Route | None] = {None: None}
+    if family.routes is not None:
+        network = load_road_network(scenario_files.map_folder(base).roads)
+        rngs = [
+            np.random.default_rng([family.routes.seed, k])
+            for k in range(family.routes.count)
         ]
+        routes = {
+            f"r{k}": draw_route(network, family.routes.length, rng)
+            for k, rng in enumerate(rngs)
+        }
+    units: dict[str | None, dict] = {None: base.lidars}
+    if family.lidars:
+        units = {
+            preset: base.with_lidar_preset(preset).lidars
+            for preset in family.lidars
+        }
     cities: dict[int | None, Scenario] = {None: base}
     if family.city_seeds:
         if redraw is None:
             raise ValueError("a family with city_seeds needs `redraw`")
-        folders = redraw(map_folder(base).path, stage, family.city_seeds)
+        folders = redraw(
+            scenario_files.map_folder(base).path, stage, family.city_seeds
+        )
         cities = {
             seed: base.replaced(map=str(folder))
             for seed, folder in folders.items()
         }
     drawn = {}
-    for city_seed, city in cities.items():
-        table = map_folder(city).structures
-        for seed in family.seeds:
-            drawn[city_seed, seed] = (
-                _decay_order(table, seed, removable),
-                draw_losses(table, family.scattered, seed, source),
-            )
+    for city_seed, seed in product(cities, family.seeds):
+        table = scenario_files.map_folder(cities[city_seed]).structures
+        drawn[city_seed, seed] = (
+            _decay_order(table, seed, removable),
+            _draw_losses(table, family.scattered, seed, source),
+        )
     members = []
-    for (city_seed, city), part, seed, (route_label, route), unit in product(
-        cities.items(), family.missing, family.seeds, routes, units
+    for city_seed, part, seed, route, preset in product(
+        cities, family.missing, family.seeds, routes, units
     ):
-        preset, lidars = unit
         labels = [base.name, f"m{round(1000 * part):03d}", f"s{seed}"]
-        labels += [label for label in (route_label, preset) if label]
+        labels += [label for label in (route, preset) if label]
         title = f"{100 * part:.1f} % of {text} missing"
         if family.scattered:
             title += f", others at random with seed {seed}"
@@ -233,16 +215,16 @@ def vary(
             title += f", in the city as seed {city_seed} draws it"
         order, losses = drawn[city_seed, seed]
         missing = losses.union(order[: round(part * len(order))])
-        member = city.replaced(
+        member = cities[city_seed].replaced(
             name="_".join(labels).replace("-", "_"),
             stage=stage,
             without=tuple(sorted(missing)),
             title=title,
-            lidars=lidars,
+            lidars=units[preset],
         )
-        if route is not None:
-            member = member.replaced(route=route, waypoints=None)
-        check_files(member, source)
+        if routes[route] is not None:
+            member = member.replaced(route=routes[route], waypoints=None)
+        scenario_files.check_files(member, source)
         members.append(member)
     return members
 
@@ -270,7 +252,7 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
 
 
 def _check_redrawable(
-    base: Scenario, family: Family, last: str, source: object
+    base: Scenario, family: Family, last: str, source: Path
 ) -> None:
     """Checks that the city can be drawn anew."""
     why = (
@@ -281,7 +263,7 @@ def _check_redrawable(
         raise InputError(f"{source}: towards: {why}")
     if family.stage not in (None, last):
         raise InputError(f"{source}: stage: {why}")
-    folder = map_folder(base)
+    folder = scenario_files.map_folder(base)
     for file in (folder.plan, folder.roads):
         if not os.path.isfile(file):
             raise InputError(
@@ -290,35 +272,17 @@ def _check_redrawable(
             )
 
 
-def _routes(
-    base: Scenario, family: Family
-) -> list[tuple[str | None, Route | None]]:
-    """Returns the routes with their labels; None for the base's own."""
-    if family.routes is None:
-        return [(None, None)]
-    network = load_road_network(map_folder(base).roads)
-    return [
-        (
-            f"r{k}",
-            draw_route(
-                network,
-                family.routes.length,
-                np.random.default_rng([family.routes.seed, k]),
-            ),
-        )
-        for k in range(family.routes.count)
-    ]
-
-
 def _difference(
-    base: Scenario, stage: str, other: str, source: object
+    base: Scenario, stage: str, other: str, source: Path
 ) -> frozenset[str]:
     """Returns the structures of a stage that another one lacks."""
     names = []
     for one in (stage, other):
         scenario = base.replaced(stage=one)
-        check_files(scenario, source)
-        names.append(structures_in(load_world(world_file(scenario))))
+        scenario_files.check_files(scenario, source)
+        names.append(
+            structures_in(load_world(scenario_files.world_file(scenario)))
+        )
     difference = names[0] - names[1]
     if not difference:
         raise InputError(
@@ -335,7 +299,7 @@ def _decay_order(
         row
         for _, row in read_records(table, ("name", "class"))
         if (
-            row["class"] in _REMOVABLE and not is_on_a_lot(row)
+            row["class"] in _REMOVABLE and not _is_on_a_lot(row)
             if removable is None
             else row["name"] in removable
         )
@@ -356,30 +320,23 @@ def _decay_order(
     return [rows[k]["name"] for k in np.argsort(distance, kind="stable")]
 
 
-def is_on_a_lot(row: Mapping[str, str]) -> bool:
+def _is_on_a_lot(row: Mapping[str, str]) -> bool:
     """Returns whether a structure occupies a lot only until it is built on."""
     tags = (row.get("tags") or "").split()
     return "_lot_" in row["name"] and "lot" in tags
 
 
-def draw_losses(
-    table: Path, parts: Mapping[str, float], seed: int, source: object
+def _draw_losses(
+    table: Path, parts: Mapping[str, float], seed: int, source: Path
 ) -> frozenset[str]:
     """Draws the missing structures, each class independently.
 
-    A greater part includes all structures of a smaller one.
-
-    Args:
-        parts: class -> missing part of its structures, 0 to 1.
-        source: the file that errors name.
-
-    Raises:
-        InputError: the table cannot be read or has no structure of a class.
+    A greater part includes all structures of a smaller one. Parts are 0 to 1.
     """
     rows = [
         row
         for _, row in read_records(table, ("name", "class"))
-        if not is_on_a_lot(row)
+        if not _is_on_a_lot(row)
     ]
     missing: set[str] = set()
     for kind, part in parts.items():

@@ -9,14 +9,13 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import RgbdSensor
 
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import McapRecorder
+from cns_drake.recording.mcap_recorder import McapRecorder, RecordedCamera
 from cns_drake.recording.recorded_topics import (
     make_calibration,
     recording_topics,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.recording.sensor_ports import RecordedCamera
 from cns_drake.sensors.imu.imu import Imu
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.odometry.odometry import OdometrySensor

@@ -19,9 +19,8 @@ from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import McapRecorder
+from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
 from cns_drake.recording.schedule import START_NS
-from cns_drake.recording.sensor_ports import RecordedSensor
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import World
@@ -104,9 +103,7 @@ def make_station(
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
     motion = builder.AddNamedSystem(
         "vehicle_motion",
-        VehicleMotion(
-            plant, world.vehicle, trajectory, period=scenario.frame_period
-        ),
+        VehicleMotion(plant, world.vehicle, trajectory),
     )
     to_pose = builder.AddNamedSystem(
         "geometry_pose", MultibodyPositionToGeometryPose(plant)

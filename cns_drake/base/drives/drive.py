@@ -65,9 +65,6 @@ def driven_way(scenario: Mapping | None) -> dict | None:
     Two drives with the same way differ at most in their surroundings and their
     sensors.
 
-    Args:
-        scenario: its fields, as a recording holds them.
-
     Returns:
         The fields that have an effect, to be compared with those of other
         drives; None if the scenario does not determine the path.
@@ -195,10 +192,7 @@ class Drive(abc.ABC):
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:
-    """Returns a recording's table of structures by instance id.
-
-    Args:
-        table: as JSON: a list of objects with at least an `instance`.
+    """Returns a table of structures, a list in JSON, by instance id.
 
     Raises:
         InputError: if it is no such table.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import points as point_arrays
-from cns_drake.base.drives import mcap_messages, ros_types
+from cns_drake.base.drives import mcap_messages, point_layouts, ros_types
 from cns_drake.base.drives.drive import (
     IMU_DTYPE,
     ODOMETRY_DTYPE,
@@ -18,11 +18,6 @@ from cns_drake.base.drives.drive import (
 )
 from cns_drake.base.drives.mcap_file import McapFile
 from cns_drake.base.drives.mcap_messages import StaticTransforms, checked_poses
-from cns_drake.base.drives.point_layouts import (
-    from_layout,
-    to_points,
-    to_records,
-)
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import parse_json
 
@@ -122,10 +117,9 @@ class McapDrive(Drive):
                     f"{self._path}: {topic}: the clock goes back by {back:.3g}"
                     " s; messages are read in the order of their log times"
                 )
-        lidars = (self.scenario or {}).get("lidars")
-        lidar = (
-            lidars.get(self.lidar_name) if isinstance(lidars, dict) else None
-        )
+        lidar = (self.scenario or {}).get("lidars")
+        if isinstance(lidar, dict):
+            lidar = lidar.get(self.lidar_name)
         if isinstance(lidar, dict) and lidar.get("motion_distortion"):
             notes.append(
                 f"{self._path}: taken while the LiDAR moved, and used as taken"
@@ -159,9 +153,11 @@ class McapDrive(Drive):
         with self._faults(
             f"{self._lidar_topic}: scan {index} at {stamp_ns} ns"
         ):
-            points = to_points(message)
+            points = point_layouts.to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
-            return from_layout(points, self._labels(index, message))
+            return point_layouts.from_layout(
+                points, self._labels(index, message)
+            )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
         """Returns the labels of a scan that has a topic for them."""
@@ -176,7 +172,7 @@ class McapDrive(Drive):
             raise ValueError(
                 f"{topic}: number {index} has another stamp than the scan"
             )
-        return to_records(message)
+        return point_layouts.to_records(message)
 
     @property
     def kalibr(self) -> str | None:
@@ -291,11 +287,10 @@ class McapDrive(Drive):
 
     @cached_property
     def _transforms(self) -> StaticTransforms:
-        messages = (
-            self._message(_TF_STATIC_TOPIC, place)
-            for place in self._file.locate(_TF_STATIC_TOPIC)
-        )
-        return StaticTransforms(messages, f"{self._path}: {_TF_STATIC_TOPIC}")
+        topic = _TF_STATIC_TOPIC
+        places = self._file.locate(topic)
+        messages = (self._message(topic, place) for place in places)
+        return StaticTransforms(messages, f"{self._path}: {topic}")
 
     def _first(self, topic: str) -> Any:
         return self._message(topic, self._file.locate(topic)[0])
@@ -376,10 +371,8 @@ class McapDrive(Drive):
 
     def _json(self, name: str) -> Any:
         data = self._file.attachment(name)
-        if data is None:
-            return None
         with self._faults(f"attachment {name}"):
-            return parse_json(data)
+            return None if data is None else parse_json(data)
 
 
 def holds_mcap(path: Path) -> bool:

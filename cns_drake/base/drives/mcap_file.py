@@ -8,10 +8,10 @@ file, so that opening a file of gigabytes reads a few kilobytes.
 The package checks only the checksums of chunks, and trusts the sizes that a
 chunk claims. Here damaged or hostile records are refused."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 import contextlib
+import functools
 import io
 import os
 from pathlib import Path
@@ -23,7 +23,7 @@ import lz4.frame
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, ChunkIndex
+from mcap.records import Attachment, Channel, Chunk
 import numpy as np
 import zstandard
 
@@ -67,39 +67,6 @@ LOCATION = np.dtype(
 _ORDER = ("log_time_ns", "chunk", "offset")
 
 
-def check_summary(stream: BinaryIO) -> None:
-    """Refuses a file whose summary does not match its checksum.
-
-    Raises:
-        ValueError: if so, or if the footer is no footer record.
-    """
-    size = stream.seek(0, os.SEEK_END)
-    end = stream.seek(max(size - len(MAGIC) - _FOOTER.size, 0))
-    _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
-    if start > end:
-        raise ValueError("the summary begins behind its end")
-    if start > 0 and end - start > SUMMARY_LIMIT_BYTES:
-        raise ValueError(f"a summary of {end - start} bytes")
-    if start > 0 and checksum > 0:
-        stream.seek(start)
-        # Up to the checksum itself.
-        summary = stream.read(end + _FOOTER.size - 4 - start)
-        if zlib.crc32(summary) != checksum:
-            raise ValueError("the checksum of the summary is wrong")
-    stream.seek(0)
-
-
-def read_attachment(stream: BinaryIO) -> Attachment:
-    """Reads the attachment at the stream's position.
-
-    Raises:
-        ValueError: if its checksum is wrong, or the record too large.
-    """
-    return parse_attachment(
-        _read_body(stream, _ATTACHMENT_LIMIT_BYTES, "an attachment")
-    )
-
-
 def parse_attachment(body: bytes) -> Attachment:
     """Returns the attachment whose record has this content.
 
@@ -111,28 +78,6 @@ def parse_attachment(body: bytes) -> Attachment:
     if checksum not in (0, zlib.crc32(body[:-4])):
         raise ValueError("the checksum of an attachment is wrong")
     return Attachment.read(RecordContent(body))
-
-
-def read_chunk(stream: BinaryIO, size: int) -> bytes:
-    """Returns the records of the chunk at the stream's position.
-
-    Args:
-        size: the records' length, as the file's index has it [bytes].
-
-    Raises:
-        ValueError: if it is damaged, too large or of unknown compression.
-        RuntimeError: if lz4 finds it damaged.
-        zstandard.ZstdError: likewise.
-    """
-    limit = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
-    body = _read_body(stream, limit, "a chunk")
-    chunk = Chunk.read(RecordContent(body))
-    if chunk.uncompressed_size != size:
-        raise ValueError(
-            f"a chunk of {chunk.uncompressed_size} bytes, of {size} by the"
-            " index"
-        )
-    return uncompress(chunk)
 
 
 class RecordContent(ReadDataStream):
@@ -223,23 +168,21 @@ class McapFile:
         check_regular(self.path)
         with self._reading() as stream:
             self._check_ends(stream)
-            check_summary(stream)
             summary = SeekingReader(
                 stream, record_size_limit=SUMMARY_LIMIT_BYTES
             ).get_summary()
         if summary is None or not summary.chunk_indexes:
             raise InputError(f"{self.path}: the MCAP file has no chunk index")
         self._summary = summary
-        self._chunk_indexes: list[ChunkIndex] = sorted(
-            self._summary.chunk_indexes,
-            key=lambda chunk: chunk.chunk_start_offset,
+        self._chunk_indexes = sorted(
+            summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset
         )
         self._channels: dict[str, list[Channel]] = {}
         for _, channel in sorted(self._summary.channels.items()):
             self._channels.setdefault(channel.topic, []).append(channel)
         self._check_channels()
         self._locations: dict[str, np.ndarray] = {}
-        self._chunks: OrderedDict[int, memoryview] = OrderedDict()
+        self._chunk = functools.lru_cache(_CHUNKS_KEPT)(self._unpack)
 
     @property
     def topics(self) -> dict[str, list[str]]:
@@ -337,7 +280,9 @@ class McapFile:
                 continue
             with self._reading() as stream:
                 stream.seek(index.offset)
-                data = read_attachment(stream).data
+                limit = _ATTACHMENT_LIMIT_BYTES
+                body = _read_body(stream, limit, "an attachment")
+                data = parse_attachment(body).data
             if content not in (None, data):
                 raise InputError(
                     f"{self.path}: attachment {name}: two attachments of this "
@@ -395,26 +340,20 @@ class McapFile:
         part["log_time_ns"] = entries["log_time"]
         return part
 
-    def _chunk(self, number: int) -> memoryview:
-        """Returns an uncompressed chunk; the latest chunks are kept."""
-        if number in self._chunks:
-            self._chunks.move_to_end(number)
-            return self._chunks[number]
-        new = self._chunk_indexes[number].uncompressed_size
-        while self._chunks and (
-            len(self._chunks) >= _CHUNKS_KEPT
-            or new + sum(map(len, self._chunks.values())) > CHUNK_LIMIT_BYTES
-        ):
-            self._chunks.popitem(last=False)
-        self._chunks[number] = self._unpack(number)
-        return self._chunks[number]
-
     def _unpack(self, number: int) -> memoryview:
         """Reads and uncompresses a chunk whose checksum is right."""
         index = self._chunk_indexes[number]
         with self._reading() as stream:
             stream.seek(index.chunk_start_offset)
-            return memoryview(read_chunk(stream, index.uncompressed_size))
+            limit = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
+            body = _read_body(stream, limit, "a chunk")
+            chunk = Chunk.read(RecordContent(body))
+            if chunk.uncompressed_size != index.uncompressed_size:
+                raise ValueError(
+                    f"a chunk of {chunk.uncompressed_size} bytes, of"
+                    f" {index.uncompressed_size} by the index"
+                )
+            return memoryview(uncompress(chunk))
 
     def _message(self, chunk: memoryview, location: np.void) -> memoryview:
         _, offset, expected_time_ns, expected_channel_id = location.item()
@@ -461,6 +400,7 @@ class McapFile:
             )
 
     def _check_ends(self, stream: BinaryIO) -> None:
+        """Refuses a file that is not whole, or whose summary is damaged."""
         if stream.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{self.path}: not an MCAP file")
         size = stream.seek(0, os.SEEK_END)
@@ -469,6 +409,18 @@ class McapFile:
             raise InputError(
                 f"{self.path}: the MCAP file is cut off or was not finished"
             )
+        end = stream.seek(max(size - len(MAGIC) - _FOOTER.size, 0))
+        _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
+        if start > end:
+            raise ValueError("the summary begins behind its end")
+        if start > 0 and end - start > SUMMARY_LIMIT_BYTES:
+            raise ValueError(f"a summary of {end - start} bytes")
+        if start > 0 and checksum > 0:
+            stream.seek(start)
+            # Up to the checksum itself.
+            summary = stream.read(end + _FOOTER.size - 4 - start)
+            if zlib.crc32(summary) != checksum:
+                raise ValueError("the checksum of the summary is wrong")
         stream.seek(0)
 
     @contextlib.contextmanager

@@ -7,18 +7,16 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.drives.ros_types import (
-    IMU,
-    ODOMETRY,
-    POINT_CLOUD,
-    TF,
-    deserialize,
-)
+from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
 
 # More bytes than a message of each type can need [bytes]. A few compressed
 # kilobytes can hold gigabytes of padding. A cloud fills a chunk at most.
-_LONGEST = {ODOMETRY: 1 << 12, IMU: 1 << 12, TF: 1 << 20}
+_LONGEST = {
+    ros_types.ODOMETRY: 1 << 12,
+    ros_types.IMU: 1 << 12,
+    ros_types.TF: 1 << 20,
+}
 _MOST_FIELDS = 256
 _LONGEST_NAME = 1 << 10
 # The header of CDR that gives the order of bytes.
@@ -35,10 +33,10 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
         raise ValueError(
             f"a message of {len(data)} bytes, more than one of its type holds"
         )
-    if message_type == POINT_CLOUD:
+    if message_type == ros_types.POINT_CLOUD:
         read_cloud_header(data)
     try:
-        return deserialize(data, message_type)
+        return ros_types.deserialize(data, message_type)
     except Exception as error:
         # rosbags raises any error of its generated code.
         raise ValueError(
@@ -111,10 +109,7 @@ class StaticTransforms:
     """Poses of frames in their parents."""
 
     def __init__(self, messages: Iterable[Any], where: str):
-        """Reads the transforms.
-
-        Args:
-            messages: each of type tf2_msgs/msg/TFMessage.
+        """Reads the transforms of messages of type tf2_msgs/msg/TFMessage.
 
         Raises:
             InputError: two messages place one frame differently.
@@ -124,7 +119,18 @@ class StaticTransforms:
         self._edges: dict[str, tuple] = {}
         for message in messages:
             for edge in message.transforms:
-                self._add(edge)
+                new = (
+                    edge.header.frame_id,
+                    xyz(edge.transform.translation),
+                    xyzw(edge.transform.rotation),
+                )
+                # Nodes repeat what is fixed.
+                old = self._edges.setdefault(edge.child_frame_id, new)
+                if old != new:
+                    raise InputError(
+                        f"{where}: {edge.child_frame_id}: at"
+                        f" {stamp_ns(edge.header)} ns {new}, before {old}"
+                    )
 
     def pose(self, base: str, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a frame in another one, its ancestor.
@@ -144,22 +150,6 @@ class StaticTransforms:
             X_PC = checked_poses(np.array(p_PC), np.array(quat_PC), self._where)
             X_CF = X_PC @ X_CF
         raise InputError(f"{self._where}: no transform from {base} to {frame}")
-
-    def _add(self, edge: Any) -> None:
-        child, transform = edge.child_frame_id, edge.transform
-        new = (
-            edge.header.frame_id,
-            xyz(transform.translation),
-            xyzw(transform.rotation),
-        )
-        # Nodes repeat what is fixed.
-        old = self._edges.setdefault(child, new)
-        if old != new:
-            raise InputError(
-                f"{self._where}: {child}: at"
-                f" {stamp_ns(edge.header)} ns {new},"
-                f" before {old}"
-            )
 
 
 def checked_poses(

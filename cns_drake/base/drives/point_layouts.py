@@ -24,7 +24,6 @@ _DATATYPES = {
 }
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
-_XYZ = [("x", "<f4", 0), ("y", "<f4", 4), ("z", "<f4", 8)]
 _LABEL_FIELDS = ("label", "instance")
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
@@ -135,45 +134,41 @@ def _record_type(message: Any) -> np.dtype:
     )
 
 
-def _make_dtype(fields: list[tuple[str, str, int]], size: int) -> np.dtype:
-    names, formats, offsets = zip(*_XYZ, *fields, strict=True)
+def _make_dtype(
+    names: str, formats: str, offsets: list[int], size: int
+) -> np.dtype:
     return np.dtype(
         {
-            "names": list(names),
-            "formats": list(formats),
-            "offsets": list(offsets),
+            "names": names.split(),
+            "formats": [f"<{one}" for one in formats.split()],
+            "offsets": offsets,
             "itemsize": size,
         }
     )
 
 
-# PCL pads a position to 16 bytes, and a point to a multiple of that.
-_OUSTER = _make_dtype(
-    [
-        ("intensity", "<f4", 16),
-        ("t", "<u4", 20),
-        ("reflectivity", "<u2", 24),
-        ("ring", "u1", 26),
-        ("ambient", "<u2", 28),
-        ("range", "<u4", 32),
-    ],
-    48,
-)
-_VELODYNE = _make_dtype(
-    [("intensity", "<f4", 12), ("ring", "<u2", 16), ("time", "<f4", 18)], 22
-)
-_AUTOWARE = _make_dtype(
-    [
-        ("intensity", "u1", 12),
-        ("return_type", "u1", 13),
-        ("channel", "<u2", 14),
-        ("azimuth", "<f4", 16),
-        ("elevation", "<f4", 20),
-        ("distance", "<f4", 24),
-        ("time_stamp", "<u4", 28),
-    ],
-    32,
-)
+_LAYOUTS = {
+    # PCL pads a position to 16 bytes, and a point to a multiple of that.
+    "ouster": _make_dtype(
+        "x y z intensity t reflectivity ring ambient range",
+        "f4 f4 f4 f4 u4 u2 u1 u2 u4",
+        [0, 4, 8, 16, 20, 24, 26, 28, 32],
+        48,
+    ),
+    "velodyne": _make_dtype(
+        "x y z intensity ring time",
+        "f4 f4 f4 f4 u2 f4",
+        [0, 4, 8, 12, 16, 18],
+        22,
+    ),
+    "autoware": _make_dtype(
+        "x y z intensity return_type channel azimuth elevation distance"
+        " time_stamp",
+        "f4 f4 f4 u1 u1 u2 f4 f4 f4 u4",
+        [0, 4, 8, 12, 13, 14, 16, 20, 24, 28],
+        32,
+    ),
+}
 
 
 def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
@@ -193,30 +188,28 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
     """
     if layout == "cns":
         return points
-    names = ("x", "y", "z", "intensity", "ring", "t")
-    columns: dict[str, Any] = {name: points[name] for name in names}
     x, y, z = (points[axis].astype(float) for axis in "xyz")
     distance = np.sqrt(x * x + y * y + z * z)
     brightness = np.rint(255.0 * np.clip(points["intensity"], 0.0, 1.0))
-    if layout == "ouster":
-        dtype = _OUSTER
-        columns["reflectivity"] = brightness
-        columns["range"] = np.rint(_MM_PER_M * distance)
-    elif layout == "velodyne":
-        dtype = _VELODYNE
-        columns["time"] = columns.pop("t") / _NS_PER_S
-    else:
-        dtype = _AUTOWARE
+    columns = {name: points[name] for name in points.dtype.names or ()}
+    columns |= {
+        "reflectivity": brightness,
+        "ambient": np.zeros(len(points)),
+        "range": np.rint(_MM_PER_M * distance),
+        "time": points["t"] / _NS_PER_S,
+        "time_stamp": points["t"],
+        "return_type": np.full(len(points), _SINGLE_STRONGEST),
+        "channel": points["ring"],
+        "azimuth": np.arctan2(y, x) % (2.0 * np.pi),
+        "elevation": np.arctan2(z, np.hypot(x, y)),
+        "distance": distance,
+    }
+    if layout == "autoware":
         columns["intensity"] = brightness
-        columns["return_type"] = _SINGLE_STRONGEST
-        columns["channel"] = columns.pop("ring")
-        columns["azimuth"] = np.arctan2(y, x) % (2.0 * np.pi)
-        columns["elevation"] = np.arctan2(z, np.hypot(x, y))
-        columns["distance"] = distance
-        columns["time_stamp"] = columns.pop("t")
+    dtype = _LAYOUTS[layout]
     made = np.zeros(len(points), dtype)
-    for name, column in columns.items():
-        made[name] = column
+    for name in dtype.names or ():
+        made[name] = columns[name]
     return made
 
 

@@ -5,9 +5,13 @@ Most come from rosbags' table of ROS 2 Humble. Types that it lacks are in
 Foxglove's schemas. A recording contains the text of its types.
 """
 
+from collections.abc import Mapping
+import dataclasses
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -29,6 +33,43 @@ for _path in sorted(_FOLDER.glob("*/msg/*.msg")):
 def message_class(message_type: str) -> type:
     """Returns the class of a type of messages."""
     return _TYPESTORE.types[message_type]
+
+
+def make_message(message_type: str, **fields: Any) -> Any:
+    """Returns a message of plain values.
+
+    Fields that are left out are zero or empty. A field that is a message takes
+    that message, a mapping of its fields, or all of its fields in order.
+    """
+    _, kinds = _TYPESTORE.fielddefs[message_type]
+    values = {
+        name: _value(kind, fields.pop(name, None)) for name, kind in kinds
+    }
+    return message_class(message_type)(**values, **fields)
+
+
+def _value(kind: tuple, given: Any) -> Any:
+    """Returns a value as a field of a kind has it; its zero for None."""
+    node, inner = kind
+    if node is Nodetype.NAME:
+        if dataclasses.is_dataclass(given):
+            return given
+        if given is not None and not isinstance(given, Mapping):
+            names = [name for name, _ in _TYPESTORE.fielddefs[inner][1]]
+            given = dict(zip(names, given, strict=True))
+        return make_message(inner, **(given or {}))
+    if node is Nodetype.BASE:
+        python_type = {"string": str, "bool": bool}.get(
+            inner[0], float if inner[0].startswith("float") else int
+        )
+        return python_type() if given is None else python_type(given)
+    element, length = inner
+    if element[0] is Nodetype.NAME:
+        return [_value(element, one) for one in given or ()]
+    scalar = element[1][0]
+    return (
+        np.zeros(length, scalar) if given is None else np.asarray(given, scalar)
+    )
 
 
 def message_definition(message_type: str) -> str:

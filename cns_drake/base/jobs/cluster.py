@@ -67,7 +67,7 @@ class Cluster:
             InputError: if the scheduler does not answer.
         """
         if self.scheduler is None:
-            return local_workers(listener, self.num_workers)
+            return LocalWorkers(listener, self.num_workers)
         return dask_workers(self.scheduler, listener)
 
 
@@ -98,22 +98,27 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
 
 
 class LocalWorkers:
-    """Runs jobs in processes of this machine.
+    """Runs jobs in processes of this machine; at its end it ends them.
 
     No port is opened, since anyone who reached it could run programs here.
     """
 
-    def __init__(self, listener: Listener, threads: ThreadPoolExecutor):
+    def __init__(self, listener: Listener, num_workers: int):
         self._listener = listener
-        self._threads = threads
+        self._threads = ThreadPoolExecutor(num_workers)
         self._stopped = threading.Event()
 
-    def submit(self, name: str, job: bytes, priority: float) -> None:
-        """Lets a job run, when there is room.
+    def __enter__(self) -> LocalWorkers:
+        return self
 
-        Args:
-            priority: among jobs that wait, the one with the highest comes
-                first; here there is a thread for each.
+    def __exit__(self, *error: object) -> None:
+        self.stop()
+        self._threads.shutdown()
+
+    def submit(self, name: str, job: bytes, priority: float) -> None:
+        """Lets a job run, when there is room; one with a high priority first.
+
+        Here there is a thread for each.
         """
         del priority
         self._threads.submit(self._run, name, job)
@@ -135,19 +140,6 @@ class LocalWorkers:
             error = caught
         self._listener("ended", name)
         self._listener("result", name, error)
-
-
-@contextlib.contextmanager
-def local_workers(
-    listener: Listener, num_workers: int
-) -> Iterator[LocalWorkers]:
-    """Yields workers of this machine; what still runs at the end is ended."""
-    with ThreadPoolExecutor(num_workers) as threads:
-        workers = LocalWorkers(listener, threads)
-        try:
-            yield workers
-        finally:
-            workers.stop()
 
 
 class DaskWorkers:
@@ -190,28 +182,25 @@ class DaskWorkers:
         return self._client.scheduler.address
 
     def _end(self, name: str, future: Future) -> None:
-        if self._futures.pop(name, None) is not None:
-            self._listener("result", name, self._error(future))
-
-    def _error(self, future: Future) -> Exception | None:
-        """Returns the error that a job ended with, or None."""
-        if future.status == "finished":
-            return None
+        if self._futures.pop(name, None) is None:
+            return
+        error: Exception | None = None
         if future.status == "lost":
             # The job is done, but its worker was lost before its result came
             # here. A second run finds the job done.
-            return ProcessDiedError("its worker died")
-        if future.status != "error":
-            return LostSchedulerError(
+            error = ProcessDiedError("its worker died")
+        elif future.status == "error":
+            from distributed.scheduler import KilledWorker
+
+            error = future.exception()
+            if isinstance(error, KilledWorker):
+                error = InputError("every worker that ran it died")
+        elif future.status != "finished":
+            error = LostSchedulerError(
                 f"{self._address}: the connection to the scheduler was lost; "
                 "run the same command again to go on"
             )
-        from distributed.scheduler import KilledWorker
-
-        error = future.exception()
-        if isinstance(error, KilledWorker):
-            return InputError("every worker that ran it died")
-        return error
+        self._listener("result", name, error)
 
 
 Workers = LocalWorkers | DaskWorkers

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping
+import contextlib
 import functools
 import hashlib
+import importlib.util
 import json
 from pathlib import Path
 import re
@@ -46,15 +48,10 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
         modules: full names; `<package>.*` stands for all modules in it.
         without: packages that do not matter, in spite of being imported.
     """
-    named = [
-        found
-        for name in modules
-        for found in (
-            _modules_in(name.removesuffix(".*"))
-            if name.endswith(".*")
-            else (_Module(_ROOT, name),)
-        )
-    ]
+    named: list[_Module] = []
+    for name in modules:
+        package = name.removesuffix(".*")
+        named += [_Module(_ROOT, name)] if package == name else _in(package)
     return _digest(named, without)
 
 
@@ -136,7 +133,7 @@ def _imports_of(module: _Module) -> _Imports:
         return _find_imports(path.read_bytes(), package)
 
 
-def _modules_in(package: str) -> Iterator[_Module]:
+def _in(package: str) -> Iterator[_Module]:
     for path in _ROOT.joinpath(*package.split(".")).rglob("*.py"):
         parts = path.relative_to(_ROOT).with_suffix("").parts
         yield _Module(_ROOT, ".".join(parts).removesuffix(".__init__"))
@@ -220,9 +217,9 @@ def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:
     if isinstance(node, ast.Import):
         yield from ((alias.name, "") for alias in node.names)
     elif isinstance(node, ast.ImportFrom):
-        parents = package.split(".")[: 1 - node.level or None]
-        home = ".".join([*parents, *(node.module or "").split(".")])
-        home = home.strip(".") if node.level else node.module or ""
+        home = "." * node.level + (node.module or "")
+        with contextlib.suppress(ImportError):  # Running the file reports it.
+            home = importlib.util.resolve_name(home, package)
         yield from ((home, alias.name) for alias in node.names)
 
 

@@ -31,12 +31,17 @@ class _Work:
         done: the share that is done.
         taken: time that the measured share took [s].
         measured: the share that was done in that time.
+        since: when it was started [s]; None if it does not run.
+        first: the share at its first message, which an earlier run may have
+            done; None until then.
     """
 
     cost: float
     done: float = 0.0
     taken: float = 0.0
     measured: float = 0.0
+    since: float | None = None
+    first: float | None = None
 
 
 class TimeLeft:
@@ -48,34 +53,28 @@ class TimeLeft:
     def __init__(self, costs: Mapping[str, float]):
         """Takes name -> expected time on one core [s]."""
         self._works = {name: _Work(cost) for name, cost in costs.items()}
-        # Name -> time and share at the job's first message. The share is
-        # unknown until then: an earlier run may have done a part.
-        self._running: dict[str, tuple[float, float | None]] = {}
         self._most_running = 1
 
     def start(self, name: str, now: float) -> None:
         """A job starts, or starts again."""
-        work = self._works[name]
-        work.done = work.taken = work.measured = 0.0
-        self._running[name] = (now, None)
-        self._most_running = max(self._most_running, len(self._running))
+        self._works[name] = _Work(self._works[name].cost, since=now)
+        running = sum(w.since is not None for w in self._works.values())
+        self._most_running = max(self._most_running, running)
 
     def progress(self, name: str, share: float, now: float) -> None:
         """A share of a job is done; its loading time does not count."""
         work = self._works[name]
         work.done = share
-        since, first = self._running.get(name, (now, None))
-        if first is None:
-            self._running[name] = (now, share)
-        else:
-            work.taken, work.measured = now - since, share - first
+        if work.since is None or work.first is None:
+            work.since, work.first = now, share
+        work.taken, work.measured = now - work.since, share - work.first
 
     def end(self, name: str, now: float) -> None:
         """A job ends."""
         work = self._works[name]
-        since, first = self._running.pop(name, (now, None))
-        work.done = 1.0
-        work.taken, work.measured = now - since, 1.0 - (first or 0.0)
+        since = now if work.since is None else work.since
+        work.done, work.since = 1.0, None
+        work.taken, work.measured = now - since, 1.0 - (work.first or 0.0)
         if work.taken < _REAL_SHARE * work.cost:
             work.taken = work.measured = 0.0
 
@@ -91,20 +90,20 @@ class TimeLeft:
         taken = sum(work.taken for work in works)
         expected = sum(work.cost * work.measured for work in works)
         pace = (_PRIOR + taken) / (_PRIOR + expected)
-        left = [work.cost * (1 - work.done) for work in works if work.done < 1]
+        left = [
+            (work.cost * (1 - work.done), work.since is not None)
+            for work in works
+            if work.done < 1
+        ]
         if not left:
             return 0.0
         # As many jobs run side by side as before, and the longest job bounds
         # the time.
-        side_by_side = min(self._most_running, len(left))
-        longest = max(
-            (
-                self._works[name].cost * (1 - self._works[name].done)
-                for name in self._running
-            ),
-            default=0.0,
+        even = sum(cost for cost, _ in left) / min(
+            self._most_running, len(left)
         )
-        return pace * max(sum(left) / side_by_side, longest)
+        longest = max((cost for cost, runs in left if runs), default=0.0)
+        return pace * max(even, longest)
 
 
 class JobProgress:

@@ -9,6 +9,7 @@ seconds. On other systems the libraries do not support forks.
 
 from collections.abc import Callable, Iterable, Iterator
 import contextlib
+from contextlib import nullcontext
 import gc
 import importlib
 import multiprocessing
@@ -23,19 +24,9 @@ import time
 import traceback
 from types import ModuleType
 
-from cns_drake.base.errors import (
-    InputError,
-    missing_library,
-    one_line,
-    shows_traceback,
-)
+from cns_drake.base import errors, interrupts
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import exclusive, remove_lock
-from cns_drake.base.interrupts import (
-    end_interrupted,
-    ignore_interrupts,
-    interrupt_on_termination,
-    uninterrupted,
-)
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.own_packages import leave_out_folder
@@ -107,8 +98,11 @@ def run_process(
             kind, text = _listen(ours, on_message, is_wanted)
         finally:
             status = _end(process)
-            if status == -signal.SIGKILL:
-                _clean_up(job)
+            if status == -signal.SIGKILL:  # It has left its lock.
+                with interrupts.uninterrupted():
+                    output = pickle.loads(job).output
+                if output is not None:
+                    remove_lock(output)
     if kind == "fault":
         raise JobError(text)
     if kind != "done":
@@ -116,7 +110,6 @@ def run_process(
 
 
 def _start(connection: Connection, job: bytes) -> BaseProcess:
-    """Starts the process of a job."""
     process = _context.Process(target=_work, args=(connection, job))
     try:
         with _starting, _environment_of_jobs():
@@ -185,29 +178,19 @@ def _end(process: BaseProcess) -> int:
     return process.exitcode
 
 
-def _clean_up(job: bytes) -> None:
-    """Removes the lock that the killed process of a job left."""
-    with uninterrupted():
-        output = pickle.loads(job).output
-    if output is not None:
-        remove_lock(output)
-
-
 def _describe(status: int) -> str:
     if status >= 0:
         return f"its process ended with status {status}"
-    try:
+    name = f"signal {-status}"
+    with contextlib.suppress(ValueError):
         name = signal.Signals(-status).name
-    except ValueError:
-        name = f"signal {-status}"
-    return f"its process was ended by {name}" + (
-        ", perhaps for lack of memory" if -status == signal.SIGKILL else ""
-    )
+    why = ", perhaps for lack of memory" if name == "SIGKILL" else ""
+    return f"its process was ended by {name}{why}"
 
 
 def _work(connection: Connection, job: bytes) -> None:
     """Runs a job; its whole process."""
-    interrupt_on_termination(once=True)
+    interrupts.interrupt_on_termination(once=True)
     # In its own session, which Ctrl-C does not reach: the interrupted parent
     # ends its jobs in good order.
     os.setsid()
@@ -222,42 +205,39 @@ def _work(connection: Connection, job: bytes) -> None:
         threading.Thread(target=end_with_parent, daemon=True).start()
         last = _run(job, Reporter(send))
     except KeyboardInterrupt:
-        end_interrupted()
-    ignore_interrupts()
+        interrupts.end_interrupted()
+    interrupts.ignore_interrupts()
     send(*last)
 
 
 def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
     """Runs a job; returns its last message."""
     try:
-        with uninterrupted():
+        with interrupts.uninterrupted():
             step: Step = pickle.loads(job)
-            output = step.output
-        with contextlib.ExitStack() as stack:
-            if output is not None:
-                stack.enter_context(
-                    exclusive(
-                        output,
-                        lambda: reporter.note(
-                            f"{output}: another process works on it; waiting"
-                        ),
-                    )
-                )
+            place = step.output
+
+        def note_waiting() -> None:
+            reporter.note(f"{place}: another process works on it; waiting")
+
+        alone = exclusive(place, note_waiting) if place else nullcontext()
+        with alone:
             if not nothing_left(step):
                 step.run(reporter)
     except MemoryError:
         # At another time, or on another machine, there may be enough memory.
         return "died", "not enough memory"
     except InputError as error:
-        if shows_traceback():
+        if errors.shows_traceback():
             reporter.note(traceback.format_exc())
         return "fault", str(error)
     except Exception as error:
-        lacking = isinstance(error, ImportError) and missing_library(error)
-        if lacking:
-            return "fault", lacking
+        if isinstance(error, ImportError):
+            lacking = errors.missing_library(error)
+            if lacking:
+                return "fault", lacking
         reporter.note(traceback.format_exc())
-        return "fault", one_line(f"{type(error).__name__}: {error}")
+        return "fault", errors.one_line(f"{type(error).__name__}: {error}")
     return "done", ""
 
 

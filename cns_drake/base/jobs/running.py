@@ -12,13 +12,8 @@ import time
 from typing import TYPE_CHECKING
 
 from cns_drake.base.errors import FailedJobsError, InputError, one_line
+from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.cluster import Cluster, LostSchedulerError, Workers
-from cns_drake.base.jobs.processes import (
-    PATIENCE,
-    JobError,
-    ProcessDiedError,
-    nothing_left,
-)
 from cns_drake.base.jobs.step import Step
 
 if TYPE_CHECKING:
@@ -60,21 +55,31 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
         InputError: if the scheduler does not answer.
     """
     by_name = _by_name(jobs)
-    urgency = _urgency(by_name)
-    done = _find_done(by_name)
-    by_name = {name: by_name[name] for name in by_name if name not in done}
-    if not by_name:
+    needs = {name: job.needs for name, job in by_name.items()}
+    order = list(graphlib.TopologicalSorter(needs).static_order())
+    # Name -> cost of the longest chain that begins with the job.
+    urgency = {name: job.cost for name, job in by_name.items()}
+    for name in reversed(order):
+        for need in needs[name]:
+            cost = by_name[need].cost + urgency[name]
+            urgency[need] = max(urgency[need], cost)
+    done: set[str] = set()
+    for name in order:
+        if done.issuperset(needs[name]) and processes.nothing_left(
+            by_name[name].step
+        ):
+            done.add(name)
+    left = {name: by_name[name] for name in by_name if name not in done}
+    if not left:
         return
     from cns_drake.base.jobs.job_progress import JobProgress
 
     messages: queue.SimpleQueue = queue.SimpleQueue()
     with (
-        JobProgress({job.name: job.cost for job in by_name.values()}) as shown,
+        JobProgress({name: job.cost for name, job in left.items()}) as shown,
         cluster.connect(lambda *message: messages.put(message)) as workers,
     ):
-        run = _Run(
-            by_name, done, urgency, workers, messages, shown, cluster.slots
-        )
+        run = _Run(left, done, urgency, workers, messages, shown, cluster.slots)
         run.run()
     run.raise_faults()
 
@@ -90,31 +95,6 @@ def _by_name(jobs: Iterable[Job]) -> dict[str, Job]:
             if need not in by_name:
                 raise ValueError(f"{job.name}: needs {need}, which is no job")
     return by_name
-
-
-def _urgency(jobs: Mapping[str, Job]) -> dict[str, float]:
-    """Returns name -> cost of the longest chain that begins with the job."""
-    urgency = {name: job.cost for name, job in jobs.items()}
-    for name in reversed(_ordered(jobs)):
-        for need in jobs[name].needs:
-            urgency[need] = max(urgency[need], jobs[need].cost + urgency[name])
-    return urgency
-
-
-def _find_done(jobs: Mapping[str, Job]) -> set[str]:
-    """Returns the names of jobs that have nothing to do."""
-    done: set[str] = set()
-    for name in _ordered(jobs):
-        job = jobs[name]
-        if done.issuperset(job.needs) and nothing_left(job.step):
-            done.add(name)
-    return done
-
-
-def _ordered(jobs: Mapping[str, Job]) -> list[str]:
-    """Returns names so that what a job needs comes before it."""
-    needs = {job.name: job.needs for job in jobs.values()}
-    return list(graphlib.TopologicalSorter(needs).static_order())
 
 
 @dataclass
@@ -162,33 +142,27 @@ class _Run:
 
     def _submit_ready(self) -> None:
         """Submits jobs while there is room, the most urgent first."""
-        while (job := self._most_urgent()) is not None:
-            del self._waiting[job.name]
+        while self._slots is None or len(self._submitted) < self._slots:
+            ready = [
+                name
+                for name, job in self._waiting.items()
+                if self._done.issuperset(job.needs)
+            ]
+            if not ready:
+                return
+            name = max(ready, key=lambda one: self._urgency[one])
+            job = self._waiting.pop(name)
             # The jobs it needs may have left it nothing to do.
-            if job.needs and nothing_left(job.step):
-                self._done.add(job.name)
-                self._shown.end(job.name)
+            if job.needs and processes.nothing_left(job.step):
+                self._done.add(name)
+                self._shown.end(name)
             else:
-                self._submit(job)
+                self._submit(name)
 
-    def _most_urgent(self) -> Job | None:
-        """Returns the next job, if there is one and there is room for it."""
-        if self._slots is not None and len(self._submitted) >= self._slots:
-            return None
-        ready = (
-            job
-            for job in self._waiting.values()
-            if self._done.issuperset(job.needs)
-        )
-        return max(ready, key=lambda job: self._urgency[job.name], default=None)
-
-    def _submit(self, job: Job) -> None:
-        self._submitted.add(job.name)
-        self._workers.submit(
-            job.name,
-            pickle.dumps(job.step),
-            self._urgency[job.name],
-        )
+    def _submit(self, name: str) -> None:
+        self._submitted.add(name)
+        step = pickle.dumps(self._jobs[name].step)
+        self._workers.submit(name, step, self._urgency[name])
 
     def _take_in(self, timeout: float) -> None:
         try:
@@ -221,29 +195,28 @@ class _Run:
         if isinstance(error, LostSchedulerError):
             raise error
         if (
-            isinstance(error, ProcessDiedError)
+            isinstance(error, processes.ProcessDiedError)
             and self._deaths[name] < _RETRIES
         ):
             self._deaths[name] += 1
             self._shown.note(f"{name}: {error}; it starts again")
-            self._submit(self._jobs[name])
+            self._submit(name)
             return
-        self._faults[name] = _describe(error)
+        fault = str(error)
+        if not isinstance(
+            error, InputError | processes.JobError | processes.ProcessDiedError
+        ):
+            fault = one_line(f"{type(error).__name__}: {error}")
+        self._faults[name] = fault
         self._shown.end(name, fault=True)
         self._submit_ready()
         if self._submitted:
-            self._shown.note(f"{name}: failed: {self._faults[name]}")
+            self._shown.note(f"{name}: failed: {fault}")
 
     def _stop(self) -> None:
         """Ends what is running, and waits until it has closed its files."""
         self._submitted.clear()
         self._workers.stop()
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + processes.PATIENCE
         while self._running and (left := deadline - time.monotonic()) > 0:
             self._take_in(min(left, _REFRESH_INTERVAL))
-
-
-def _describe(error: Exception) -> str:
-    if isinstance(error, InputError | JobError | ProcessDiedError):
-        return str(error)
-    return one_line(f"{type(error).__name__}: {error}")

@@ -21,7 +21,7 @@ class Reporter:
     """Reports the progress of a step; without a receiver it is silent."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
-        """Reports a message to its receiver: a kind and its values."""
+        """Takes the receiver of messages: a kind and its values."""
         self._send = send
         self._reported: float | None = None
 

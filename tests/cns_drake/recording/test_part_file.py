@@ -86,14 +86,15 @@ def test_one_writer_at_a_time(tmp_path):
 def test_a_file_that_gets_its_final_name_meanwhile(tmp_path, monkeypatch):
     path = tmp_path / "file.part"
     path.write_bytes(b"abc")
-    fdopen = os.fdopen
+    os_open = os.open
 
-    def fdopen_late(*arguments):
+    def open_late(*arguments):
+        descriptor = os_open(*arguments)
         path.rename(tmp_path / "file")
         path.write_bytes(b"of another")
-        return fdopen(*arguments)
+        return descriptor
 
-    monkeypatch.setattr(os, "fdopen", fdopen_late)
+    monkeypatch.setattr(os, "open", open_late)
     with pytest.raises(InputError, match=r"file\.part: another process has"):
         PartFile(path)
     assert (tmp_path / "file").read_bytes() == b"abc"
