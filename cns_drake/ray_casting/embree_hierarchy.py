@@ -50,8 +50,7 @@ class _Built(NamedTuple):
 
     Attributes:
         scene: the RTCScene, 0 if empty.
-        owners: `Primitives.owners` of each of its geometries. A copy, which
-            shares its scene, has one owner for all primitives.
+        owners: `Primitives.owners` of each of its geometries.
     """
 
     scene: int
@@ -69,11 +68,11 @@ class _Tree(NamedTuple):
         first_primitive: (1 + I, G) int64, the index in `owner_of_primitive` of
             the first primitive of geometry g in the fixed scene (first row) and
             in each instance.
-        owner_of_primitive: (P,) int32.
-        steps: (1 + I,) int64, from one primitive to the next in
-            `owner_of_primitive`: 1, or 0 where all have the same owner.
+        owner_of_primitive: (P,) int32 number of its member in the group.
         groups: (1 + I,) int32 row of the group of the fixed scene and of each
             instance.
+        first_member: (1 + I,) int64 place of the group's first member in:
+        geometries: (M,) int32 index of the geometry of each member.
     """
 
     lanes: int
@@ -82,8 +81,9 @@ class _Tree(NamedTuple):
     arguments: int
     first_primitive: np.ndarray
     owner_of_primitive: np.ndarray
-    steps: np.ndarray
     groups: np.ndarray
+    first_member: np.ndarray
+    geometries: np.ndarray
 
 
 class EmbreeHierarchy:
@@ -126,32 +126,22 @@ class EmbreeHierarchy:
             self._lib.rtcRetainDevice(self._device)
         self._scenes: list[int] = []
         weakref.finalize(self, _release, self._lib, self._device, self._scenes)
-        # The `id` of a group, and of a copied surface -> its Embree scene.
-        known: dict[int, _Built] = {}
-        copied: dict[int, _Built] = {}
-        if previous is not None:
-            for row, old in previous._built.items():
-                group = previous._groups[row]
-                known[id(group)] = old
-                if group.is_copy:
-                    copied[id(group.members[0][2])] = old
-        self._built: dict[int, _Built] = {}
-        for row, group in enumerate(groups):
-            built = known.get(id(group))
-            if built is None and group.is_copy:
-                built = copied.get(id(group.members[0][2]))
-            if built is None:
-                built = self._build(list(merge(group)))
-                if group.is_copy:
-                    copied[id(group.members[0][2])] = built
-            elif built.scene:
-                self._lib.rtcRetainScene(built.scene)
-                self._scenes.append(built.scene)
-            if group.is_copy:
-                owner = np.array([group.members[0][0]], np.int32)
-                built = built._replace(owners=(owner,))
-            self._built[row] = built
-        self.rows = [row for row, built in self._built.items() if built.scene]
+        # Groups of the same shapes share their scene.
+        before = {} if previous is None else previous._by_content
+        self._by_content: dict[tuple, _Built] = {}
+        self._built: list[_Built] = []
+        for group in groups:
+            content = group.content()
+            if content not in self._by_content:
+                built = before.get(content)
+                if built is None:
+                    built = self._build(list(merge(group)))
+                elif built.scene:
+                    self._lib.rtcRetainScene(built.scene)
+                    self._scenes.append(built.scene)
+                self._by_content[content] = built
+            self._built.append(self._by_content[content])
+        self.rows = [k for k, built in enumerate(self._built) if built.scene]
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top = 0
@@ -170,23 +160,25 @@ class EmbreeHierarchy:
         if error:
             raise MemoryError(f"Embree cannot build the scene: error {error}")
         # Rows of groups in the order of `_Tree.first_primitive`.
-        rows = [fixed[0] if fixed else -1, *moving]
+        rows = [*(fixed or [-1]), *moving]
         self._arguments = embree.IntersectArguments(
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
-        nothing = _Built(0, ())
-        copies = {row for row, group in enumerate(groups) if group.is_copy}
         lanes, self._intersect = embree.native_packet(self._lib, self._device)
+        nothing = _Built(0, ())
+        counts = [len(group.members) for group in groups]
+        indices = [index for group in groups for index, *_ in group.members]
         self._tree = _Tree(
             lanes,
             self._built[fixed[0]].scene if fixed else 0,
             self._top,
             ctypes.addressof(self._arguments),
             *_list_owners(
-                [self._built.get(row, nothing).owners for row in rows]
+                [self._built[k] if k >= 0 else nothing for k in rows]
             ),
-            np.array([row not in copies for row in rows], np.int64),
             np.array(rows, np.int32),
+            np.cumsum([0, *counts])[rows],
+            np.array(indices, np.int32),
         )
 
     def place(self, placed: Placed) -> None:
@@ -241,7 +233,7 @@ class EmbreeHierarchy:
     ) -> Hits:
         """Casts rays."""
         num_rays = len(rays.d_Sset)
-        hits = Hits.room_for(num_rays, with_normals)
+        hits = Hits.misses(num_rays, with_normals)
         # All threads draw from one iterator, which gives each part once.
         parts = iter(_divide(num_rays, self._num_threads))
 
@@ -378,14 +370,19 @@ def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
 
 
 def _list_owners(
-    scenes: Collection[Sequence[np.ndarray]],
+    scenes: Collection[_Built],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns `_Tree.first_primitive` and `_Tree.owner_of_primitive`."""
-    first = np.zeros((len(scenes), max(1, *map(len, scenes))), np.int64)
-    owners = [np.zeros(0, np.int32)]
-    count = 0
-    for row, parts in enumerate(scenes):
-        for k, part in enumerate(parts):
+    widest = max(1, *(len(built.owners) for built in scenes))
+    first = np.zeros((len(scenes), widest), np.int64)
+    owners, count = [np.zeros(0, np.int32)], 0
+    known: dict[int, int] = {}
+    for row, built in enumerate(scenes):
+        same = known.setdefault(built.scene, row)
+        if same < row:
+            first[row] = first[same]
+            continue
+        for k, part in enumerate(built.owners):
             first[row, k] = count
             owners.append(part)
             count += len(part)
@@ -495,17 +492,16 @@ def _cast_packets(
             ray = begin + lane
             hit = packet_id[18, lane]
             if hit == embree.INVALID_ID:
-                hits.ranges[ray] = np.inf
-                hits.owner[ray] = hits.group[ray] = -1
-                for axis in range(hits.normals.shape[1]):
-                    hits.normals[ray, axis] = 0.0
                 continue
             hits.ranges[ray] = packet[8, lane]
             instance = packet_id[19, lane]
             row = 0 if instance == embree.INVALID_ID else 1 + np.int64(instance)
-            primitive = np.int64(packet_id[17, lane]) * tree.steps[row]
+            primitive = np.int64(packet_id[17, lane])
             primitive += tree.first_primitive[row, hit]
-            hits.owner[ray] = tree.owner_of_primitive[primitive]
+            owner = tree.owner_of_primitive[primitive]
+            if owner >= 0:
+                owner = tree.geometries[tree.first_member[row] + owner]
+            hits.owner[ray] = owner
             hits.group[ray] = tree.groups[row]
             for axis in range(hits.normals.shape[1]):
                 hits.normals[ray, axis] = packet[12 + axis, lane]

@@ -9,12 +9,7 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.ray_casting.ray_groups import (
-    NO_MOTIONS,
-    Member,
-    Motion,
-    RayGroup,
-)
+from cns_drake.ray_casting.ray_groups import Member, Motion, RayGroup
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
@@ -93,6 +88,7 @@ class Placed(NamedTuple):
         return Placed(*(one[kept] for one in self))
 
 
+NO_MOTIONS: Mapping[FrameId, Motion] = {}
 NOTHING_KNOWN = KnownPoses({}, np.zeros((0, 4, 4)))
 EVERYWHERE = Ball(np.zeros(3), np.inf)
 NOTHING_PLACED = Placed.of((), ())
