@@ -308,9 +308,7 @@ def _animate(meshcat: Meshcat, drive: DriveRecord, world: World) -> None:
     own = [frame for frame in drive.X_WFs if frame not in drive.limbs]
     for path, frame_id in _moving_paths(world, own).items():
         draw_body(
-            meshcat,
-            path,
-            read_perception_geometry(inspector, frame_id.__eq__),
+            meshcat, path, read_perception_geometry(inspector, frame_id.__eq__)
         )
         _move(meshcat, animation, path, drive.X_WFs[frame_id])
     _animate_limbs(meshcat, animation, drive, inspector)

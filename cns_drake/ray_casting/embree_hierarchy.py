@@ -225,11 +225,7 @@ class EmbreeHierarchy:
             lib.rtcJoinCommitScene(self._top)
 
     def cast(
-        self,
-        rays: Rays,
-        *,
-        mask: int = ALL,
-        with_normals: bool = False,
+        self, rays: Rays, *, mask: int = ALL, with_normals: bool = False
     ) -> Hits:
         """Casts rays."""
         num_rays = len(rays.d_Sset)
@@ -369,9 +365,7 @@ def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
     return parts
 
 
-def _list_owners(
-    scenes: Collection[_Built],
-) -> tuple[np.ndarray, np.ndarray]:
+def _list_owners(scenes: Collection[_Built]) -> tuple[np.ndarray, np.ndarray]:
     """Returns `_Tree.first_primitive` and `_Tree.owner_of_primitive`."""
     widest = max(1, *(len(built.owners) for built in scenes))
     first = np.zeros((len(scenes), widest), np.int64)
@@ -483,10 +477,7 @@ def _cast_packets(
         for scene in (tree.fixed, tree.instances):
             if scene != 0:
                 intersect(
-                    valid.ctypes.data,
-                    scene,
-                    packet.ctypes.data,
-                    tree.arguments,
+                    valid.ctypes.data, scene, packet.ctypes.data, tree.arguments
                 )
         for lane in range(count):
             ray = begin + lane

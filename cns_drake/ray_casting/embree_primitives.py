@@ -160,10 +160,7 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
         normals = _float32(d[2] for d in discs)
         yield Primitives(
             embree.DISC,
-            [
-                _vertices(discs),
-                (embree.NORMAL_BUFFER, embree.FLOAT3, normals),
-            ],
+            [_vertices(discs), (embree.NORMAL_BUFFER, embree.FLOAT3, normals)],
             np.repeat([d[0] for d in discs], 2).astype(np.int32),
         )
     if spheres:

@@ -183,9 +183,7 @@ class MovingGroups:
         )
 
     def _find_poses(
-        self,
-        calc_X_WF: Callable[[FrameId], RigidTransform],
-        known: KnownPoses,
+        self, calc_X_WF: Callable[[FrameId], RigidTransform], known: KnownPoses
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns (M, 4, 4) poses, and the (G,) rows of those of frames."""
         if known.rows is not self._known:

@@ -106,9 +106,7 @@ class RayGroup:
         return isinstance(self.members[0][2], HalfSpaceSurface)
 
     def place(
-        self,
-        p_WO: np.ndarray,
-        calc_X_WF: Callable[[FrameId], RigidTransform],
+        self, p_WO: np.ndarray, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> None:
         """Sets `X_OL` by the pose of the group's frame."""
         X_WL = self.X_FL

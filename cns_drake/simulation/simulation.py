@@ -10,10 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.files import (
-    check_writable,
-    write_text,
-)
+from cns_drake.base.files import check_writable, write_text
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.version import __version__
 from cns_drake.pictures.drive_page import ShownStages

@@ -278,9 +278,7 @@ class Lidar(LeafSystem):
         duration = self.pattern.period
         motions = {
             frame_id: Motion(
-                V_WBs[body].rotational(),
-                V_WBs[body].translational(),
-                duration,
+                V_WBs[body].rotational(), V_WBs[body].translational(), duration
             )
             for frame_id, body in self._moving_bodies.items()
         }

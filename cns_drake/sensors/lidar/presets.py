@@ -104,6 +104,5 @@ def make_beam_pattern(
         "max_range": max_range,
     }
     return replace(
-        base,
-        **{name: one for name, one in changes.items() if one is not None},
+        base, **{name: one for name, one in changes.items() if one is not None}
     )
