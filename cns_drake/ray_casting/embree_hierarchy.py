@@ -24,15 +24,8 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import embree
+from cns_drake.ray_casting import embree_primitives as primitives
 from cns_drake.ray_casting.curved_shapes import CapsuleAxes, NearCurvedShapes
-from cns_drake.ray_casting.embree_primitives import (
-    ALL,
-    PROXY_OWNER,
-    SOLID,
-    Primitives,
-    merge_first,
-    merge_second,
-)
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
@@ -100,7 +93,7 @@ class EmbreeHierarchy:
     def __init__(
         self,
         groups: Sequence[RayGroup],
-        merge: Callable[[RayGroup], Iterable[Primitives]],
+        merge: Callable[[RayGroup], Iterable[primitives.Primitives]],
         num_threads: int = 1,
         previous: EmbreeHierarchy | None = None,
     ):
@@ -225,7 +218,11 @@ class EmbreeHierarchy:
             lib.rtcJoinCommitScene(self._top)
 
     def cast(
-        self, rays: Rays, *, mask: int = ALL, with_normals: bool = False
+        self,
+        rays: Rays,
+        *,
+        mask: int = primitives.ALL,
+        with_normals: bool = False,
     ) -> Hits:
         """Casts rays."""
         num_rays = len(rays.d_Sset)
@@ -252,7 +249,7 @@ class EmbreeHierarchy:
         self._scenes.append(scene)
         return scene
 
-    def _build(self, parts: Sequence[Primitives]) -> _Built:
+    def _build(self, parts: Sequence[primitives.Primitives]) -> _Built:
         if not parts:
             return _Built(0, ())
         scene = self._new_scene()
@@ -275,7 +272,7 @@ class EmbreeHierarchy:
     def _new_instance(self, scene: int) -> int:
         handle = self._lib.rtcNewGeometry(self._device, embree.INSTANCE)
         self._lib.rtcSetGeometryInstancedScene(handle, scene)
-        self._lib.rtcSetGeometryMask(handle, ALL)
+        self._lib.rtcSetGeometryMask(handle, primitives.ALL)
         self._lib.rtcAttachGeometry(self._top, handle)
         self._lib.rtcReleaseGeometry(handle)  # The scene owns it.
         return handle
@@ -302,10 +299,10 @@ class EmbreeScene:
         if previous is not None:
             first, second = previous._first, previous._second
         self._first: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_first, num_threads, first
+            groups, primitives.merge_first, num_threads, first
         )
         self._second: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_second, 1, second
+            groups, primitives.merge_second, 1, second
         )
         self._near = NearCurvedShapes(
             [groups[row] for row in self._second.rows]
@@ -328,7 +325,7 @@ class EmbreeScene:
     def _cast_again(self, rays: Rays, hits: Hits, with_normals: bool) -> None:
         """Updates the hits of rays that may meet curved shapes that stay."""
         is_near = self._near.contain(rays.p_OSset)
-        is_unsure = hits.owner == PROXY_OWNER
+        is_unsure = hits.owner == primitives.PROXY_OWNER
         if is_near.any():  # Origins are taken in turn.
             is_unsure |= np.resize(is_near, len(is_unsure))
         again = np.flatnonzero(is_unsure)
@@ -339,7 +336,7 @@ class EmbreeScene:
             reach = np.minimum(in_second.ranges, rest.max_ranges)
             in_first = self._first.cast(
                 rest._replace(max_ranges=reach),
-                mask=SOLID,
+                mask=primitives.SOLID,
                 with_normals=with_normals,
             )
             is_first = in_first.owner >= 0

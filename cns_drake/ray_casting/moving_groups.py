@@ -10,12 +10,7 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting.ray_groups import Member, Motion, RayGroup
-from cns_drake.scene.surfaces import (
-    CapsuleSurface,
-    CylinderSurface,
-    EllipsoidSurface,
-    TriangleSurface,
-)
+from cns_drake.scene import surfaces
 
 
 class KnownPoses(NamedTuple):
@@ -212,14 +207,16 @@ def _radius_about_F(group: RayGroup) -> float:
 def _radius_about_L(members: Iterable[Member]) -> float:
     radii = []
     for _, X_LG, surface in members:
-        if isinstance(surface, TriangleSurface):
+        if isinstance(surface, surfaces.TriangleSurface):
             p_LVset = surface.p_GVset @ X_LG.rotation().matrix().T
             p_LVset = p_LVset + X_LG.translation()
             radii.append(float(np.linalg.norm(p_LVset, axis=1).max(initial=0)))
             continue
-        if isinstance(surface, EllipsoidSurface):
+        if isinstance(surface, surfaces.EllipsoidSurface):
             radius = max(surface.semi_axes)
-        elif isinstance(surface, CylinderSurface | CapsuleSurface):
+        elif isinstance(
+            surface, surfaces.CylinderSurface | surfaces.CapsuleSurface
+        ):
             radius = surface.radius + surface.length / 2.0
         else:
             radius = np.inf

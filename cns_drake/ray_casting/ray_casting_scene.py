@@ -16,14 +16,7 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.moving_groups import (
-    EVERYWHERE,
-    NO_MOTIONS,
-    NOTHING_KNOWN,
-    Ball,
-    KnownPoses,
-    MovingGroups,
-)
+from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_groups import Motion, RayGroup, group_geometries
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
@@ -102,7 +95,7 @@ class RayCastingScene:
         self._scene: EmbreeScene | Open3dScene = _make_scene(
             solid, num_threads, None if previous is None else previous._scene
         )
-        self._moving = MovingGroups(self._groups, self._p_WO)
+        self._moving = moving_groups.MovingGroups(self._groups, self._p_WO)
         self._normal_matrices: np.ndarray | None = None
         self._group_of = np.zeros(len(geometries), np.int64)
         for row, group in enumerate(self._groups):
@@ -111,9 +104,9 @@ class RayCastingScene:
     def set_frame_poses(
         self,
         calc_X_WF: Callable[[FrameId], RigidTransform],
-        motions: Mapping[FrameId, Motion] = NO_MOTIONS,
-        known: KnownPoses = NOTHING_KNOWN,
-        seen: Ball = EVERYWHERE,
+        motions: Mapping[FrameId, Motion] = moving_groups.NO_MOTIONS,
+        known: moving_groups.KnownPoses = moving_groups.NOTHING_KNOWN,
+        seen: moving_groups.Ball = moving_groups.EVERYWHERE,
     ) -> None:
         """Moves the geometry of the frames that are not anchored.
 

@@ -14,13 +14,8 @@ from pydrake.math import RigidTransform, inv
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.elementary import product, rotated
+from cns_drake.scene import surfaces
 from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surfaces import (
-    EllipsoidSurface,
-    HalfSpaceSurface,
-    Surface,
-    TriangleSurface,
-)
 
 # A mesh whose copies have more triangles than this is held once. Its rays are
 # slower, since each copy has its own hierarchy. The many small objects of a
@@ -31,7 +26,7 @@ _LARGEST_STEP_RAD = 2.0
 # The most time steps that Embree supports.
 _MOST_STEPS = 129
 # A member of a scene: index of a geometry, its pose, its surface.
-Member = tuple[int, RigidTransform, Surface]
+Member = tuple[int, RigidTransform, surfaces.Surface]
 
 
 class Motion(NamedTuple):
@@ -103,7 +98,7 @@ class RayGroup:
 
     @property
     def is_half_space(self) -> bool:
-        return isinstance(self.members[0][2], HalfSpaceSurface)
+        return isinstance(self.members[0][2], surfaces.HalfSpaceSurface)
 
     def place(
         self, p_WO: np.ndarray, calc_X_WF: Callable[[FrameId], RigidTransform]
@@ -135,7 +130,7 @@ class RayGroup:
         shapes = tuple(
             (
                 # Comparing all triangles would take too long.
-                id(one) if isinstance(one, TriangleSurface) else one,
+                id(one) if isinstance(one, surfaces.TriangleSurface) else one,
                 X_LG.GetAsMatrix34().tobytes(),
             )
             for _, X_LG, one in self.members
@@ -172,7 +167,7 @@ def group_geometries(
         frame_id, X_FG = geometry.frame_id, geometry.X_FG
         if frame_id in anchored_frames:
             frame_id, X_FG = None, calc_X_WF(frame_id) @ X_FG
-        if isinstance(geometry.surface, HalfSpaceSurface):
+        if isinstance(geometry.surface, surfaces.HalfSpaceSurface):
             plane: Member = (index, RigidTransform(), geometry.surface)
             half_spaces.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [plane]))
             continue
@@ -203,10 +198,11 @@ def group_geometries(
                     )
                 )
             elif (
-                isinstance(surface, EllipsoidSurface) and not surface.is_sphere
+                isinstance(surface, surfaces.EllipsoidSurface)
+                and not surface.is_sphere
             ):
                 stretch = np.diag([*surface.semi_axes, 1.0])
-                unit_sphere = EllipsoidSurface((1.0, 1.0, 1.0))
+                unit_sphere = surfaces.EllipsoidSurface((1.0, 1.0, 1.0))
                 alone.append(
                     RayGroup(
                         frame_id,
@@ -230,7 +226,7 @@ def _find_shared(
     num_triangles: Counter[int] = Counter()
     copies: Counter[int] = Counter()
     for _, geometry in geometries:
-        if isinstance(geometry.surface, TriangleSurface):
+        if isinstance(geometry.surface, surfaces.TriangleSurface):
             key = id(geometry.surface)
             copies[key] += 1
             num_triangles[key] += len(geometry.surface.triangles)

@@ -26,12 +26,7 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake.base.elementary import product, rotated
-from cns_drake.ray_casting.moving_groups import (
-    EVERYWHERE,
-    NOTHING_KNOWN,
-    Ball,
-    KnownPoses,
-)
+from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.perception_geometry import (
@@ -243,8 +238,8 @@ class Lidar(LeafSystem):
         return seen
 
     def _update(self, context: Context, seen: SeenGeometry) -> None:
-        known, ball = self._known_poses(context), EVERYWHERE
-        if known is not NOTHING_KNOWN:
+        known, ball = self._known_poses(context), moving_groups.EVERYWHERE
+        if known is not moving_groups.NOTHING_KNOWN:
             # Geometry out of sight is not moved.
             ball = self._calc_ball(context)
         seen.update(
@@ -255,10 +250,10 @@ class Lidar(LeafSystem):
             ball,
         )
 
-    def _known_poses(self, context: Context) -> KnownPoses:
-        return _value(self._frame_poses, context, NOTHING_KNOWN)
+    def _known_poses(self, context: Context) -> moving_groups.KnownPoses:
+        return _value(self._frame_poses, context, moving_groups.NOTHING_KNOWN)
 
-    def _calc_ball(self, context: Context) -> Ball:
+    def _calc_ball(self, context: Context) -> moving_groups.Ball:
         """Returns the ball in which beams can meet geometry."""
         model = self._returns or self._measurement
         reach = model.reach(self.pattern.max_range)
@@ -268,7 +263,7 @@ class Lidar(LeafSystem):
             middle = p_WSset.mean(axis=0)
             way = np.linalg.norm(p_WSset - middle, axis=1).max()
         # A metre of margin for rounding and merged beams.
-        return Ball(middle, float(reach + way) + 1.0)
+        return moving_groups.Ball(middle, float(reach + way) + 1.0)
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
         """Returns the motion of each frame that does not stay."""
@@ -448,8 +443,8 @@ class SeenGeometry:
         query_object: QueryObject,
         revision: int | None,
         motions: Mapping[FrameId, Motion],
-        known: KnownPoses,
-        seen: Ball,
+        known: moving_groups.KnownPoses,
+        seen: moving_groups.Ball,
     ) -> None:
         """Moves moving geometry, and builds changed geometry anew.
 
