@@ -9,30 +9,11 @@ from importlib import resources
 import logging
 
 import numpy as np
-from pydrake.geometry import (
-    FrameId,
-    Meshcat,
-    MeshcatAnimation,
-    MeshcatParams,
-    Rgba,
-    Role,
-    SceneGraphInspector,
-)
+from pydrake import geometry
 from pydrake.math import RigidTransform
 
+from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
-from cns_drake.pictures.meshcat_drawing import (
-    END_RGB,
-    POINT_HEIGHTS,
-    START_RGB,
-    draw_body,
-    draw_marker,
-    draw_parts,
-    draw_points,
-    draw_route,
-    height_rgb,
-    set_view,
-)
 from cns_drake.pictures.static_page import make_static_page
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
@@ -94,15 +75,17 @@ class DriveRecord:
 
     period: float
     X_WBs: list[RigidTransform] = field(default_factory=list)
-    X_WFs: dict[FrameId, list[RigidTransform]] = field(default_factory=dict)
+    X_WFs: dict[geometry.FrameId, list[RigidTransform]] = field(
+        default_factory=dict
+    )
     scans: list[tuple[int, np.ndarray]] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
     specific_forces_I: list[np.ndarray] = field(default_factory=list)
     angular_velocities_I: list[np.ndarray] = field(default_factory=list)
-    limbs: dict[FrameId, dict[FrameId, RigidTransform]] = field(
-        default_factory=dict
+    limbs: dict[geometry.FrameId, dict[geometry.FrameId, RigidTransform]] = (
+        field(default_factory=dict)
     )
-    names: dict[FrameId, str] = field(default_factory=dict)
+    names: dict[geometry.FrameId, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -152,13 +135,15 @@ def make_drive_page(
     then violet. Below the time line are plots of speed, IMU and stage.
     """
     with _quiet():
-        meshcat = Meshcat(MeshcatParams(host="127.0.0.1", port=0))
+        meshcat = geometry.Meshcat(
+            geometry.MeshcatParams(host="127.0.0.1", port=0)
+        )
     changes = _draw_city(meshcat, world, shown.other)
     if len(drive.X_WBs) > 1:
-        draw_route(meshcat, "/route", drive.X_WBs)
+        drawing.draw_route(meshcat, "/route", drive.X_WBs)
     _animate(meshcat, drive, world)
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
-    set_view(meshcat, p_WBset.min(axis=0), p_WBset.max(axis=0))
+    drawing.set_view(meshcat, p_WBset.min(axis=0), p_WBset.max(axis=0))
     return make_static_page(
         meshcat,
         title,
@@ -182,7 +167,7 @@ def make_panel(
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
     length = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1).sum()
     minutes, seconds = divmod(int((len(p_WBset) - 1) * drive.period), 60)
-    lowest, highest = POINT_HEIGHTS
+    lowest, highest = drawing.POINT_HEIGHTS
     environment = Environment(
         autoescape=True,
         trim_blocks=True,
@@ -193,9 +178,9 @@ def make_panel(
         style=Markup(_read_template("drive.css")),
         title=title,
         facts=f"{length / 1000.0:.2f} km in {minutes} min {seconds} s",
-        points=_gradient(height_rgb(np.linspace(lowest, highest, 9))),
+        points=_gradient(drawing.height_rgb(np.linspace(lowest, highest, 9))),
         heights=f"{lowest:g} to {highest:g} m",
-        route=_gradient([START_RGB, END_RGB]),
+        route=_gradient([drawing.START_RGB, drawing.END_RGB]),
         colours={name: _hex(rgb) for name, rgb in CHANGE_RGB.items()},
         changes={
             name: words.format(other=shown.other_name)
@@ -264,75 +249,83 @@ def motion_plots(drive: DriveRecord) -> list[Plot]:
     ]
 
 
-def moving_frames(world: World) -> tuple[FrameId, ...]:
+def moving_frames(world: World) -> tuple[geometry.FrameId, ...]:
     """Returns the frames with visible geometry that may move."""
     inspector = world.scene_graph.model_inspector()
     frames = (
         inspector.GetFrameId(geometry_id)
-        for geometry_id in inspector.GetAllGeometryIds(Role.kPerception)
+        for geometry_id in inspector.GetAllGeometryIds(
+            geometry.Role.kPerception
+        )
     )
     anchored = world.anchored_frames()
     return tuple(f for f in dict.fromkeys(frames) if f not in anchored)
 
 
 def _draw_city(
-    meshcat: Meshcat, world: World, other_stage: World | None
+    meshcat: geometry.Meshcat, world: World, other_stage: World | None
 ) -> set[str]:
     """Draws static structures; returns the layers of change that exist."""
     own = read_parts(world)
     other = own if other_stage is None else read_parts(other_stage)
     difference = compare_parts(own, other)
-    draw_parts(meshcat, "/city", difference.common)
-    draw_parts(meshcat, "/stage_difference/additional", difference.additional)
+    drawing.draw_parts(meshcat, "/city", difference.common)
+    drawing.draw_parts(
+        meshcat, "/stage_difference/additional", difference.additional
+    )
     _draw_missing(meshcat, "absent", difference.absent)
     _draw_missing(meshcat, "lower", difference.lower)
     return {name for name in CHANGE_RGB if getattr(difference, name)}
 
 
-def _draw_missing(meshcat: Meshcat, name: str, parts: Sequence[Part]) -> None:
+def _draw_missing(
+    meshcat: geometry.Meshcat, name: str, parts: Sequence[Part]
+) -> None:
     """Draws the parts that only the other stage has; off at first."""
     if not parts:
         return
     path = f"/stage_difference/{name}"
-    draw_parts(meshcat, path, parts, Rgba(*CHANGE_RGB[name], _OPACITY))
+    drawing.draw_parts(
+        meshcat, path, parts, geometry.Rgba(*CHANGE_RGB[name], _OPACITY)
+    )
     for semantic_class in {part.semantic_class for part in parts}:
         for key, value in _UNREAL.items():
             meshcat.SetProperty(f"{path}/{semantic_class}/<object>", key, value)
     meshcat.SetProperty(path, "visible", False)
 
 
-def _animate(meshcat: Meshcat, drive: DriveRecord, world: World) -> None:
+def _animate(
+    meshcat: geometry.Meshcat, drive: DriveRecord, world: World
+) -> None:
     """Draws moving bodies and scans, and animates them over the drive."""
-    animation = MeshcatAnimation(frames_per_second=1.0 / drive.period)
+    animation = geometry.MeshcatAnimation(frames_per_second=1.0 / drive.period)
     inspector = world.scene_graph.model_inspector()
     own = [frame for frame in drive.X_WFs if frame not in drive.limbs]
     for path, frame_id in _moving_paths(world, own).items():
-        draw_body(
-            meshcat,
-            path,
-            read_perception_geometry(inspector, frame_id.__eq__),
+        drawing.draw_body(
+            meshcat, path, read_perception_geometry(inspector, frame_id.__eq__)
         )
         _move(meshcat, animation, path, drive.X_WFs[frame_id])
     _animate_limbs(meshcat, animation, drive, inspector)
     # The page's script places it.
-    draw_marker(meshcat, "/vehicle/marker")
+    drawing.draw_marker(meshcat, "/vehicle/marker")
     for k, (frame, p_WRset) in enumerate(drive.scans):
         path = f"/scans/{k:03d}"
-        draw_points(meshcat, path, p_WRset)
+        drawing.draw_points(meshcat, path, p_WRset)
         if frame > 0:
             animation.SetProperty(0, path, "visible", False)
             animation.SetProperty(frame, path, "visible", True)
     animation.set_autoplay(True)
-    animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopOnce)
+    animation.set_loop_mode(geometry.MeshcatAnimation.LoopMode.kLoopOnce)
     animation.set_clamp_when_finished(True)
     meshcat.SetAnimation(animation)
 
 
 def _animate_limbs(
-    meshcat: Meshcat,
-    animation: MeshcatAnimation,
+    meshcat: geometry.Meshcat,
+    animation: geometry.MeshcatAnimation,
     drive: DriveRecord,
-    inspector: SceneGraphInspector,
+    inspector: geometry.SceneGraphInspector,
 ) -> None:
     """Draws a moving frame and its limbs as one."""
     # The frame that leads each limb, and the pose of the limb in it.
@@ -341,7 +334,7 @@ def _animate_limbs(
         for leading, X_FLs in drive.limbs.items()
         for limb, X_FL in X_FLs.items()
     }
-    drawn: dict[FrameId, list[PerceptionGeometry]] = {
+    drawn: dict[geometry.FrameId, list[PerceptionGeometry]] = {
         f: [] for f in drive.limbs
     }
     if led:
@@ -350,13 +343,13 @@ def _animate_limbs(
             drawn[leading].append(replace(one, X_FG=X_FL @ one.X_FG))
     for leading, geometries in drawn.items():
         path = f"/moving/{drive.names[leading]}"
-        draw_body(meshcat, path, geometries)
+        drawing.draw_body(meshcat, path, geometries)
         _move(meshcat, animation, path, drive.X_WFs[leading], _TRAFFIC_INTERVAL)
 
 
 def _move(
-    meshcat: Meshcat,
-    animation: MeshcatAnimation,
+    meshcat: geometry.Meshcat,
+    animation: geometry.MeshcatAnimation,
     path: str,
     X_WFs: Sequence[RigidTransform],
     interval: int = 1,
@@ -369,8 +362,8 @@ def _move(
 
 
 def _moving_paths(
-    world: World, frame_ids: Iterable[FrameId]
-) -> dict[str, FrameId]:
+    world: World, frame_ids: Iterable[geometry.FrameId]
+) -> dict[str, geometry.FrameId]:
     """Returns the layer of each moving frame."""
     paths = {}
     for frame_id in frame_ids:

@@ -171,8 +171,7 @@ def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     # The camera is south of the middle and looks north.
     target = np.array([center[0], center[1] - 0.15 * reach, lower[2]])
     meshcat.SetCameraPose(
-        target + np.array([-0.35, -1.05, 0.85]) * max(reach, 10.0) * 1.5,
-        target,
+        target + np.array([-0.35, -1.05, 0.85]) * max(reach, 10.0) * 1.5, target
     )
 
 

@@ -9,9 +9,7 @@ import zlib
 import numpy as np
 from pydrake.geometry import Meshcat
 
-from cns_drake.base.files import (
-    write_text,
-)
+from cns_drake.base.files import write_text
 
 # Higher levels take many times as long for a few percent.
 _LEVEL = 4

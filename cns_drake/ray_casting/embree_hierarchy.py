@@ -24,15 +24,8 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import embree
+from cns_drake.ray_casting import embree_primitives as primitives
 from cns_drake.ray_casting.curved_shapes import CapsuleAxes, NearCurvedShapes
-from cns_drake.ray_casting.embree_primitives import (
-    ALL,
-    PROXY_OWNER,
-    SOLID,
-    Primitives,
-    merge_first,
-    merge_second,
-)
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
@@ -50,8 +43,7 @@ class _Built(NamedTuple):
 
     Attributes:
         scene: the RTCScene, 0 if empty.
-        owners: `Primitives.owners` of each of its geometries. A copy, which
-            shares its scene, has one owner for all primitives.
+        owners: `Primitives.owners` of each of its geometries.
     """
 
     scene: int
@@ -69,11 +61,11 @@ class _Tree(NamedTuple):
         first_primitive: (1 + I, G) int64, the index in `owner_of_primitive` of
             the first primitive of geometry g in the fixed scene (first row) and
             in each instance.
-        owner_of_primitive: (P,) int32.
-        steps: (1 + I,) int64, from one primitive to the next in
-            `owner_of_primitive`: 1, or 0 where all have the same owner.
+        owner_of_primitive: (P,) int32 number of its member in the group.
         groups: (1 + I,) int32 row of the group of the fixed scene and of each
             instance.
+        first_member: (1 + I,) int64 place of the group's first member in:
+        geometries: (M,) int32 index of the geometry of each member.
     """
 
     lanes: int
@@ -82,8 +74,9 @@ class _Tree(NamedTuple):
     arguments: int
     first_primitive: np.ndarray
     owner_of_primitive: np.ndarray
-    steps: np.ndarray
     groups: np.ndarray
+    first_member: np.ndarray
+    geometries: np.ndarray
 
 
 class EmbreeHierarchy:
@@ -100,7 +93,7 @@ class EmbreeHierarchy:
     def __init__(
         self,
         groups: Sequence[RayGroup],
-        merge: Callable[[RayGroup], Iterable[Primitives]],
+        merge: Callable[[RayGroup], Iterable[primitives.Primitives]],
         num_threads: int = 1,
         previous: EmbreeHierarchy | None = None,
     ):
@@ -126,32 +119,22 @@ class EmbreeHierarchy:
             self._lib.rtcRetainDevice(self._device)
         self._scenes: list[int] = []
         weakref.finalize(self, _release, self._lib, self._device, self._scenes)
-        # The `id` of a group, and of a copied surface -> its Embree scene.
-        known: dict[int, _Built] = {}
-        copied: dict[int, _Built] = {}
-        if previous is not None:
-            for row, old in previous._built.items():
-                group = previous._groups[row]
-                known[id(group)] = old
-                if group.is_copy:
-                    copied[id(group.members[0][2])] = old
-        self._built: dict[int, _Built] = {}
-        for row, group in enumerate(groups):
-            built = known.get(id(group))
-            if built is None and group.is_copy:
-                built = copied.get(id(group.members[0][2]))
-            if built is None:
-                built = self._build(list(merge(group)))
-                if group.is_copy:
-                    copied[id(group.members[0][2])] = built
-            elif built.scene:
-                self._lib.rtcRetainScene(built.scene)
-                self._scenes.append(built.scene)
-            if group.is_copy:
-                owner = np.array([group.members[0][0]], np.int32)
-                built = built._replace(owners=(owner,))
-            self._built[row] = built
-        self.rows = [row for row, built in self._built.items() if built.scene]
+        # Groups of the same shapes share their scene.
+        before = {} if previous is None else previous._by_content
+        self._by_content: dict[tuple, _Built] = {}
+        self._built: list[_Built] = []
+        for group in groups:
+            content = group.content()
+            if content not in self._by_content:
+                built = before.get(content)
+                if built is None:
+                    built = self._build(list(merge(group)))
+                elif built.scene:
+                    self._lib.rtcRetainScene(built.scene)
+                    self._scenes.append(built.scene)
+                self._by_content[content] = built
+            self._built.append(self._by_content[content])
+        self.rows = [k for k, built in enumerate(self._built) if built.scene]
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top = 0
@@ -170,23 +153,25 @@ class EmbreeHierarchy:
         if error:
             raise MemoryError(f"Embree cannot build the scene: error {error}")
         # Rows of groups in the order of `_Tree.first_primitive`.
-        rows = [fixed[0] if fixed else -1, *moving]
+        rows = [*(fixed or [-1]), *moving]
         self._arguments = embree.IntersectArguments(
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
-        nothing = _Built(0, ())
-        copies = {row for row, group in enumerate(groups) if group.is_copy}
         lanes, self._intersect = embree.native_packet(self._lib, self._device)
+        nothing = _Built(0, ())
+        counts = [len(group.members) for group in groups]
+        indices = [index for group in groups for index, *_ in group.members]
         self._tree = _Tree(
             lanes,
             self._built[fixed[0]].scene if fixed else 0,
             self._top,
             ctypes.addressof(self._arguments),
             *_list_owners(
-                [self._built.get(row, nothing).owners for row in rows]
+                [self._built[k] if k >= 0 else nothing for k in rows]
             ),
-            np.array([row not in copies for row in rows], np.int64),
             np.array(rows, np.int32),
+            np.cumsum([0, *counts])[rows],
+            np.array(indices, np.int32),
         )
 
     def place(self, placed: Placed) -> None:
@@ -236,12 +221,12 @@ class EmbreeHierarchy:
         self,
         rays: Rays,
         *,
-        mask: int = ALL,
+        mask: int = primitives.ALL,
         with_normals: bool = False,
     ) -> Hits:
         """Casts rays."""
         num_rays = len(rays.d_Sset)
-        hits = Hits.room_for(num_rays, with_normals)
+        hits = Hits.misses(num_rays, with_normals)
         # All threads draw from one iterator, which gives each part once.
         parts = iter(_divide(num_rays, self._num_threads))
 
@@ -264,7 +249,7 @@ class EmbreeHierarchy:
         self._scenes.append(scene)
         return scene
 
-    def _build(self, parts: Sequence[Primitives]) -> _Built:
+    def _build(self, parts: Sequence[primitives.Primitives]) -> _Built:
         if not parts:
             return _Built(0, ())
         scene = self._new_scene()
@@ -287,7 +272,7 @@ class EmbreeHierarchy:
     def _new_instance(self, scene: int) -> int:
         handle = self._lib.rtcNewGeometry(self._device, embree.INSTANCE)
         self._lib.rtcSetGeometryInstancedScene(handle, scene)
-        self._lib.rtcSetGeometryMask(handle, ALL)
+        self._lib.rtcSetGeometryMask(handle, primitives.ALL)
         self._lib.rtcAttachGeometry(self._top, handle)
         self._lib.rtcReleaseGeometry(handle)  # The scene owns it.
         return handle
@@ -314,10 +299,10 @@ class EmbreeScene:
         if previous is not None:
             first, second = previous._first, previous._second
         self._first: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_first, num_threads, first
+            groups, primitives.merge_first, num_threads, first
         )
         self._second: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_second, 1, second
+            groups, primitives.merge_second, 1, second
         )
         self._near = NearCurvedShapes(
             [groups[row] for row in self._second.rows]
@@ -340,7 +325,7 @@ class EmbreeScene:
     def _cast_again(self, rays: Rays, hits: Hits, with_normals: bool) -> None:
         """Updates the hits of rays that may meet curved shapes that stay."""
         is_near = self._near.contain(rays.p_OSset)
-        is_unsure = hits.owner == PROXY_OWNER
+        is_unsure = hits.owner == primitives.PROXY_OWNER
         if is_near.any():  # Origins are taken in turn.
             is_unsure |= np.resize(is_near, len(is_unsure))
         again = np.flatnonzero(is_unsure)
@@ -351,7 +336,7 @@ class EmbreeScene:
             reach = np.minimum(in_second.ranges, rest.max_ranges)
             in_first = self._first.cast(
                 rest._replace(max_ranges=reach),
-                mask=SOLID,
+                mask=primitives.SOLID,
                 with_normals=with_normals,
             )
             is_first = in_first.owner >= 0
@@ -377,15 +362,18 @@ def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
     return parts
 
 
-def _list_owners(
-    scenes: Collection[Sequence[np.ndarray]],
-) -> tuple[np.ndarray, np.ndarray]:
+def _list_owners(scenes: Collection[_Built]) -> tuple[np.ndarray, np.ndarray]:
     """Returns `_Tree.first_primitive` and `_Tree.owner_of_primitive`."""
-    first = np.zeros((len(scenes), max(1, *map(len, scenes))), np.int64)
-    owners = [np.zeros(0, np.int32)]
-    count = 0
-    for row, parts in enumerate(scenes):
-        for k, part in enumerate(parts):
+    widest = max(1, *(len(built.owners) for built in scenes))
+    first = np.zeros((len(scenes), widest), np.int64)
+    owners, count = [np.zeros(0, np.int32)], 0
+    known: dict[int, int] = {}
+    for row, built in enumerate(scenes):
+        same = known.setdefault(built.scene, row)
+        if same < row:
+            first[row] = first[same]
+            continue
+        for k, part in enumerate(built.owners):
             first[row, k] = count
             owners.append(part)
             count += len(part)
@@ -486,26 +474,22 @@ def _cast_packets(
         for scene in (tree.fixed, tree.instances):
             if scene != 0:
                 intersect(
-                    valid.ctypes.data,
-                    scene,
-                    packet.ctypes.data,
-                    tree.arguments,
+                    valid.ctypes.data, scene, packet.ctypes.data, tree.arguments
                 )
         for lane in range(count):
             ray = begin + lane
             hit = packet_id[18, lane]
             if hit == embree.INVALID_ID:
-                hits.ranges[ray] = np.inf
-                hits.owner[ray] = hits.group[ray] = -1
-                for axis in range(hits.normals.shape[1]):
-                    hits.normals[ray, axis] = 0.0
                 continue
             hits.ranges[ray] = packet[8, lane]
             instance = packet_id[19, lane]
             row = 0 if instance == embree.INVALID_ID else 1 + np.int64(instance)
-            primitive = np.int64(packet_id[17, lane]) * tree.steps[row]
+            primitive = np.int64(packet_id[17, lane])
             primitive += tree.first_primitive[row, hit]
-            hits.owner[ray] = tree.owner_of_primitive[primitive]
+            owner = tree.owner_of_primitive[primitive]
+            if owner >= 0:
+                owner = tree.geometries[tree.first_member[row] + owner]
+            hits.owner[ray] = owner
             hits.group[ray] = tree.groups[row]
             for axis in range(hits.normals.shape[1]):
                 hits.normals[ray, axis] = packet[12 + axis, lane]

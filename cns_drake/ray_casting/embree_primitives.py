@@ -38,7 +38,7 @@ class Primitives(NamedTuple):
     Attributes:
         kind: Embree's number for the kind of its primitives.
         buffers: (slot, format, array) each.
-        owners: (P,) int32, the index of each primitive's geometry.
+        owners: (P,) int32, the number of each primitive's member in its group.
         mask: `SOLID` or `PROXY`.
     """
 
@@ -54,7 +54,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
     They are its triangles, and polyhedra about its curved shapes; or the curved
     shapes themselves, if the group can move.
     """
-    members = group.members
+    members = _numbered(group)
     flat = [
         (index, X_LG, surface)
         for index, X_LG, surface in members
@@ -77,7 +77,16 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
     """Yields the primitives for few rays: curved shapes that cannot move."""
     if group.frame_id is None:
-        yield from merge_curved(group.members)
+        yield from merge_curved(_numbered(group))
+
+
+def _numbered(group: RayGroup) -> list[Member]:
+    """Returns the members of a group with their numbers in it.
+
+    Primitives then depend on shapes alone, and groups of the same shapes share
+    them.
+    """
+    return [(k, X, surface) for k, (_, X, surface) in enumerate(group.members)]
 
 
 def _as_primitives(
@@ -151,10 +160,7 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
         normals = _float32(d[2] for d in discs)
         yield Primitives(
             embree.DISC,
-            [
-                _vertices(discs),
-                (embree.NORMAL_BUFFER, embree.FLOAT3, normals),
-            ],
+            [_vertices(discs), (embree.NORMAL_BUFFER, embree.FLOAT3, normals)],
             np.repeat([d[0] for d in discs], 2).astype(np.int32),
         )
     if spheres:

@@ -9,18 +9,8 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.ray_casting.ray_groups import (
-    NO_MOTIONS,
-    Member,
-    Motion,
-    RayGroup,
-)
-from cns_drake.scene.surfaces import (
-    CapsuleSurface,
-    CylinderSurface,
-    EllipsoidSurface,
-    TriangleSurface,
-)
+from cns_drake.ray_casting.ray_groups import Member, Motion, RayGroup
+from cns_drake.scene import surfaces
 
 
 class KnownPoses(NamedTuple):
@@ -93,6 +83,7 @@ class Placed(NamedTuple):
         return Placed(*(one[kept] for one in self))
 
 
+NO_MOTIONS: Mapping[FrameId, Motion] = {}
 NOTHING_KNOWN = KnownPoses({}, np.zeros((0, 4, 4)))
 EVERYWHERE = Ball(np.zeros(3), np.inf)
 NOTHING_PLACED = Placed.of((), ())
@@ -187,9 +178,7 @@ class MovingGroups:
         )
 
     def _find_poses(
-        self,
-        calc_X_WF: Callable[[FrameId], RigidTransform],
-        known: KnownPoses,
+        self, calc_X_WF: Callable[[FrameId], RigidTransform], known: KnownPoses
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns (M, 4, 4) poses, and the (G,) rows of those of frames."""
         if known.rows is not self._known:
@@ -218,14 +207,16 @@ def _radius_about_F(group: RayGroup) -> float:
 def _radius_about_L(members: Iterable[Member]) -> float:
     radii = []
     for _, X_LG, surface in members:
-        if isinstance(surface, TriangleSurface):
+        if isinstance(surface, surfaces.TriangleSurface):
             p_LVset = surface.p_GVset @ X_LG.rotation().matrix().T
             p_LVset = p_LVset + X_LG.translation()
             radii.append(float(np.linalg.norm(p_LVset, axis=1).max(initial=0)))
             continue
-        if isinstance(surface, EllipsoidSurface):
+        if isinstance(surface, surfaces.EllipsoidSurface):
             radius = max(surface.semi_axes)
-        elif isinstance(surface, CylinderSurface | CapsuleSurface):
+        elif isinstance(
+            surface, surfaces.CylinderSurface | surfaces.CapsuleSurface
+        ):
             radius = surface.radius + surface.length / 2.0
         else:
             radius = np.inf

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 import importlib.util
-import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,20 +16,8 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.moving_groups import (
-    EVERYWHERE,
-    NOTHING_KNOWN,
-    Ball,
-    KnownPoses,
-    MovingGroups,
-)
-from cns_drake.ray_casting.ray_groups import (
-    NO_MOTIONS,
-    Motion,
-    RayGroup,
-    group_geometries,
-    take_over,
-)
+from cns_drake.ray_casting import moving_groups
+from cns_drake.ray_casting.ray_groups import Motion, RayGroup, group_geometries
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 
@@ -92,23 +79,15 @@ class RayCastingScene:
             num_threads: number of threads that share the rays of a cast; hits
                 do not depend on it.
             previous: a scene of similar geometry, which this one replaces:
-                frames whose geometries are still the same objects are not built
+                frames whose surfaces are still the same objects are not built
                 anew.
         """
-        self._geometries = tuple(geometries)
-        self._slots = _assign_slots(self._geometries, previous)
-        slots = [self._slots[id(geometry)] for geometry in self._geometries]
-        # Slots -> indices; the last entry serves a miss, -1.
-        self._index_of_slot = np.full(max(slots, default=-1) + 2, -1, np.int32)
-        self._index_of_slot[slots] = np.arange(len(slots))
         self._p_WO, self._groups = group_geometries(
-            zip(slots, self._geometries, strict=True),
+            enumerate(geometries),
             anchored_frames,
             calc_X_WF,
             may_share=_has_embree(),
         )
-        if previous is not None:
-            take_over(self._groups, previous._groups)
         for group in self._groups:
             group.place(self._p_WO, calc_X_WF)
         solid = [group for group in self._groups if not group.is_half_space]
@@ -116,19 +95,18 @@ class RayCastingScene:
         self._scene: EmbreeScene | Open3dScene = _make_scene(
             solid, num_threads, None if previous is None else previous._scene
         )
-        self._moving = MovingGroups(self._groups, self._p_WO)
+        self._moving = moving_groups.MovingGroups(self._groups, self._p_WO)
         self._normal_matrices: np.ndarray | None = None
-        self._group_of = np.zeros(len(self._geometries), np.int64)
+        self._group_of = np.zeros(len(geometries), np.int64)
         for row, group in enumerate(self._groups):
-            slots = [member[0] for member in group.members]
-            self._group_of[self._index_of_slot[slots]] = row
+            self._group_of[[index for index, *_ in group.members]] = row
 
     def set_frame_poses(
         self,
         calc_X_WF: Callable[[FrameId], RigidTransform],
-        motions: Mapping[FrameId, Motion] = NO_MOTIONS,
-        known: KnownPoses = NOTHING_KNOWN,
-        seen: Ball = EVERYWHERE,
+        motions: Mapping[FrameId, Motion] = moving_groups.NO_MOTIONS,
+        known: moving_groups.KnownPoses = moving_groups.NOTHING_KNOWN,
+        seen: moving_groups.Ball = moving_groups.EVERYWHERE,
     ) -> None:
         """Moves the geometry of the frames that are not anchored.
 
@@ -215,12 +193,7 @@ class RayCastingScene:
         is_outside = np.zeros(0, bool)
         if with_normals:
             is_outside = self._face_rays(hits, rays)
-        return RayHits(
-            hits.ranges,
-            self._index_of_slot.take(hits.owner),
-            hits.normals,
-            is_outside,
-        )
+        return RayHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
     def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
         """Turns normals towards the rays' origins; see `_face_origins`.
@@ -333,25 +306,6 @@ def _calc_normal_matrices(groups: Sequence[RayGroup]) -> np.ndarray:
     # Normals transform by the inverse transpose.
     maps = np.linalg.inv(np.reshape(turns, (-1, 3, 3)))
     return np.ascontiguousarray(maps.transpose(0, 2, 1))
-
-
-def _assign_slots(
-    geometries: Sequence[PerceptionGeometry], previous: RayCastingScene | None
-) -> dict[int, int]:
-    """Returns a number for each geometry's `id`, the same as before.
-
-    Built scenes refer to geometries by these numbers, which do not depend on
-    their present order.
-    """
-    ids = [id(geometry) for geometry in geometries]
-    before = {} if previous is None else previous._slots
-    slots = {key: before[key] for key in ids if key in before}
-    taken = set(slots.values())
-    free = (slot for slot in itertools.count() if slot not in taken)
-    for key in ids:
-        if key not in slots:
-            slots[key] = next(free)
-    return slots
 
 
 def _has_embree() -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
@@ -14,13 +14,8 @@ from pydrake.math import RigidTransform, inv
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.elementary import product, rotated
+from cns_drake.scene import surfaces
 from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surfaces import (
-    EllipsoidSurface,
-    HalfSpaceSurface,
-    Surface,
-    TriangleSurface,
-)
 
 # A mesh whose copies have more triangles than this is held once. Its rays are
 # slower, since each copy has its own hierarchy. The many small objects of a
@@ -31,7 +26,7 @@ _LARGEST_STEP_RAD = 2.0
 # The most time steps that Embree supports.
 _MOST_STEPS = 129
 # A member of a scene: index of a geometry, its pose, its surface.
-Member = tuple[int, RigidTransform, Surface]
+Member = tuple[int, RigidTransform, surfaces.Surface]
 
 
 class Motion(NamedTuple):
@@ -75,9 +70,6 @@ class Motion(NamedTuple):
         return Rotation.from_rotvec(t * self.w).as_matrix(), t * self.v
 
 
-NO_MOTIONS: Mapping[FrameId, Motion] = {}
-
-
 @dataclass
 class RayGroup:
     """Geometry that moves as one, in a local frame L.
@@ -89,8 +81,6 @@ class RayGroup:
         members: the geometry of the group, posed in L. A half space is alone in
             its group, and in L bounded by z = 0.
         is_merged_world: whether L is the world, moved to O.
-        is_copy: whether its only member is a surface, in its own frame, that
-            other groups share.
         X_OL: (3, 4) affine map from L to the scene's origin, at the start of
             a turn; it does not exist before `place`.
         motion: motion of F during the turn, None if it stays.
@@ -102,27 +92,21 @@ class RayGroup:
     X_FL: np.ndarray
     members: list[Member]
     is_merged_world: bool = False
-    is_copy: bool = False
     X_OL: np.ndarray = field(init=False)
     motion: Motion | None = None
     in_sight: bool = True
 
     @property
     def is_half_space(self) -> bool:
-        return isinstance(self.members[0][2], HalfSpaceSurface)
+        return isinstance(self.members[0][2], surfaces.HalfSpaceSurface)
 
     def place(
-        self,
-        p_WO: np.ndarray,
-        calc_X_WF: Callable[[FrameId], RigidTransform],
-        motions: Mapping[FrameId, Motion] = NO_MOTIONS,
+        self, p_WO: np.ndarray, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> None:
-        """Sets `X_OL` and `motion` by those of the group's frame."""
-        self.in_sight = True
+        """Sets `X_OL` by the pose of the group's frame."""
         X_WL = self.X_FL
         if self.frame_id is not None:
             X_WL = calc_X_WF(self.frame_id).GetAsMatrix4() @ X_WL
-            self.motion = motions.get(self.frame_id)
         self.X_OL = X_WL[:3].copy()
         self.X_OL[:, 3] -= p_WO
 
@@ -138,32 +122,22 @@ class RayGroup:
         X_OL[:, :, 3] = self.X_OL[:, 3] - p_FL + way_F + rotated(R_OL0, p_FL)
         return X_OL
 
-    def holds_the_same(self, other: RayGroup) -> bool:
-        """Returns whether another group has equal members with equal poses."""
-        return (
-            self.frame_id == other.frame_id
-            and self.is_merged_world == other.is_merged_world
-            and self.is_copy == other.is_copy
-            and len(self.members) == len(other.members)
-            and np.array_equal(self.X_FL, other.X_FL)
-            and all(
-                index == other_index
-                and _is_same(surface, other_surface)
-                and X_LG.IsExactlyEqualTo(other_X_LG)
-                for (index, X_LG, surface), (
-                    other_index,
-                    other_X_LG,
-                    other_surface,
-                ) in zip(self.members, other.members, strict=True)
+    def content(self) -> tuple:
+        """Returns a key that is equal only for groups of the same shapes.
+
+        It holds as long as there are the surfaces of both groups.
+        """
+        shapes = tuple(
+            (
+                # Comparing all triangles would take too long.
+                id(one) if isinstance(one, surfaces.TriangleSurface) else one,
+                X_LG.GetAsMatrix34().tobytes(),
             )
+            for _, X_LG, one in self.members
         )
-
-
-def _is_same(surface: Surface, other: Surface) -> bool:
-    if surface is other:
-        return True
-    # Comparing all triangles would take too long.
-    return not isinstance(surface, TriangleSurface) and surface == other
+        # Curved shapes that stay are built in another way.
+        is_flat = all(isinstance(one, int) for one, _ in shapes)
+        return is_flat or self.frame_id is None, shapes
 
 
 def group_geometries(
@@ -193,7 +167,7 @@ def group_geometries(
         frame_id, X_FG = geometry.frame_id, geometry.X_FG
         if frame_id in anchored_frames:
             frame_id, X_FG = None, calc_X_WF(frame_id) @ X_FG
-        if isinstance(geometry.surface, HalfSpaceSurface):
+        if isinstance(geometry.surface, surfaces.HalfSpaceSurface):
             plane: Member = (index, RigidTransform(), geometry.surface)
             half_spaces.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [plane]))
             continue
@@ -221,14 +195,14 @@ def group_geometries(
                         frame_id,
                         X_FG.GetAsMatrix4(),
                         [(index, RigidTransform(), surface)],
-                        is_copy=True,
                     )
                 )
             elif (
-                isinstance(surface, EllipsoidSurface) and not surface.is_sphere
+                isinstance(surface, surfaces.EllipsoidSurface)
+                and not surface.is_sphere
             ):
                 stretch = np.diag([*surface.semi_axes, 1.0])
-                unit_sphere = EllipsoidSurface((1.0, 1.0, 1.0))
+                unit_sphere = surfaces.EllipsoidSurface((1.0, 1.0, 1.0))
                 alone.append(
                     RayGroup(
                         frame_id,
@@ -252,7 +226,7 @@ def _find_shared(
     num_triangles: Counter[int] = Counter()
     copies: Counter[int] = Counter()
     for _, geometry in geometries:
-        if isinstance(geometry.surface, TriangleSurface):
+        if isinstance(geometry.surface, surfaces.TriangleSurface):
             key = id(geometry.surface)
             copies[key] += 1
             num_triangles[key] += len(geometry.surface.triangles)
@@ -261,22 +235,3 @@ def _find_shared(
         for key, count in num_triangles.items()
         if count > MOST_COPIED_TRIANGLES and copies[key] > 1
     )
-
-
-def take_over(groups: list[RayGroup], previous: Iterable[RayGroup]) -> None:
-    """Replaces groups by previous ones with the same members.
-
-    Args:
-        groups: to compare, in place.
-        previous: the groups of an earlier scene.
-    """
-    known = {_key(group): group for group in previous}
-    for row, group in enumerate(groups):
-        old = known.get(_key(group))
-        if old is not None and old.holds_the_same(group):
-            groups[row] = old
-
-
-def _key(group: RayGroup) -> tuple:
-    index, _, surface = group.members[0]
-    return group.frame_id, index, type(surface)

@@ -101,13 +101,3 @@ class Hits(NamedTuple):
             np.full(num_rays, -1, np.int32),
             np.zeros((num_rays, 3 if with_normals else 0), np.float32),
         )
-
-    @classmethod
-    def room_for(cls, num_rays: int, with_normals: bool) -> Hits:
-        """Returns hits to fill in."""
-        return cls(
-            np.empty(num_rays, np.float32),
-            np.empty(num_rays, np.int32),
-            np.empty(num_rays, np.int32),
-            np.empty((num_rays, 3 if with_normals else 0), np.float32),
-        )

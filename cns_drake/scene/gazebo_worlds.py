@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import math
 import os
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import read_elements
@@ -101,7 +101,7 @@ def model_file(path: Path) -> Path:
     return preferred if preferred in found else found[0]
 
 
-def read_xml(path: Path) -> ElementTree.Element:
+def read_xml(path: Path) -> Element:
     """Reads a file.
 
     Raises:
@@ -140,7 +140,7 @@ _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 _DEEPEST = 20
 
 
-def is_gazebo_world(root: ElementTree.Element) -> bool:
+def is_gazebo_world(root: Element) -> bool:
     """Returns whether a world has elements of Gazebo's."""
     world = root.find("world")
     return world is not None and (
@@ -150,7 +150,7 @@ def is_gazebo_world(root: ElementTree.Element) -> bool:
 
 
 def simplify_world(
-    path: Path, root: ElementTree.Element, model_paths: Iterable[Path] = ()
+    path: Path, root: Element, model_paths: Iterable[Path] = ()
 ) -> tuple[str, tuple[str, ...]]:
     """Returns a world of static models with visuals only, and notes.
 
@@ -160,12 +160,10 @@ def simplify_world(
     simplifier = _Simplifier(path, model_paths)
     world = root.find("world")
     assert world is not None
-    made = ElementTree.Element("sdf", version="1.9")
-    target = ElementTree.SubElement(
-        made, "world", name=_legal(world.get("name", "world"))
-    )
+    made = Element("sdf", version="1.9")
+    target = SubElement(made, "world", name=_legal(world.get("name", "world")))
     simplifier.add_models(world, target, path.absolute().parent, 0)
-    return ElementTree.tostring(made, "unicode"), simplifier.notes()
+    return tostring(made, "unicode"), simplifier.notes()
 
 
 class _Simplifier:
@@ -198,29 +196,24 @@ class _Simplifier:
         return tuple(notes)
 
     def add_models(
-        self,
-        source: ElementTree.Element,
-        target: ElementTree.Element,
-        folder: Path,
-        depth: int,
+        self, source: Element, target: Element, folder: Path, depth: int
     ) -> None:
         """Adds the models in a world or a model, and included ones."""
         if depth > _DEEPEST:
             raise InputError(f"{self._path}: models include each other")
         for element in source:
-            if element.tag in _SKIPPED:
-                self._skipped[_SKIPPED[element.tag]] += 1
-            elif element.tag == "include":
+            self._skip(element)
+            if element.tag == "include":
                 self._include(element, target, folder, depth)
             elif element.tag == "model":
                 self._add_model(element, target, folder, depth)
 
+    def _skip(self, element: Element) -> None:
+        if element.tag in _SKIPPED:
+            self._skipped[_SKIPPED[element.tag]] += 1
+
     def _include(
-        self,
-        include: ElementTree.Element,
-        target: ElementTree.Element,
-        folder: Path,
-        depth: int,
+        self, include: Element, target: Element, folder: Path, depth: int
     ) -> None:
         uri = _local_uri((include.findtext("uri") or "").strip())
         place = self._finder.find(uri, folder)
@@ -234,7 +227,7 @@ class _Simplifier:
             self._skipped["lights"] += 1
             return
         elif uri.rstrip("/") == _GROUND_PLANE:
-            models = [ElementTree.fromstring(_GROUND)]
+            models = [fromstring(_GROUND)]
         else:
             self._missing["models"][uri] += 1
             return
@@ -249,15 +242,11 @@ class _Simplifier:
             self._add_model(model, target, folder, depth)
 
     def _add_model(
-        self,
-        model: ElementTree.Element,
-        target: ElementTree.Element,
-        folder: Path,
-        depth: int,
+        self, model: Element, target: Element, folder: Path, depth: int
     ) -> None:
-        made = ElementTree.Element("model", name=_name(model, target))
+        made = Element("model", name=_name(model, target))
         if target.tag == "world":
-            ElementTree.SubElement(made, "static").text = "true"
+            SubElement(made, "static").text = "true"
         _copy_pose(model, made)
         self.add_models(model, made, folder, depth + 1)
         for frame in model.findall("frame"):
@@ -267,27 +256,18 @@ class _Simplifier:
         if made.find("link") is not None or made.find("model") is not None:
             target.append(made)
 
-    def _add_link(
-        self,
-        link: ElementTree.Element,
-        target: ElementTree.Element,
-        folder: Path,
-    ) -> None:
-        made = ElementTree.Element("link", name=_name(link, target))
+    def _add_link(self, link: Element, target: Element, folder: Path) -> None:
+        made = Element("link", name=_name(link, target))
         _copy_pose(link, made)
         for element in link:
-            if element.tag in _SKIPPED:
-                self._skipped[_SKIPPED[element.tag]] += 1
-            elif element.tag == "visual":
+            self._skip(element)
+            if element.tag == "visual":
                 self._add_visual(element, made, folder)
         # An invisible element stays if others are placed relative to it.
         target.append(made)
 
     def _add_visual(
-        self,
-        visual: ElementTree.Element,
-        target: ElementTree.Element,
-        folder: Path,
+        self, visual: Element, target: Element, folder: Path
     ) -> None:
         geometry = visual.find("geometry")
         shapes = [] if geometry is None else list(geometry)
@@ -302,27 +282,23 @@ class _Simplifier:
             if place is None or not place.is_file():
                 self._missing["meshes"][uri] += 1
                 return
-            mesh = ElementTree.Element("mesh")
+            mesh = Element("mesh")
             # Drake does not decode percent signs in such a URI.
-            ElementTree.SubElement(mesh, "uri").text = f"file://{place}"
+            SubElement(mesh, "uri").text = f"file://{place}"
             scale = shape.find("scale")
             if scale is not None:
                 mesh.append(scale)
             if shape.find("submesh") is not None:
                 self._skipped["choices of a part of a mesh"] += 1
             shape = mesh
-        made = ElementTree.SubElement(
-            target, "visual", name=_name(visual, target)
-        )
+        made = SubElement(target, "visual", name=_name(visual, target))
         _copy_pose(visual, made)
-        ElementTree.SubElement(made, "geometry").append(shape)
+        SubElement(made, "geometry").append(shape)
         material = visual.find("material")
         if material is not None:
             self._add_material(material, made)
 
-    def _add_material(
-        self, material: ElementTree.Element, target: ElementTree.Element
-    ) -> None:
+    def _add_material(self, material: Element, target: Element) -> None:
         for tag in ("script", "pbr"):
             if material.find(tag) is not None:
                 self._skipped["materials by script or texture"] += 1
@@ -332,9 +308,9 @@ class _Simplifier:
         except ValueError:
             return
         if len(values) in (3, 4) and all(map(math.isfinite, values)):
-            made = ElementTree.SubElement(target, "material")
+            made = SubElement(target, "material")
             text = " ".join([*numbers, "1"][:4])
-            ElementTree.SubElement(made, "diffuse").text = text
+            SubElement(made, "diffuse").text = text
 
 
 def _local_uri(uri: str) -> str:
@@ -345,9 +321,7 @@ def _local_uri(uri: str) -> str:
     return "model://" + name.split("/")[0].strip().lower().replace(" ", "_")
 
 
-def _copy_pose(
-    source: ElementTree.Element, target: ElementTree.Element
-) -> None:
+def _copy_pose(source: Element, target: Element) -> None:
     pose = source.find("pose")
     if pose is not None and (pose.text or "").strip():
         # Before version 1.7, `frame` meant nothing.
@@ -355,7 +329,7 @@ def _copy_pose(
         target.append(pose)
 
 
-def _name(element: ElementTree.Element, target: ElementTree.Element) -> str:
+def _name(element: Element, target: Element) -> str:
     """Returns an element's name, or a similar one that is still free."""
     wanted = _legal(element.get("name", element.tag))
     taken = {sibling.get("name") for sibling in target}

@@ -3,47 +3,26 @@
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 import itertools
-from typing import NamedTuple
 
 import numpy as np
+from pydrake import geometry as shapes
 from pydrake.common.value import Value
 from pydrake.geometry import (
-    Box,
-    Capsule,
-    Convex,
-    Cylinder,
-    Ellipsoid,
     FrameId,
     GeometryId,
-    HalfSpace,
-    Mesh,
-    MeshcatCone,
     Role,
     SceneGraph,
     SceneGraphInspector,
     Shape,
-    Sphere,
 )
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import (
-    AbstractParameterIndex,
-    OutputPort,
-)
+from pydrake.systems.framework import AbstractParameterIndex, OutputPort
 
 from cns_drake.base.errors import InputError
+from cns_drake.scene import surfaces
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
-from cns_drake.scene.surfaces import (
-    LARGEST_SIZE,
-    CapsuleSurface,
-    CylinderSurface,
-    EllipsoidSurface,
-    HalfSpaceSurface,
-    Surface,
-    TriangleSurface,
-    merge_triangles,
-    tessellate,
-)
+from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
 
 # The corners of a unit cube and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(
@@ -106,7 +85,7 @@ def check_shape(name: str, shape: Shape) -> None:
     Raises:
         InputError: it is too large; the message names the geometry.
     """
-    if isinstance(shape, Mesh | Convex | HalfSpace):
+    if isinstance(shape, shapes.Mesh | shapes.Convex | shapes.HalfSpace):
         return
     if not np.max(_dimensions(shape)) <= LARGEST_SIZE:
         raise InputError(f"geometry '{name}': larger than {LARGEST_SIZE:g} m")
@@ -146,22 +125,11 @@ def merge_surfaces(
         (
             index,
             calc_X_TF(geometry.frame_id) @ geometry.X_FG,
-            tessellate(geometry.surface),
+            surfaces.tessellate(geometry.surface),
         )
         for index, geometry in enumerate(geometries)
     ]
-    return merge_triangles(members)[0]
-
-
-class _Record(NamedTuple):
-    """The properties of a geometry in a SceneGraph, for comparison."""
-
-    name: str
-    frame_id: FrameId
-    pose: bytes
-    shape: tuple
-    rgb: tuple[float, float, float] | None
-    reflectivity: float | None
+    return surfaces.merge_triangles(members)[0]
 
 
 class GeometryReader:
@@ -170,7 +138,7 @@ class GeometryReader:
     def __init__(self, role: Role):
         """Reads nothing yet."""
         self._role = role
-        self._known: dict[GeometryId, tuple[_Record, PerceptionGeometry]] = {}
+        self._known: dict[GeometryId, tuple[tuple, PerceptionGeometry]] = {}
 
     def read(
         self,
@@ -194,51 +162,37 @@ class GeometryReader:
             for geometry_id in inspector.GetAllGeometryIds(self._role):
                 if geometry_id in hidden:
                     continue
-                record = self._record(inspector, geometry_id)
+                name = inspector.GetName(geometry_id)
+                if inspector.IsDeformableGeometry(geometry_id):
+                    raise InputError(
+                        f"geometry '{name}': a LiDAR cannot see deformable "
+                        "geometry; hide it, or remove its role"
+                    )
+                shape = inspector.GetShape(geometry_id)
+                frame_id = inspector.GetFrameId(geometry_id)
+                # A copy: Drake gives references.
+                X_FG = RigidTransform(inspector.GetPoseInFrame(geometry_id))
+                look = self._appearance(name, inspector, geometry_id)
+                pose = X_FG.GetAsMatrix34().tobytes()
+                record = name, frame_id, pose, _shape_key(shape), look
                 entry = known.get(geometry_id)
                 if entry is None or entry[0] != record:
-                    shape = inspector.GetShape(geometry_id)
+                    surface = _surface(name, shape, meshes)
                     entry = (
                         record,
                         PerceptionGeometry(
-                            geometry_id=geometry_id,
-                            name=record.name,
-                            frame_id=record.frame_id,
-                            # A copy: Drake gives references.
-                            X_FG=RigidTransform(
-                                inspector.GetPoseInFrame(geometry_id)
-                            ),
-                            surface=_surface(record.name, shape, meshes),
-                            rgb=record.rgb,
-                            reflectivity=record.reflectivity,
+                            geometry_id, name, frame_id, X_FG, surface, *look
                         ),
                     )
                 self._known[geometry_id] = entry
         return tuple(geometry for _, geometry in self._known.values())
-
-    def _record(
-        self, inspector: SceneGraphInspector, geometry_id: GeometryId
-    ) -> _Record:
-        name = inspector.GetName(geometry_id)
-        if inspector.IsDeformableGeometry(geometry_id):
-            raise InputError(
-                f"geometry '{name}': a LiDAR cannot see deformable geometry; "
-                "hide it, or remove its role"
-            )
-        return _Record(
-            name,
-            inspector.GetFrameId(geometry_id),
-            inspector.GetPoseInFrame(geometry_id).GetAsMatrix34().tobytes(),
-            _shape_key(inspector.GetShape(geometry_id)),
-            *self._appearance(name, inspector, geometry_id),
-        )
 
     def _appearance(
         self, name: str, inspector: SceneGraphInspector, geometry_id: GeometryId
     ) -> tuple[tuple[float, float, float] | None, float | None]:
         """Returns colour and reflectivity; None if the model has none."""
         properties = inspector.GetProperties(geometry_id, self._role)
-        reflectivity = None
+        rgb = reflectivity = None
         if properties.HasProperty("lidar", "reflectivity"):
             reflectivity = float(
                 properties.GetProperty("lidar", "reflectivity")
@@ -248,54 +202,54 @@ class GeometryReader:
                     f"geometry '{name}': lidar/reflectivity: {reflectivity} "
                     "is not within 0 to 1"
                 )
-        if not properties.HasProperty("phong", "diffuse"):
-            return None, reflectivity
-        rgba = properties.GetProperty("phong", "diffuse")
-        return (rgba.r(), rgba.g(), rgba.b()), reflectivity
+        if properties.HasProperty("phong", "diffuse"):
+            rgba = properties.GetProperty("phong", "diffuse")
+            rgb = rgba.r(), rgba.g(), rgba.b()
+        return rgb, reflectivity
 
 
 def _shape_key(shape: Shape) -> tuple:
     """Returns a key that is equal only for equal shapes."""
-    if isinstance(shape, Mesh | Convex):
+    if isinstance(shape, shapes.Mesh | shapes.Convex):
         return mesh_shape_key(shape)
-    if isinstance(shape, HalfSpace):
-        return (HalfSpace,)
+    if isinstance(shape, shapes.HalfSpace):
+        return (shapes.HalfSpace,)
     return type(shape), *_dimensions(shape)
 
 
 def _dimensions(shape: Shape) -> Sequence[float]:
     """Returns the numbers that define the size of a shape."""
-    if isinstance(shape, Box):
+    if isinstance(shape, shapes.Box):
         return shape.size()
-    if isinstance(shape, Sphere):
+    if isinstance(shape, shapes.Sphere):
         return (shape.radius(),)
-    if isinstance(shape, Ellipsoid):
+    if isinstance(shape, shapes.Ellipsoid):
         return (shape.a(), shape.b(), shape.c())
-    if isinstance(shape, MeshcatCone):
+    if isinstance(shape, shapes.MeshcatCone):
         return (shape.a(), shape.b(), shape.height())
     return (shape.radius(), shape.length())
 
 
 def _surface(name: str, shape: Shape, meshes: MeshFiles) -> Surface:
     check_shape(name, shape)
-    if isinstance(shape, Mesh | Convex):
+    if isinstance(shape, shapes.Mesh | shapes.Convex):
         return meshes.read(name, shape)
-    if isinstance(shape, HalfSpace):
-        return HalfSpaceSurface()
-    if isinstance(shape, Box):
+    if isinstance(shape, shapes.HalfSpace):
+        return surfaces.HalfSpaceSurface()
+    if isinstance(shape, shapes.Box):
         return TriangleSurface(_CUBE_CORNERS * shape.size(), _CUBE_TRIANGLES)
-    if isinstance(shape, Sphere):
-        return EllipsoidSurface((shape.radius(),) * 3)
-    if isinstance(shape, Ellipsoid):
-        return EllipsoidSurface((shape.a(), shape.b(), shape.c()))
-    if isinstance(shape, Cylinder):
-        return CylinderSurface(shape.radius(), shape.length())
-    if isinstance(shape, Capsule):
-        return CapsuleSurface(shape.radius(), shape.length())
+    if isinstance(shape, shapes.Sphere):
+        return surfaces.EllipsoidSurface((shape.radius(),) * 3)
+    if isinstance(shape, shapes.Ellipsoid):
+        return surfaces.EllipsoidSurface((shape.a(), shape.b(), shape.c()))
+    if isinstance(shape, shapes.Cylinder):
+        return surfaces.CylinderSurface(shape.radius(), shape.length())
+    if isinstance(shape, shapes.Capsule):
+        return surfaces.CapsuleSurface(shape.radius(), shape.length())
     return _cone(shape)
 
 
-def _cone(shape: MeshcatCone) -> TriangleSurface:
+def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
     """Returns a pyramid for a cone; its apex is the origin."""
     angle = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
     corners = np.zeros((2 + _CONE_SIDES, 3))

@@ -1,11 +1,12 @@
 """Loading an SDF world, and the vehicle in it, into a SceneGraph."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 import re
 
-from pydrake.geometry import FrameId, Role, SceneGraph, SourceId
+from pydrake.geometry import FrameId, GeometryId, Role, SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
@@ -24,64 +25,7 @@ from cns_drake.scene.perception_geometry import check_shape, structure_name
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
 
 
-@dataclass(frozen=True)
-class ParsedWorld:
-    """The models of a world; more may be parsed before the plant is finalized.
-
-    Attributes:
-        scene_graph: holds the geometry.
-        plant: owns bodies and frames; not finalized yet.
-        parser: the plant's.
-        names: names of the geometries that a LiDAR can see.
-        notes: for the user.
-    """
-
-    scene_graph: SceneGraph
-    plant: MultibodyPlant
-    parser: Parser
-    names: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-def parse_world(
-    sdf: Path,
-    *,
-    without: Collection[str] = (),
-    model_paths: Collection[Path] = (),
-) -> ParsedWorld:
-    """Parses a world; see `load_world`.
-
-    Raises:
-        InputError: likewise.
-    """
-    scene_graph = SceneGraph()
-    # The plant parses models and has their frames. It stays out of the
-    # Diagram: motion is prescribed, for which a plant has no port, and a
-    # plant of many models makes Build() slow.
-    plant = MultibodyPlant(time_step=0.0)
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    parser = Parser(plant)
-    notes = _parse_world(parser, sdf, model_paths)
-    _check_names(scene_graph, sdf)
-    if without:
-        _remove(scene_graph, plant.get_source_id(), set(without), sdf)
-    inspector = scene_graph.model_inspector()
-    if not inspector.GetAllGeometryIds(Role.kPerception):
-        raise InputError(
-            f"{sdf}: the world has no visuals, and so no geometry that a "
-            "LiDAR can see"
-        )
-    names = []
-    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
-        names.append(inspector.GetName(geometry_id))
-        try:
-            check_shape(names[-1], inspector.GetShape(geometry_id))
-        except InputError as error:
-            raise InputError(f"{sdf}: {error}") from None
-    return ParsedWorld(scene_graph, plant, parser, tuple(names), notes)
-
-
-def parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
+def _parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     """Parses the models of a file.
 
     Raises:
@@ -89,41 +33,52 @@ def parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     """
     _check_file(path)
     check_model(path)
-    with collected_errors() as errors:
-        try:
-            models = parser.AddModels(str(path))
-        except PARSER_ERRORS as error:
-            raise _parse_fault(path, str(error), *errors) from error
-        if errors:
-            raise _parse_fault(path, *errors)
+    with _parse_faults(path):
+        models = parser.AddModels(str(path))
     if not models:
         raise InputError(f"{path}: holds no model")
     return models
 
 
-def _check_names(scene_graph: SceneGraph, sdf: Path) -> None:
-    inspector = scene_graph.model_inspector()
+@contextlib.contextmanager
+def _parse_faults(path: Path) -> Iterator[None]:
+    """Raises what Drake says of a file as an InputError."""
+    with collected_errors() as errors:
+        try:
+            yield
+        except PARSER_ERRORS as error:
+            raise _parse_fault(path, str(error), *errors) from error
+        if errors:
+            raise _parse_fault(path, *errors)
+
+
+def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:
+    """Returns the name of each geometry."""
+    inspector, names = scene_graph.model_inspector(), {}
     for geometry_id in inspector.GetAllGeometryIds():
         try:
-            inspector.GetName(geometry_id)
+            names[geometry_id] = inspector.GetName(geometry_id)
         except UnicodeDecodeError:
             raise InputError(f"{sdf}: a name is not UTF-8 text") from None
+    return names
 
 
-def _remove(
-    scene_graph: SceneGraph, source_id: SourceId, names: set[str], sdf: Path
-) -> None:
-    """Removes the geometry of structures."""
-    inspector = scene_graph.model_inspector()
-    found = set()
-    for geometry_id in inspector.GetAllGeometryIds():
-        structure = structure_name(inspector.GetName(geometry_id))
-        if structure in names:
-            found.add(structure)
-            scene_graph.RemoveGeometry(source_id, geometry_id)
-    missing = sorted(names - found)
-    if missing:
-        raise InputError(f"{sdf}: no structure {missing[0]} to leave out")
+def _check_visible(scene_graph: SceneGraph, sdf: Path) -> set[str]:
+    """Checks what a LiDAR can see; returns the names of its structures."""
+    inspector, structures = scene_graph.model_inspector(), set()
+    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        name = inspector.GetName(geometry_id)
+        structures.add(structure_name(name))
+        try:
+            check_shape(name, inspector.GetShape(geometry_id))
+        except InputError as error:
+            raise InputError(f"{sdf}: {error}") from None
+    if not structures:
+        raise InputError(
+            f"{sdf}: the world has no visuals, and so no geometry that a "
+            "LiDAR can see"
+        )
+    return structures
 
 
 def _parse_world(
@@ -133,16 +88,11 @@ def _parse_world(
     _check_file(path)
     root = None if path.suffix.lower() == ".urdf" else read_xml(path)
     if root is None or not is_gazebo_world(root):
-        parse_models(parser, path)
+        _parse_models(parser, path)
         return ()
     text, notes = simplify_world(path, root, model_paths)
-    with collected_errors() as errors:
-        try:
-            parser.AddModelsFromString(text, "sdf")
-        except PARSER_ERRORS as error:
-            raise _parse_fault(path, str(error), *errors) from error
-        if errors:
-            raise _parse_fault(path, *errors)
+    with _parse_faults(path):
+        parser.AddModelsFromString(text, "sdf")
     return notes
 
 
@@ -244,17 +194,28 @@ def load_world(
         world = load_world("my_world.sdf")
     """
     sdf = Path(sdf)
-    parsed = parse_world(
-        sdf, without=without, model_paths=[Path(one) for one in model_paths]
-    )
-    plant, notes = parsed.plant, parsed.notes
+    scene_graph = SceneGraph()
+    # The plant parses models and has their frames. It stays out of the
+    # Diagram: motion is prescribed, for which a plant has no port, and a
+    # plant of many models makes Build() slow.
+    plant = MultibodyPlant(time_step=0.0)
+    source = plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    notes = _parse_world(parser, sdf, [Path(one) for one in model_paths])
+    missing = set(without)
+    for geometry_id, name in _read_names(scene_graph, sdf).items():
+        if structure_name(name) in without:
+            missing.discard(structure_name(name))
+            scene_graph.RemoveGeometry(source, geometry_id)
+    if missing:
+        raise InputError(f"{sdf}: no structure {min(missing)} to leave out")
+    found = _check_visible(scene_graph, sdf)
     vehicle_model = None
     if vehicle is not None:
-        vehicle_model = parse_models(parsed.parser, Path(vehicle))[0]
+        vehicle_model = _parse_models(parser, Path(vehicle))[0]
     plant.Finalize()
 
     table = Path(structures or MapFolder(sdf.parent).structures)
-    found = set(map(structure_name, parsed.names))
     if structures is not None or table.is_file():
         entries = load_structure_table(table)
         notes += _mismatches(table, {entry.name for entry in entries}, found)
@@ -264,7 +225,7 @@ def load_world(
         entries = entries.completed(found)
     except InputError as error:
         raise InputError(f"{sdf}: {error}") from None
-    return World(parsed.scene_graph, plant, vehicle_model, entries, notes)
+    return World(scene_graph, plant, vehicle_model, entries, notes)
 
 
 def _mismatches(

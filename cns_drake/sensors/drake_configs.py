@@ -24,19 +24,10 @@ from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.perception import PointCloudToLcm
-from pydrake.systems.framework import (
-    Context,
-    DiagramBuilder,
-    LeafSystem,
-    OutputPort,
-    PortDataType,
-    System,
-)
-from pydrake.systems.lcm import (
-    LcmBuses,
-    LcmInterfaceSystem,
-    LcmPublisherSystem,
-)
+from pydrake.systems import framework
+from pydrake.systems import lcm as drake_lcm
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 
 from cns_drake.base.errors import describe_validation_error
 from cns_drake.sensors.imu.config import ImuSection
@@ -44,14 +35,12 @@ from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.odometry import odometry
 from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.sensors.odometry.odometry import (
-    Odometry,
-    OdometrySensor,
-    add_odometry,
-)
 from cns_drake.sensors.sensor_config import Section
 
+# What messages are published on.
+Interface = DrakeLcmInterface | LcmInterfaceSystem
 # Fields of a section that a struct leaves out: `X_PB` stands for the place, and
 # a layout is that of a recording.
 _LEFT_OUT = ("xyz", "rpy_deg", "layout")
@@ -142,7 +131,7 @@ def ApplyLidarConfig(
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
     lcm_buses: LcmBuses | None = None,
-    lcm: DrakeLcmInterface | LcmInterfaceSystem | None = None,
+    lcm: Interface | None = None,
 ) -> Lidar:
     """Adds a LiDAR to a diagram, and publishes its scans on LCM.
 
@@ -188,15 +177,11 @@ def ApplyLidarConfig(
     _publish(
         builder,
         config,
+        "POINT_CLOUD",
         [lidar.GetOutputPort("point_cloud_W")],
         PointCloudToLcm("world"),
-        LcmPublisherSystem.Make(
-            f"DRAKE_POINT_CLOUD_{config.name}",
-            lcmt_point_cloud,
-            _interface(config, builder, lcm_buses, lcm),
-            publish_period=lidar.pattern.period,
-            use_cpp_serializer=True,
-        ),
+        _interface(config, builder, lcm_buses, lcm),
+        lidar.pattern.period,
     )
     return lidar
 
@@ -207,7 +192,7 @@ def ApplyImuConfig(
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
     lcm_buses: LcmBuses | None = None,
-    lcm: DrakeLcmInterface | LcmInterfaceSystem | None = None,
+    lcm: Interface | None = None,
 ) -> Imu:
     """Adds an IMU to a diagram, and publishes its samples on LCM.
 
@@ -246,18 +231,9 @@ def ApplyImuConfig(
     ports = imu.ports()
     axes = [f"{name}_{axis}" for name in ports for axis in "xyz"]
     measured = list(ports.values())
-    _publish(
-        builder,
-        config,
-        measured,
-        _SignalToLcm(measured, axes, lambda *values: np.hstack(values)),
-        LcmPublisherSystem.Make(
-            f"DRAKE_IMU_{config.name}",
-            lcmt_drake_signal,
-            _interface(config, builder, lcm_buses, lcm),
-            publish_period=1.0 / rate,
-        ),
-    )
+    to_lcm = _SignalToLcm(measured, axes, lambda *values: np.hstack(values))
+    interface = _interface(config, builder, lcm_buses, lcm)
+    _publish(builder, config, "IMU", measured, to_lcm, interface, 1.0 / rate)
     return imu
 
 
@@ -267,8 +243,8 @@ def ApplyOdometryConfig(
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
     lcm_buses: LcmBuses | None = None,
-    lcm: DrakeLcmInterface | LcmInterfaceSystem | None = None,
-) -> OdometrySensor:
+    lcm: Interface | None = None,
+) -> odometry.OdometrySensor:
     """Adds exact odometry of a frame B to a diagram; publishes it on LCM.
 
     It is `lcmt_drake_signal` on the channel `DRAKE_ODOMETRY_<name>`: the
@@ -295,23 +271,15 @@ def ApplyOdometryConfig(
     section = _section(config, OdometrySection)
     plant = plant or builder.GetSubsystemByName("plant")
     frame, X_PB = _place(config, plant)
-    odometry = add_odometry(builder, frame, X_PB=X_PB, name=config.name)
+    sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
     axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
     axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
-    measured = [odometry.GetOutputPort("odometry")]
-    _publish(
-        builder,
-        config,
-        measured,
-        _SignalToLcm(measured, axes, _odometry_values),
-        LcmPublisherSystem.Make(
-            f"DRAKE_ODOMETRY_{config.name}",
-            lcmt_drake_signal,
-            _interface(config, builder, lcm_buses, lcm),
-            publish_period=1.0 / (section.rate or _RATE),
-        ),
-    )
-    return odometry
+    measured = [sensor.GetOutputPort("odometry")]
+    to_lcm = _SignalToLcm(measured, axes, _odometry_values)
+    interface = _interface(config, builder, lcm_buses, lcm)
+    period = 1.0 / (section.rate or _RATE)
+    _publish(builder, config, "ODOMETRY", measured, to_lcm, interface, period)
+    return sensor
 
 
 def _section(config: Any, kind: type[Section]) -> Any:
@@ -341,8 +309,8 @@ def _interface(
     config: Any,
     builder: DiagramBuilder,
     lcm_buses: LcmBuses | None,
-    lcm: DrakeLcmInterface | LcmInterfaceSystem | None,
-) -> DrakeLcmInterface | LcmInterfaceSystem:
+    lcm: Interface | None,
+) -> Interface:
     caller = f"{type(config).__name__} {config.name}"
     if lcm is not None:
         return lcm
@@ -356,8 +324,8 @@ def _interface(
     return builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
 
 
-def _odometry_values(odometry: Odometry) -> np.ndarray:
-    X_WB, V_WB_B = odometry.X_WB, odometry.V_WB_B
+def _odometry_values(value: odometry.Odometry) -> np.ndarray:
+    X_WB, V_WB_B = value.X_WB, value.V_WB_B
     return np.hstack(
         [
             X_WB.rotation().ToQuaternion().wxyz(),
@@ -371,11 +339,24 @@ def _odometry_values(odometry: Odometry) -> np.ndarray:
 def _publish(
     builder: DiagramBuilder,
     config: Any,
+    kind: str,
     ports: list[OutputPort],
-    to_lcm: System,
-    publisher: LcmPublisherSystem,
+    to_lcm: framework.System,
+    interface: Interface,
+    period: float,
 ) -> None:
-    """Adds systems that make a message of ports, and publish it."""
+    """Adds systems that make a message of ports, and publish it.
+
+    The channel is `DRAKE_<kind>_<name>`, the period in seconds.
+    """
+    is_cloud = isinstance(to_lcm, PointCloudToLcm)
+    publisher = drake_lcm.LcmPublisherSystem.Make(
+        f"DRAKE_{kind}_{config.name}",
+        lcmt_point_cloud if is_cloud else lcmt_drake_signal,
+        interface,
+        publish_period=period,
+        use_cpp_serializer=is_cloud,
+    )
     builder.AddNamedSystem(f"{config.name}_to_lcm", to_lcm)
     for index, port in enumerate(ports):
         builder.Connect(port, to_lcm.get_input_port(index))
@@ -383,7 +364,7 @@ def _publish(
     builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
 
 
-class _SignalToLcm(LeafSystem):
+class _SignalToLcm(framework.LeafSystem):
     """Converts the values of ports to an `lcmt_drake_signal`."""
 
     def __init__(
@@ -396,14 +377,12 @@ class _SignalToLcm(LeafSystem):
         super().__init__()
         self._names, self._values = names, values
         for index, port in enumerate(ports):
-            if port.get_data_type() == PortDataType.kVectorValued:
+            if port.get_data_type() == framework.PortDataType.kVectorValued:
                 self.DeclareVectorInputPort(f"u{index}", port.size())
             else:
                 self.DeclareAbstractInputPort(f"u{index}", port.Allocate())
         self.DeclareAbstractOutputPort(
-            "lcmt_drake_signal",
-            lambda: Value(lcmt_drake_signal()),
-            self._calc,
+            "lcmt_drake_signal", lambda: Value(lcmt_drake_signal()), self._calc
         )
 
     def _calc(self, context: Context, output: AbstractValue) -> None:

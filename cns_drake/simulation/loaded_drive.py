@@ -29,14 +29,9 @@ from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.referenced_files import FileWatch
 from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.traffic import lane_graph
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
-from cns_drake.traffic.lane_graph import (
-    LaneGraph,
-    Walkway,
-    kept_clear,
-    with_unmarked_crossings,
-)
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_adding import traffic_structures
@@ -48,10 +43,7 @@ from cns_drake.traffic.traffic_plan import (
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.world_structures import (
-    GROUND_CLASSES,
-    read_structures,
-)
+from cns_drake.transient.world_structures import GROUND_CLASSES, read_structures
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
@@ -263,8 +255,10 @@ def plan_scenario_traffic(
             scenario, with_vehicle=False, trajectory=trajectory
         )
         things = _things(world)
-        walkways = kept_clear(walkways, things)
-        graph, walkways = with_unmarked_crossings(graph, walkways, things)
+        walkways = lane_graph.kept_clear(walkways, things)
+        graph, walkways = lane_graph.with_unmarked_crossings(
+            graph, walkways, things
+        )
     follows = scenario.driver.follows
     plan = plan_traffic(
         graph,
@@ -331,8 +325,8 @@ def _ways_along(roads: Path, content: bytes) -> LaneFile:
 def _check_room(
     wanted: TrafficConfig,
     where: str,
-    graph: LaneGraph,
-    walkways: Sequence[Walkway],
+    graph: lane_graph.LaneGraph,
+    walkways: Sequence[lane_graph.Walkway],
 ) -> None:
     """Checks that roads and sidewalks have room for the traffic."""
     room = room_for_vehicles(graph)

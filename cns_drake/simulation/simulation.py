@@ -10,10 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.files import (
-    check_writable,
-    write_text,
-)
+from cns_drake.base.files import check_writable, write_text
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.version import __version__
 from cns_drake.pictures.drive_page import ShownStages
@@ -34,17 +31,7 @@ from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.config import KALIBR_FILE
 from cns_drake.sensors.lidar.config import describe_unit
-from cns_drake.simulation.loaded_drive import (
-    LoadedDrive,
-    load_drive,
-    load_stage,
-    structure_list,
-)
-from cns_drake.simulation.recording_schedule import (
-    drive_schedule,
-    first_points_topic,
-    scenario_topics,
-)
+from cns_drake.simulation import loaded_drive, recording_schedule
 from cns_drake.simulation.simulated_drive import DriveInProgress
 from cns_drake.simulation.station import make_station
 
@@ -146,7 +133,7 @@ def simulate(
         RecordingFolder(folder).check(overwrite)
         if not scenario.traffic.is_off:
             on_note(f"{scenario.name}: planning the traffic")
-        drive = load_drive(scenario)
+        drive = loaded_drive.load_drive(scenario)
         for text in drive.world.notes:
             on_note(text)
         strike()
@@ -192,7 +179,7 @@ def simulate(
 
 
 def _make_bag(
-    drive: LoadedDrive, folder: Path, *, overwrite: bool = False
+    drive: loaded_drive.LoadedDrive, folder: Path, *, overwrite: bool = False
 ) -> BagWriter:
     """Makes the recording of a drive, so far without messages."""
     scenario, inputs = drive.scenario, drive.inputs
@@ -206,11 +193,11 @@ def _make_bag(
     }
     return BagWriter(
         folder,
-        scenario_topics(scenario),
+        recording_schedule.scenario_topics(scenario),
         start_ns=START_NS,
         attachments={
             "scenario.json": described,
-            "structures.json": structure_list(drive.world),
+            "structures.json": loaded_drive.structure_list(drive.world),
             "calibration.json": make_calibration(
                 drive.X_BSs
                 | {
@@ -244,7 +231,7 @@ def _make_bag(
 
 def _resume(
     bag: BagWriter,
-    drive: LoadedDrive,
+    drive: loaded_drive.LoadedDrive,
     on_frame: ProgressCallback,
     on_note: NoteCallback,
 ) -> int:
@@ -255,9 +242,9 @@ def _resume(
     on_note(f"{name}: found an interrupted run, reading it")
     frames = take_over_frames(
         bag,
-        scenario_topics(drive.scenario),
-        drive_schedule(drive.scenario),
-        first_points_topic(drive.scenario),
+        recording_schedule.scenario_topics(drive.scenario),
+        recording_schedule.drive_schedule(drive.scenario),
+        recording_schedule.first_points_topic(drive.scenario),
     )
     on_note(
         f"{name}: {frames} of {num_frames} frames are there; going on with "
@@ -268,7 +255,7 @@ def _resume(
     return frames
 
 
-def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
+def _make_page(drive: loaded_drive.LoadedDrive) -> MeshcatRecorder:
     other, other_name = shown_beside(drive.scenario)
     stage = drive.scenario.stage
     stages = () if stage is None else tuple(map_folder(drive.scenario).stages())
@@ -278,7 +265,7 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
         period=drive.scenario.frame_period,
         num_frames=drive.num_frames,
         shown=ShownStages(
-            None if other is None else load_stage(other),
+            None if other is None else loaded_drive.load_stage(other),
             other_name,
             stage,
             stages,
@@ -289,7 +276,7 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
 def _advance(
     diagram: Diagram,
     writer: BackgroundWriter,
-    drive: LoadedDrive,
+    drive: loaded_drive.LoadedDrive,
     first: int,
     on_frame: Callable[[int], None],
     reader: Callable[[Drive], None] | None,
@@ -303,7 +290,7 @@ def _advance(
         return 0.0
     scenario = drive.scenario
     period = scenario.frame_period
-    schedule = drive_schedule(scenario)
+    schedule = recording_schedule.drive_schedule(scenario)
 
     def monitor(context: Context) -> None:
         done = math.floor(context.get_time() / period + 1e-6) + 1
@@ -313,7 +300,9 @@ def _advance(
     simulator.set_monitor(monitor)
     # Messages come at ticks. The simulation begins and ends between two ticks,
     # so that rounding cannot add or drop a message.
-    begin = first * schedule.steps[first_points_topic(scenario)]
+    begin = (
+        first * schedule.steps[recording_schedule.first_points_topic(scenario)]
+    )
     end = max(schedule.ends.values())
     start = max(begin - 0.5, 0.0) * schedule.period
     simulator.get_mutable_context().SetTime(start)

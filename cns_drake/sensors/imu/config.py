@@ -7,10 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from cns_drake.base.errors import (
-    InputError,
-    validated,
-)
+from cns_drake.base.errors import InputError, validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.sensors.imu.noise import ImuNoise
 from cns_drake.sensors.sensor_config import (

@@ -4,17 +4,9 @@ from collections.abc import Collection
 from typing import Any
 import warnings
 
-from pydrake.geometry import (
-    FrameId,
-    GeometryId,
-    Meshcat,
-    MeshcatPointCloudVisualizer,
-    Rgba,
-    Role,
-    SceneGraph,
-)
+from pydrake import geometry
+from pydrake.geometry import FrameId, GeometryId, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
@@ -26,7 +18,6 @@ from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.config import (
     LidarSection,
     WeatherConfig,
-    make_measurement,
     make_pattern,
     make_returns,
 )
@@ -106,14 +97,54 @@ def add_lidar(
         lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
-    _check_arguments(builder, scene_graph, name, X_PS, pattern)
+    if not isinstance(scene_graph, SceneGraph):
+        raise TypeError(
+            f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "
+            "AddMultibodyPlantSceneGraph returns one beside the plant"
+        )
+    if not isinstance(X_PS, RigidTransform):
+        raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")
+    if builder.HasSubsystemNamed(name):
+        raise ValueError(
+            f"name: the diagram has a system '{name}'; give each LiDAR a name "
+            "of its own"
+        )
     if not isinstance(body, FrameId):
         body, X_PS = body_and_pose(body, X_PS)
-    _choose_measuring(
-        options, pattern, returns, name, range_noise, dropout, seed
-    )
     if isinstance(pattern, str):
+        if returns == "calibrated":
+            returns = CalibratedReturns.of_preset(
+                pattern, seed=seed, sensor_name=name
+            )
         pattern = make_beam_pattern(pattern)
+    elif not isinstance(pattern, BeamPattern):
+        raise TypeError(
+            f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
+            "preset"
+        )
+    if isinstance(returns, CalibratedReturns):
+        if range_noise or dropout:
+            raise ValueError(
+                "range_noise, dropout: calibrated returns have their own; "
+                "leave these out"
+            )
+        options["returns"] = returns
+    elif returns != "ideal":
+        raise ValueError(
+            f"returns: {returns!r}: give 'ideal', 'calibrated' with the name "
+            "of a preset as pattern, or CalibratedReturns"
+        )
+    elif range_noise or dropout or seed:
+        if "measurement" in options:
+            raise ValueError(
+                "measurement: give either it or range_noise, dropout and seed"
+            )
+        options["measurement"] = MeasurementModel(
+            range_noise=range_noise,
+            dropout=dropout,
+            seed=seed,
+            sensor_name=name,
+        )
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
         source = plant.get_source_id()
@@ -129,7 +160,13 @@ def add_lidar(
             unseen = _welded_to(body)
         options.setdefault("anchored_frames", anchored_frames(plant))
         if motion_distortion:
-            options["moving_bodies"] = _moving_bodies(plant)
+            frames = map(
+                plant.GetBodyFrameIdIfExists,
+                map(BodyIndex, range(plant.num_bodies())),
+            )
+            options["moving_bodies"] = {
+                frame: k for k, frame in enumerate(frames) if frame is not None
+            }
     else:
         frame_id = body
         if motion_distortion:
@@ -139,13 +176,22 @@ def add_lidar(
             )
     if unseen is not None:
         options["unseen"] = [
-            _frame_of(place) if isinstance(place, RigidBody) else place
+            place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
+            if isinstance(place, RigidBody)
+            else place
             for place in unseen
         ]
     lidar = builder.AddNamedSystem(
         name, Lidar(frame_id, X_PS, pattern, **options)
     )
-    _warn_of_nothing_to_see(scene_graph, options.get("role", Role.kPerception))
+    role = options.get("role", Role.kPerception)
+    if scene_graph.model_inspector().NumGeometriesWithRole(role) == 0:
+        warnings.warn(
+            f"the SceneGraph holds no geometry of {role}: so far the LiDAR "
+            "has nothing to see. RegisterVisualGeometry of a plant gives the "
+            "perception role.",
+            stacklevel=2,
+        )
     connect_lidar(builder, scene_graph, lidar)
     if motion_distortion and isinstance(body, RigidBody):
         port = "body_spatial_velocities"
@@ -181,7 +227,14 @@ def add_described_lidar(
         X_PS,
         pattern,
         name=name,
-        measurement=make_measurement(config, name, seed),
+        measurement=MeasurementModel(
+            resolution=config.resolution,
+            range_noise=config.range_noise,
+            dropout=config.dropout,
+            faint_dropout=config.faint_dropout,
+            seed=seed,
+            sensor_name=name,
+        ),
         returns=make_returns(config, weather, name, seed) or "ideal",
         **options,
     )
@@ -199,12 +252,12 @@ def add_described_lidar(
 def add_lidar_view(
     builder: DiagramBuilder,
     lidar: Lidar,
-    meshcat: Meshcat,
+    meshcat: geometry.Meshcat,
     *,
     period: float | None = None,
     color: Rgba = _VIEW_COLOR,
     point_size: float = 0.05,
-) -> MeshcatPointCloudVisualizer:
+) -> geometry.MeshcatPointCloudVisualizer:
     """Adds a live view of a LiDAR's scans, at their places in Meshcat.
 
     Args:
@@ -223,7 +276,7 @@ def add_lidar_view(
     name = lidar.get_name()
     view = builder.AddNamedSystem(
         f"{name}_view",
-        MeshcatPointCloudVisualizer(
+        geometry.MeshcatPointCloudVisualizer(
             meshcat, name, lidar.pattern.period if period is None else period
         ),
     )
@@ -235,54 +288,14 @@ def add_lidar_view(
     return view
 
 
-def _choose_measuring(
-    options: dict[str, Any],
-    pattern: BeamPattern | str,
-    returns: CalibratedReturns | str,
-    name: str,
-    range_noise: float,
-    dropout: float,
-    seed: int,
-) -> None:
-    """Sets the options of `Lidar` for its measurement."""
-    if returns == "calibrated" and isinstance(pattern, str):
-        returns = CalibratedReturns.of_preset(
-            pattern, seed=seed, sensor_name=name
-        )
-    if isinstance(returns, CalibratedReturns):
-        if range_noise or dropout:
-            raise ValueError(
-                "range_noise, dropout: calibrated returns have their own; "
-                "leave these out"
-            )
-        options["returns"] = returns
-    elif returns != "ideal":
-        raise ValueError(
-            f"returns: {returns!r}: give 'ideal', 'calibrated' with the name "
-            "of a preset as pattern, or CalibratedReturns"
-        )
-    elif range_noise or dropout or seed:
-        if "measurement" in options:
-            raise ValueError(
-                "measurement: give either it or range_noise, dropout and seed"
-            )
-        options["measurement"] = MeasurementModel(
-            range_noise=range_noise,
-            dropout=dropout,
-            seed=seed,
-            sensor_name=name,
-        )
-
-
 def connect_lidar(
     builder: DiagramBuilder, scene_graph: SceneGraph, lidar: Lidar
 ) -> None:
     """Connects a LiDAR's inputs to a SceneGraph."""
-    for source, target in (
-        (scene_graph.get_query_output_port(), "geometry_query"),
-        (geometry_revision_port(scene_graph), "geometry_revision"),
-    ):
-        builder.Connect(source, lidar.GetInputPort(target))
+    query = scene_graph.get_query_output_port()
+    builder.Connect(query, lidar.GetInputPort("geometry_query"))
+    revision = geometry_revision_port(scene_graph)
+    builder.Connect(revision, lidar.GetInputPort("geometry_revision"))
 
 
 def _welded_to(body: RigidBody) -> list[RigidBody]:
@@ -305,54 +318,3 @@ def _welded_to(body: RigidBody) -> list[RigidBody]:
         found[int(place.index())] = place
         rest += neighbours.get(int(place.index()), [])
     return list(found.values())
-
-
-def _moving_bodies(plant: MultibodyPlant) -> dict[FrameId, int]:
-    """Returns frame -> index of its body."""
-    frames = {
-        k: plant.GetBodyFrameIdIfExists(BodyIndex(k))
-        for k in range(plant.num_bodies())
-    }
-    return {frame: k for k, frame in frames.items() if frame is not None}
-
-
-def _frame_of(body: RigidBody) -> FrameId:
-    return body.GetParentPlant().GetBodyFrameIdOrThrow(body.index())
-
-
-def _check_arguments(
-    builder: DiagramBuilder,
-    scene_graph: object,
-    name: str,
-    X_PS: object,
-    pattern: object,
-) -> None:
-    """Checks the arguments of `add_lidar`."""
-    if not isinstance(scene_graph, SceneGraph):
-        raise TypeError(
-            f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "
-            "AddMultibodyPlantSceneGraph returns one beside the plant"
-        )
-    if not isinstance(X_PS, RigidTransform):
-        raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")
-    if not isinstance(pattern, BeamPattern | str):
-        raise TypeError(
-            f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
-            "preset"
-        )
-    if builder.HasSubsystemNamed(name):
-        raise ValueError(
-            f"name: the diagram has a system '{name}'; give each LiDAR a name "
-            "of its own"
-        )
-
-
-def _warn_of_nothing_to_see(scene_graph: SceneGraph, role: Role) -> None:
-    """Warns if no registered geometry has the role yet."""
-    if scene_graph.model_inspector().NumGeometriesWithRole(role) == 0:
-        warnings.warn(
-            f"the SceneGraph holds no geometry of {role}: so far the LiDAR "
-            "has nothing to see. RegisterVisualGeometry of a plant gives the "
-            "perception role.",
-            stacklevel=3,
-        )

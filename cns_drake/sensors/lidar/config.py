@@ -5,18 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import (
-    Field,
-    PlainSerializer,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, PlainSerializer, field_validator, model_validator
 
 from cns_drake.base.drives.point_layouts import LayoutName
-from cns_drake.base.errors import (
-    validated,
-)
-from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
+from cns_drake.base.errors import validated
+from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
 from cns_drake.sensors.sensor_config import (
@@ -28,7 +21,6 @@ from cns_drake.sensors.sensor_config import (
 
 if TYPE_CHECKING:
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
-    from cns_drake.sensors.returns.weather import Weather
 
 
 class WeatherConfig(Section):
@@ -43,13 +35,6 @@ class WeatherConfig(Section):
     visibility: float | None = Field(default=None, ge=5.0, le=1e6)
     rain: float = Field(default=0.0, ge=0.0, le=300.0)
     snowfall: float = Field(default=0.0, ge=0.0, le=300.0)
-
-    def weather(self) -> Weather:
-        """Returns the weather as the model of a LiDAR."""
-        # Slow to import, and not needed to describe a scenario.
-        from cns_drake.sensors.returns.weather import Weather
-
-        return Weather(self.visibility, self.rain, self.snowfall)
 
 
 class LidarSection(Mount):
@@ -196,26 +181,13 @@ def make_returns(
         return None
     # Slow to import, and not needed to describe a scenario.
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
+    from cns_drake.sensors.returns.weather import Weather
 
     return CalibratedReturns.of_preset(
         config.preset,
         echoes=config.echoes,
-        weather=weather.weather(),
+        weather=Weather(**weather.model_dump()),
         seed=seed,
         sensor_name=name,
         unit_seed=config.unit_seed,
-    )
-
-
-def make_measurement(
-    config: LidarSection, name: str, seed: int
-) -> MeasurementModel:
-    """Returns the model of a LiDAR's measurement of true ranges."""
-    return MeasurementModel(
-        resolution=config.resolution,
-        range_noise=config.range_noise,
-        dropout=config.dropout,
-        faint_dropout=config.faint_dropout,
-        seed=seed,
-        sensor_name=name,
     )

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from operator import is_
 from typing import Any, NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
+from pydrake.geometry import (
+    FrameId,
+    GeometryId,
+    QueryObject,
+    Role,
+    SceneGraphInspector,
+)
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import PointCloud
@@ -18,22 +25,20 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
-from cns_drake.ray_casting.moving_groups import (
-    EVERYWHERE,
-    NOTHING_KNOWN,
-    Ball,
-    KnownPoses,
-)
+from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
-from cns_drake.scene.semantics import CLASS_IDS
-from cns_drake.scene.structure_table import StructureTable
+from cns_drake.scene.perception_geometry import (
+    GeometryReader,
+    PerceptionGeometry,
+)
+from cns_drake.scene.semantics import CLASS_IDS, moving_id
+from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
-from cns_drake.sensors.lidar.seen_geometry import SeenGeometry, Sight
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
+from cns_drake.sensors.returns.materials import Materials, find_materials
 
 # The class of points without a structure.
 SCATTERED_LABEL = CLASS_IDS["outlier"]
@@ -155,14 +160,11 @@ class Lidar(LeafSystem):
         self.pattern = pattern
         self._measurement = measurement
         self._returns = returns
-        sight = Sight(
-            role,
-            parent_frame_id,
-            None if unseen is None else frozenset(unseen),
-            structures or StructureTable(()),
-            frozenset(anchored_frames),
-            num_threads,
-        )
+        self.role = role
+        self.unseen = None if unseen is None else frozenset(unseen)
+        self.structures = structures or StructureTable(())
+        self.anchored_frames = frozenset(anchored_frames)
+        self.num_threads = num_threads
         self._first = self._latest = _Turn(0, pattern.beams(0), returns)
         # When each column fires, as a part of a turn.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
@@ -187,7 +189,7 @@ class Lidar(LeafSystem):
         self._seen = self.DeclareCacheEntry(
             description="ray-casting scene",
             value_producer=ValueProducer(
-                allocate=lambda: Value(SeenGeometry(sight)),
+                allocate=lambda: Value(SeenGeometry(self)),
                 calc=lambda context, seen: self._update(
                     context, seen.get_value()
                 ),
@@ -236,8 +238,8 @@ class Lidar(LeafSystem):
         return seen
 
     def _update(self, context: Context, seen: SeenGeometry) -> None:
-        known, ball = self._known_poses(context), EVERYWHERE
-        if known is not NOTHING_KNOWN:
+        known, ball = self._known_poses(context), moving_groups.EVERYWHERE
+        if known is not moving_groups.NOTHING_KNOWN:
             # Geometry out of sight is not moved.
             ball = self._calc_ball(context)
         seen.update(
@@ -248,10 +250,10 @@ class Lidar(LeafSystem):
             ball,
         )
 
-    def _known_poses(self, context: Context) -> KnownPoses:
-        return _value(self._frame_poses, context, NOTHING_KNOWN)
+    def _known_poses(self, context: Context) -> moving_groups.KnownPoses:
+        return _value(self._frame_poses, context, moving_groups.NOTHING_KNOWN)
 
-    def _calc_ball(self, context: Context) -> Ball:
+    def _calc_ball(self, context: Context) -> moving_groups.Ball:
         """Returns the ball in which beams can meet geometry."""
         model = self._returns or self._measurement
         reach = model.reach(self.pattern.max_range)
@@ -261,7 +263,7 @@ class Lidar(LeafSystem):
             middle = p_WSset.mean(axis=0)
             way = np.linalg.norm(p_WSset - middle, axis=1).max()
         # A metre of margin for rounding and merged beams.
-        return Ball(middle, float(reach + way) + 1.0)
+        return moving_groups.Ball(middle, float(reach + way) + 1.0)
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
         """Returns the motion of each frame that does not stay."""
@@ -271,9 +273,7 @@ class Lidar(LeafSystem):
         duration = self.pattern.period
         motions = {
             frame_id: Motion(
-                V_WBs[body].rotational(),
-                V_WBs[body].translational(),
-                duration,
+                V_WBs[body].rotational(), V_WBs[body].translational(), duration
             )
             for frame_id, body in self._moving_bodies.items()
         }
@@ -289,27 +289,21 @@ class Lidar(LeafSystem):
             times = times[columns]
             if len(p_WSset) > 1:
                 p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
-        met, (beams, ranges, intensity) = self._measure(
-            seen, turn, p_WSset, R_WSset, times, frame
-        )
+        met, returns = self._measure(seen, turn, p_WSset, R_WSset, times, frame)
         labels = seen.label
         moving = _value(self._moving, context)
         if moving is not None:
             labels = seen.labels(moving)
-        # Zeros, so that the padding between fields is defined, too.
-        scan = np.zeros(len(beams), POINT_DTYPE)
-        assemble_points(
-            scan,
-            turn.table,
-            beams,
-            ranges,
-            intensity,
-            met,
-            labels,
-            seen.instance,
-            np.float32(self._measurement.resolution),
+        output.set_value(
+            assemble_points(
+                turn.table,
+                returns,
+                met,
+                labels,
+                seen.instance,
+                self._measurement.resolution,
+            )
         )
-        output.set_value(scan)
 
     def _measure(
         self,
@@ -417,6 +411,136 @@ def _fill(point_cloud: PointCloud, p_FRset: np.ndarray) -> None:
     point_cloud.mutable_xyzs()[:] = p_FRset
 
 
+class SeenGeometry:
+    """The geometry that a LiDAR sees in a Context, kept until it changes.
+
+    In a cloned Context it is empty at first: a scene with moving geometry
+    cannot be shared.
+
+    Attributes:
+        scene: casts rays, None before the first update; its geometry indices
+            select from:
+        label: (num_geometries,) uint16 class of each geometry.
+        moving_label: (num_geometries,) uint16 its class while it moves.
+        instance: (num_geometries,) uint16 structure of each geometry.
+    """
+
+    def __init__(self, lidar: Lidar):
+        self._lidar = lidar
+        self._reader = GeometryReader(lidar.role)
+        self._geometries: tuple[PerceptionGeometry, ...] = ()
+        self._revision: int | None = None
+        self._built: tuple[PerceptionGeometry, ...] = ()
+        self._X_WAs: dict[FrameId, RigidTransform] = {}
+        self.scene: RayCastingScene | None = None
+        self._materials: Materials | None = None
+
+    def __deepcopy__(self, memo: dict) -> SeenGeometry:
+        return SeenGeometry(self._lidar)
+
+    def update(
+        self,
+        query_object: QueryObject,
+        revision: int | None,
+        motions: Mapping[FrameId, Motion],
+        known: moving_groups.KnownPoses,
+        seen: moving_groups.Ball,
+    ) -> None:
+        """Moves moving geometry, and builds changed geometry anew.
+
+        Args:
+            revision: the geometry's (`geometry_revision_port`), None if
+                unknown; all geometries are then compared.
+            known: poses of frames, which replace calls of `query_object`.
+            seen: the ball in which beams can meet geometry.
+
+        Raises:
+            InputError: see `GeometryReader.read`.
+        """
+        inspector = query_object.inspector()
+
+        def calc_X_WF(frame: FrameId) -> RigidTransform:
+            return known.find(frame, query_object.GetPoseInWorld)
+
+        if self.scene is None or revision is None or revision != self._revision:
+            self._read(inspector)
+        if self.scene is None or not self._is_built(calc_X_WF):
+            self._build(inspector.world_frame_id(), calc_X_WF)
+        assert self.scene is not None
+        self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
+        self._revision = revision
+
+    def labels(self, moving: np.ndarray) -> np.ndarray:
+        """Returns the class of each geometry while some instances move."""
+        moves = np.zeros(MAX_INSTANCE + 1, bool)
+        moves[moving] = True
+        return np.where(moves[self.instance], self.moving_label, self.label)
+
+    def materials(self, *, is_wet: bool) -> Materials:
+        """Returns the materials of the geometries of `scene`.
+
+        Args:
+            is_wet: whether the ground is wet; the same at each call.
+        """
+        if self._materials is None:
+            self._materials = find_materials(
+                self._built, self._table, is_wet=is_wet
+            )
+        return self._materials
+
+    def _read(self, inspector: SceneGraphInspector) -> None:
+        unseen = self._lidar.unseen
+        if unseen is None:
+            unseen = frozenset([self._lidar.parent_frame_id])
+            unseen -= {inspector.world_frame_id()}
+        hidden = set(unseen)
+        for frame_id in inspector.GetAllFrameIds():
+            if frame_id in unseen:
+                hidden |= set(
+                    inspector.GetGeometries(frame_id, self._lidar.role)
+                )
+        self._geometries = self._reader.read(inspector, hidden)
+
+    def _is_built(self, calc_X_WF: Callable[[FrameId], RigidTransform]) -> bool:
+        """Returns whether the scene is up to date."""
+        if self._built is not self._geometries and (
+            len(self._built) != len(self._geometries)
+            or not all(map(is_, self._built, self._geometries))
+        ):
+            return False
+        return all(
+            X_WA.IsExactlyEqualTo(calc_X_WF(frame_id))
+            for frame_id, X_WA in self._X_WAs.items()
+        )
+
+    def _build(
+        self, world: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
+    ) -> None:
+        names = [geometry.structure for geometry in self._geometries]
+        table = self._lidar.structures.completed(names)
+        self._table, self._materials = table, None
+        self.label = np.array([table[n].label for n in names], np.uint16)
+        self.moving_label = np.array(
+            [moving_id(table[n].semantic_class) for n in names], np.uint16
+        )
+        self.instance = np.array([table[n].instance for n in names], np.uint16)
+        anchored = self._lidar.anchored_frames | {world}
+        # Copies: Drake's references go on changing.
+        self._X_WAs = {
+            frame_id: RigidTransform(calc_X_WF(frame_id))
+            for frame_id in {g.frame_id for g in self._geometries}
+            if frame_id in anchored and frame_id != world
+        }
+        self.scene = RayCastingScene(
+            self._geometries,
+            anchored,
+            calc_X_WF,
+            num_threads=self._lidar.num_threads,
+            previous=self.scene,
+        )
+        self._built = self._geometries
+
+
 class BeamTable(NamedTuple):
     """Constants of all scans, for all beams in firing order.
 
@@ -467,59 +591,39 @@ class _Turn:
         )
 
 
-@compiled
 def assemble_points(
-    scan: np.ndarray,
     table: BeamTable,
-    beams: np.ndarray,
-    ranges: np.ndarray,
-    intensity: np.ndarray,
+    returns: Returns,
     met: np.ndarray,
     label: np.ndarray,
     instance: np.ndarray,
-    step: np.float32,
-) -> None:
-    """Fills a scan, one point for each return.
+    step: float,
+) -> np.ndarray:
+    """Returns a scan, one point of `POINT_DTYPE` for each of N returns.
 
     Args:
-        scan: (N,) `POINT_DTYPE` to fill.
-        beams: (N,) the beams with a return.
-        ranges: (N,) float32 measured along them [m].
-        intensity: (N,) float32.
         met: (N,) int32 index of the hit geometry in `label` and `instance`;
             negative for the weather.
         label: uint16 classes.
         instance: uint16 structures.
         step: coordinates are rounded to multiples of it [m]; not rounded if 0.
     """
-    for k in range(len(beams)):
-        # For a signed index, numba looks at each use whether it counts from
-        # the end.
-        beam = np.uint64(beams[k])
-        x = table.d_Sset[beam, 0] * ranges[k]
-        y = table.d_Sset[beam, 1] * ranges[k]
-        z = table.d_Sset[beam, 2] * ranges[k]
-        if len(table.p_Sset):
-            x += table.p_Sset[beam, 0]
-            y += table.p_Sset[beam, 1]
-            z += table.p_Sset[beam, 2]
-        if step > 0:
-            x = np.rint(x / step) * step
-            y = np.rint(y / step) * step
-            z = np.rint(z / step) * step
-        point = scan[k]
-        point.x = x
-        point.y = y
-        point.z = z
-        point.intensity = intensity[k]
-        point.ring = table.ring[beam]
-        point.t = table.t_ns[beam]
-        if met[k] < 0:
-            point.label, point.instance = SCATTERED_LABEL, 0
-        else:
-            geometry = np.uint64(met[k])
-            point.label = label[geometry]
-            point.instance = instance[geometry]
+    beams = returns.beams
+    p_SRset = table.d_Sset[beams] * returns.ranges[:, None]
+    if len(table.p_Sset):
+        p_SRset += table.p_Sset[beams]
+    if step > 0.0:
+        p_SRset = np.rint(p_SRset / np.float32(step)) * np.float32(step)
+    # Zeros, so that the padding between fields is defined, too.
+    scan = np.zeros(len(beams), POINT_DTYPE)
+    scan["x"], scan["y"], scan["z"] = p_SRset.T
+    scan["intensity"] = returns.intensity
+    scan["ring"], scan["t"] = table.ring[beams], table.t_ns[beams]
+    is_solid = met >= 0
+    scan["label"] = SCATTERED_LABEL
+    scan["label"][is_solid] = label[met[is_solid]]
+    scan["instance"][is_solid] = instance[met[is_solid]]
+    return scan
 
 
 def points_in_world(

@@ -227,12 +227,7 @@ class CalibratedReturns:
             *scene.surface_frames(),
         )
         return report_echoes(
-            light,
-            receiver,
-            key,
-            len(turn.beam),
-            turn.range_error,
-            turn.gain,
+            light, receiver, key, len(turn.beam), turn.range_error, turn.gain
         )
 
     def turn(self, beams: Beams) -> CalibratedTurn:
@@ -241,12 +236,7 @@ class CalibratedReturns:
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
         angle = np.radians(sheet.angle_error_deg)
-        sizes = (
-            sheet.range_bias,
-            angle,
-            angle,
-            sheet.response.gain,
-        )
+        sizes = (sheet.range_bias, angle, angle, sheet.response.gain)
         # None is farther off than three deviations.
         errors = [
             size * np.clip(normal(key, laser, draw), -3.0, 3.0)

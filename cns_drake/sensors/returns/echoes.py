@@ -294,10 +294,7 @@ def _fog(
 
 
 def _detect(
-    pulses: _Pulses,
-    receiver: Receiver,
-    key: np.uint64,
-    range_error: np.ndarray,
+    pulses: _Pulses, receiver: Receiver, key: np.uint64, range_error: np.ndarray
 ) -> _Pulses:
     """Returns the echoes that are detected, with errors of their ranges."""
     # Where a surface lies decides; an error of its range does not.

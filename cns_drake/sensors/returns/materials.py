@@ -50,7 +50,7 @@ _BY_CLASS = {
 }
 # Classes of smooth surfaces, which reflect after Lambert, and those of leaves.
 _SMOOTH = {c for c in _BY_CLASS if c.endswith("car") or "vehicle" in c} | {
-    *("bus", "truck", "motorcycle", "traffic-sign", "vegetation"),
+    *("bus", "truck", "motorcycle", "traffic-sign", "vegetation")
 }
 # Rough surfaces follow Oren and Nayar (1994), with slopes of 30 deg: 0.77 times
 # the cosine and 0.34 times the square of the sine, here over the first one.

@@ -26,12 +26,7 @@ from cns_drake.sensors.returns.light import (
     select,
 )
 from cns_drake.sensors.returns.link_budget import LinkBudget
-from cns_drake.sensors.returns.materials import (
-    GLASS,
-    LEAVES,
-    SPRAYS,
-    Materials,
-)
+from cns_drake.sensors.returns.materials import GLASS, LEAVES, SPRAYS, Materials
 from cns_drake.sensors.returns.random_numbers import uniform
 
 # Refractive index of window glass near 900 nm.

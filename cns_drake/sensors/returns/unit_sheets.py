@@ -1,16 +1,15 @@
-"""Values from the data sheets of the presets' units.
-
-If a sheet lacks a value, a similar unit's is used, and `unknown` names the
-field.
-"""
+"""Values from the data sheets of the presets' units: unit_sheets.yaml."""
 
 from dataclasses import dataclass
 from functools import cached_property
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cns_drake.base.elementary import exp, log
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.sensors.returns.link_budget import (
     LinkBudget,
     SheetRow,
@@ -98,9 +97,9 @@ class UnitSheet:
     range_floor: float
     divergence_deg: float
     pulse_ns: float
-    retro_from: float
     unknown: tuple[str, ...]
     source: str
+    retro_from: float = 100.0
     angle_error_deg: float = 0.03
     own_part: float = 0.8
     response: Response = Response()
@@ -128,176 +127,26 @@ class UnitSheet:
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
 
 
-def _rows(
-    far: tuple[float, float, float], near: tuple[float, float, float] | None
-) -> tuple[SheetRow, ...]:
-    rows = [SheetRow(*far)]
-    if near is not None:
-        rows.append(SheetRow(*near))
-    return tuple(rows)
-
-
-def _ouster(
-    far: tuple[float, float, float],
-    near: tuple[float, float, float],
-    divergence_deg: float,
-    source: str,
+def _sheet(
+    rows: list, unknown: list[str], source: str, **fields: Any
 ) -> UnitSheet:
-    # Ranges of the first OS1 scatter by 10, 3 and 1.5 cm at an SNR of 12, 100
-    # and 250: 0.30 m / sqrt(SNR) in the middle, and nowhere below 1.5 cm.
+    """Returns a sheet of its fields in unit_sheets.yaml."""
+    if "response" in fields:
+        fields["response"] = Response(**fields["response"])
+    if "head" in fields:
+        heights = tuple(map(tuple, fields["head"]["heights"]))
+        fields["head"] = Head(heights, fields["head"]["tick_deg"])
     return UnitSheet(
-        _rows(far, near),
-        0.30,
-        0.015,
-        divergence_deg,
-        4.0,
-        100.0,
-        ("pulse_ns",),
-        source,
-        0.01,
+        rows=tuple(SheetRow(*row) for row in rows),
+        unknown=tuple(unknown),
+        source=source,
+        **fields,
     )
 
 
-_OS1 = _ouster(
-    (0.8, 120.0, 0.9),
-    (0.1, 40.0, 0.9),
-    0.18,
-    "Ouster OS1 data sheet, first generation: 120 m at 80 %, 40 m at 10 %, "
-    "both with 90 % detection at 100 klx; 0.18 deg",
-)
-
 UNIT_SHEETS: dict[str, UnitSheet] = {
-    "cns": _OS1,
-    "os1-32": _OS1,
-    "os1-64": _OS1,
-    "os1-128": _OS1,
-    "os1-64-33": _OS1,
-    "os1-128-42": _ouster(
-        (0.8, 170.0, 0.9),
-        (0.1, 90.0, 0.9),
-        0.35,
-        "Ouster OS1 data sheet rev. 7: 170 m at 80 %, 90 m at 10 %, 90 % "
-        "detection at 100 klx; 0.35 deg",
-    ),
-    "os0-128": _ouster(
-        (0.8, 50.0, 0.9),
-        (0.1, 20.0, 0.9),
-        0.35,
-        "Ouster OS0 data sheet: 50 m at 80 %, 20 m at 10 %, 90 % detection at "
-        "100 klx; 0.35 deg",
-    ),
-    "vlp-16": UnitSheet(
-        _rows((0.8, 100.0, 0.9), None),
-        0.10,
-        0.03,
-        0.18,
-        6.0,
-        100.0,
-        ("probability", "range at 10 %"),
-        "Velodyne VLP-16 user manual: 100 m, typical accuracy 3 cm, 3 mrad, "
-        "pulses of 6 ns, diffuse targets 0 to 100 and retro-reflectors above",
-    ),
-    "hdl-64e": UnitSheet(
-        _rows((0.8, 120.0, 0.9), (0.1, 50.0, 0.9)),
-        0.15,
-        0.02,
-        0.11,
-        5.0,
-        100.0,
-        ("probability",),
-        "Velodyne HDL-64E manual: 120 m for cars and foliage (reflectivity "
-        "about 0.8), 50 m for pavement (about 0.1), below 2 cm, 2 mrad, 5 ns; "
-        "response, errors of lasers and steps of azimuths fitted to the first "
-        "eleven scans of KITTI odometry 00; heights of blocks rounded from the "
-        "calibration of an S2.1 in ROS's velodyne_pointcloud",
-        0.05,
-        0.9,
-        Response(0.57, 0.3, True, 4.0, 0.05, 0.1, 0.1),
-        Head(((-8.5, 0.2), (-90.0, 0.115)), 0.09),
-    ),
-    "hdl-32e": UnitSheet(
-        _rows((0.8, 100.0, 0.9), None),
-        0.10,
-        0.02,
-        0.18,
-        6.0,
-        100.0,
-        ("probability", "range at 10 %", "divergence_deg", "pulse_ns"),
-        "Velodyne HDL-32E manual: 100 m, typical accuracy 2 cm",
-    ),
-    "alpha-prime": UnitSheet(
-        _rows((0.1, 220.0, 0.9), None),
-        0.10,
-        0.03,
-        0.18,
-        6.0,
-        100.0,
-        ("probability", "range at 80 %", "divergence_deg", "pulse_ns"),
-        "Velodyne Alpha Prime data sheet: 220 m at 10 %, typical accuracy 3 cm",
-    ),
-    "hesai-pandar64": UnitSheet(
-        _rows((0.1, 200.0, 0.9), None),
-        0.10,
-        0.02,
-        0.11,
-        5.0,
-        100.0,
-        ("probability", "range at 80 %", "divergence_deg", "pulse_ns"),
-        "Hesai Pandar64 user manual: 200 m at 10 %, 2 cm",
-    ),
-    "hesai-pandar-xt32": UnitSheet(
-        _rows((0.8, 120.0, 0.9), (0.1, 80.0, 0.9)),
-        0.03,
-        0.005,
-        0.09,
-        3.0,
-        100.0,
-        ("probability", "range at 80 %", "divergence_deg", "pulse_ns"),
-        "Hesai PandarXT-32 user manual: 80 m at 10 %, 120 m at most, "
-        "0.5 cm typical precision",
-    ),
-    "hokuyo-ust-20lx": UnitSheet(
-        _rows((0.9, 20.0, 0.9), (0.1, 8.0, 0.9)),
-        0.10,
-        0.03,
-        0.3,
-        4.0,
-        100.0,
-        ("probability", "divergence_deg", "pulse_ns", "retro_from"),
-        "Hokuyo UST-20LX specification: 20 m on white paper (0.9), 8 m at "
-        "10 %, repeated accuracy below 3 cm",
-    ),
-    "mid-70": UnitSheet(
-        _rows((0.8, 260.0, 0.9), (0.1, 90.0, 0.9)),
-        0.06,
-        0.02,
-        0.28,
-        6.0,
-        150.0,
-        ("probability", "pulse_ns"),
-        "Livox Mid-70 user manual: 260 m at 80 %, 90 m at 10 %, 2 cm, "
-        "0.28 x 0.03 deg, diffuse targets 0 to 150",
-    ),
-    "avia": UnitSheet(
-        _rows((0.8, 320.0, 0.9), (0.1, 190.0, 0.9)),
-        0.06,
-        0.02,
-        0.28,
-        6.0,
-        150.0,
-        ("probability", "pulse_ns"),
-        "Livox Avia user manual: 320 m at 80 %, 190 m at 10 %, 2 cm, "
-        "0.28 x 0.03 deg, diffuse targets 0 to 150",
-    ),
-    "mid-360": UnitSheet(
-        _rows((0.8, 70.0, 0.9), (0.1, 40.0, 0.9)),
-        0.06,
-        0.02,
-        0.9,
-        6.0,
-        150.0,
-        ("probability", "divergence_deg", "pulse_ns"),
-        "Livox Mid-360 user manual: 70 m at 80 %, 40 m at 10 %, 2 cm, diffuse "
-        "targets 0 to 150",
-    ),
+    name: _sheet(**fields)
+    for name, fields in parse_yaml(
+        Path(__file__).with_name("unit_sheets.yaml").read_bytes()
+    ).items()
 }

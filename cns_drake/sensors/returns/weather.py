@@ -111,10 +111,7 @@ class Weather:
             slope = 2.29 * self.snowfall**-0.45
             number = 2500.0 * self.snowfall**-0.94
             kinds.append(
-                (
-                    number * exp(-slope * diameters_mm),
-                    _FLAKE_REFLECTIVITY,
-                )
+                (number * exp(-slope * diameters_mm), _FLAKE_REFLECTIVITY)
             )
         return kinds
 

@@ -71,7 +71,8 @@ def scenes_of_copies(scene):
     return [
         hierarchy._built[row].scene
         for row, group in enumerate(hierarchy._groups)
-        if group.is_copy
+        for _, X_LG, surface in group.members
+        if isinstance(surface, TriangleSurface) and X_LG.IsExactlyIdentity()
     ]
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cns_drake.sensors.lidar.lidar import BeamTable, assemble_points
+from cns_drake.sensors.lidar.measurement import Returns
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
@@ -28,11 +29,9 @@ def test_points_are_what_numpy_makes_of_the_beams(step, is_apart):
     met[:3] = -2  # What the weather sent back.
     label = rng.integers(0, 255, 9).astype(np.uint8)
     instance = rng.integers(0, 60_000, 9).astype(np.uint16)
-    scan = np.zeros(len(beams), POINT_DTYPE)
-    assemble_points(
-        scan, table, beams, ranges, intensity, met, label, instance,
-        np.float32(step),
-    )  # fmt: skip
+    returns = Returns(beams, ranges, intensity)
+    scan = assemble_points(table, returns, met, label, instance, step)
+    assert scan.dtype == POINT_DTYPE
     expected = table.d_Sset[beams] * ranges[:, None]
     if is_apart:
         expected += table.p_Sset[beams]

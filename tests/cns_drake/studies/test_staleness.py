@@ -77,7 +77,7 @@ def test_a_quick_study(reproduce, code, tmp_path):
     # The code of the report's page measures nothing.
     change(code / "evaluation/report/page_template/page.css", "{", "{ ")
     assert reproduce(quick=True) == set()
-    change(code / "cns_drake/sensors/lidar/presets.py", "120.0", "10.0")
+    change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
     assert reproduce(quick=True) == STUDY
     change(code / "evaluation/report/figures.py", "def ", "def  ")
     assert reproduce(quick=True) == DRAWN
@@ -101,7 +101,7 @@ def test_recordings_pages_and_pictures(reproduce, code, tmp_path):
     change(code / "cns_drake/pictures/page_template/drive.css", "{", "{ ")
     assert reproduce() == PAGES
     assert not list((tmp_path / "out").glob("*.part"))
-    change(code / "cns_drake/sensors/lidar/presets.py", "120.0", "10.0")
+    change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
     assert reproduce(with_pages=False) == everything
     assert reproduce() == PAGES
     # A page also shows the last stage.
