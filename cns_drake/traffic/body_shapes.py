@@ -4,11 +4,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.geometry import Box, Capsule, Cylinder, Mesh, Shape
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cns_drake.city.furniture.parked_cars import PAINTS, TRIM, WHITE
+from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.traffic.vehicle_kinds import VehicleKind
 
 Rgb = tuple[float, float, float]
+Point = tuple[float, float, float]
 _CLOTHES: tuple[Rgb, ...] = (
     (0.16, 0.18, 0.25),
     (0.35, 0.1, 0.12),
@@ -22,25 +26,11 @@ _METAL: Rgb = (0.3, 0.31, 0.33)
 
 
 class BodyShape(NamedTuple):
-    """One shape of a body, in the frame of its limb.
-
-    Attributes:
-        name: name of the shape.
-        kind: "mesh", "box", "capsule" or "cylinder".
-        size: a box's sides; radius and length of the straight part of a capsule
-            or cylinder; empty for meshes [m].
-        mesh: name of one of the city's meshes.
-        start, end: ends of the axis of a capsule or cylinder; other shapes have
-            their middle at the first [m].
-        rgb: its colour.
-    """
+    """One shape of a body, in the frame L of its limb, and its colour."""
 
     name: str
-    kind: str
-    size: tuple[float, ...]
-    mesh: str
-    start: tuple[float, float, float]
-    end: tuple[float, float, float]
+    shape: Shape
+    X_LS: RigidTransform
     rgb: Rgb
 
 
@@ -56,34 +46,33 @@ class Limb(NamedTuple):
     """
 
     name: str
-    joint: tuple[float, float, float]
+    joint: Point
     swing: float
     shapes: tuple[BodyShape, ...]
 
 
 def _mesh(name: str, mesh: str, rgb: Rgb) -> BodyShape:
-    return BodyShape(name, "mesh", (), mesh, (0, 0, 0), (0, 0, 0), rgb)
+    shape = Mesh(str(FOLDER / f"{mesh}.obj"))
+    return BodyShape(name, shape, RigidTransform(), rgb)
 
 
-def _box(
-    name: str,
-    size: tuple[float, float, float],
-    middle: tuple[float, float, float],
-    rgb: Rgb,
-) -> BodyShape:
-    return BodyShape(name, "box", size, "", middle, middle, rgb)
+def _box(name: str, size: Point, middle: Point, rgb: Rgb) -> BodyShape:
+    return BodyShape(name, Box(*size), RigidTransform(middle), rgb)
 
 
 def _round(
-    kind: str,
     name: str,
     radius: float,
-    start: tuple[float, float, float],
-    end: tuple[float, float, float],
+    start: Point,
+    end: Point,
     rgb: Rgb,
+    kind: type[Capsule] | type[Cylinder] = Capsule,
 ) -> BodyShape:
-    length = math.dist(start, end)
-    return BodyShape(name, kind, (radius, length), "", start, end, rgb)
+    """Returns a capsule, or a cylinder, about an axis from start to end."""
+    p, q = np.array(start, float), np.array(end, float)
+    shape = kind(radius, math.dist(start, end))
+    R = RotationMatrix.MakeFromOneVector(q - p, 2)
+    return BodyShape(name, shape, RigidTransform(R, (p + q) / 2), rgb)
 
 
 def vehicle_limbs(
@@ -116,15 +105,11 @@ def _two_wheeler(
     seat = 0.82 if heavy else 0.95
     shapes = [
         _round(
-            "cylinder",
-            f"wheel_{k}",
-            radius,
-            (x, -width / 2, radius),
-            (x, width / 2, radius),
-            TRIM,
+            f"wheel_{k}", radius, (x, -width / 2, radius),
+            (x, width / 2, radius), TRIM, Cylinder,
         )
         for k, x in enumerate((-axle, axle))
-    ]
+    ]  # fmt: skip
     if heavy:
         shapes += [
             _box("engine", (0.6, 0.32, 0.4), (0.0, 0.0, 0.45), _METAL),
@@ -139,30 +124,27 @@ def _two_wheeler(
             ((-0.12, 0, 0.3), (0.4, 0, 0.82)),
         )
         shapes += [
-            _round("capsule", f"frame_{k}", 0.02, start, end, paint)
+            _round(f"frame_{k}", 0.02, start, end, paint)
             for k, (start, end) in enumerate(bars)
         ]
     hip, shoulder = (-0.25, 0.0, seat + 0.08), (0.0, 0.0, seat + 0.5)
     skin = _SKIN[int(rng.integers(len(_SKIN)))]
     head = (0.06, 0.0, seat + 0.75)
     shapes += [
-        _round("capsule", "torso", 0.15, hip, shoulder, coat),
+        _round("torso", 0.15, hip, shoulder, coat),
         _round(
-            "capsule", "head", 0.1, head, (0.06, 0, seat + 0.8),
-            TRIM if heavy else skin,
+            "head", 0.1, head, (0.06, 0, seat + 0.8), TRIM if heavy else skin
         ),
     ]  # fmt: skip
     for side, y in (("left", 0.17), ("right", -0.17)):
+        shoulder, hand = (0.0, y, seat + 0.45), (0.42, 1.4 * y, seat + 0.1)
         knee, foot = (0.15, y, seat - 0.12), (0.0, y, 0.4)
         hip_joint = (-0.2, y, seat)
         shapes += [
-            _round("capsule", f"{side}_thigh", 0.07, hip_joint, knee, TRIM),
-            _round("capsule", f"{side}_shank", 0.055, knee, foot, TRIM),
-            _round(
-                "capsule", f"{side}_arm", 0.045, (0.0, y, seat + 0.45),
-                (0.42, 1.4 * y, seat + 0.1), coat,
-            ),
-        ]  # fmt: skip
+            _round(f"{side}_thigh", 0.07, hip_joint, knee, TRIM),
+            _round(f"{side}_shank", 0.055, knee, foot, TRIM),
+            _round(f"{side}_arm", 0.045, shoulder, hand, coat),
+        ]
     return tuple(shapes)
 
 
@@ -178,46 +160,29 @@ def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
     )
     skin = _SKIN[int(rng.integers(len(_SKIN)))]
     trunk = (
+        _round("torso", 0.16 * h, (0, 0, 1.0 * h), (0, 0, 1.27 * h), coat),
         _round(
-            "capsule", "torso", 0.16 * h, (0, 0, 1.0 * h), (0, 0, 1.27 * h),
-            coat,
+            "head", 0.095 * h, (0.01, 0, 1.53 * h), (0.01, 0, 1.58 * h), skin
         ),
-        _round(
-            "capsule", "head", 0.095 * h, (0.01, 0, 1.53 * h),
-            (0.01, 0, 1.58 * h), skin,
-        ),
-    )  # fmt: skip
+    )
     limbs = [Limb("trunk", (0.0, 0.0, 0.0), 0.0, trunk)]
     for side, sign in (("left", 1.0), ("right", -1.0)):
         knee, ankle = (0.03, 0.0, -0.42 * h), (0.0, 0.0, -0.82 * h)
-        limbs.append(
-            Limb(
-                f"{side}_leg",
-                (0.0, 0.09 * sign, 0.9 * h),
-                0.36 * sign,
-                (
-                    _round(
-                        "capsule", "thigh", 0.075 * h, (0, 0, 0), knee,
-                        trousers,
-                    ),
-                    _round(
-                        "capsule", "shank", 0.055 * h, knee, ankle, trousers
-                    ),
-                ),
-            )
-        )  # fmt: skip
-        elbow, hand = (-0.02, 0.0, -0.29 * h), (0.06, 0.0, -0.52 * h)
-        limbs.append(
-            Limb(
-                f"{side}_arm",
-                (0.0, 0.2 * sign * h, 1.36 * h),
-                -0.36 * sign,
-                (
-                    _round(
-                        "capsule", "upper", 0.045 * h, (0, 0, 0), elbow, coat
-                    ),
-                    _round("capsule", "lower", 0.038 * h, elbow, hand, coat),
-                ),
-            )
+        leg = (
+            _round("thigh", 0.075 * h, (0, 0, 0), knee, trousers),
+            _round("shank", 0.055 * h, knee, ankle, trousers),
         )
+        elbow, hand = (-0.02, 0.0, -0.29 * h), (0.06, 0.0, -0.52 * h)
+        arm = (
+            _round("upper", 0.045 * h, (0, 0, 0), elbow, coat),
+            _round("lower", 0.038 * h, elbow, hand, coat),
+        )
+        hip, shoulder = (
+            (0.0, 0.09 * sign, 0.9 * h),
+            (0.0, 0.2 * sign * h, 1.36 * h),
+        )
+        limbs += [
+            Limb(f"{side}_leg", hip, 0.36 * sign, leg),
+            Limb(f"{side}_arm", shoulder, -0.36 * sign, arm),
+        ]
     return tuple(limbs)

@@ -10,14 +10,14 @@ from cns_drake.motion.path_geometry import REACH
 from cns_drake.motion.speed_profile import KNOT_PERIOD
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.traffic.lane_graph import LaneGraph
-from cns_drake.traffic.streets import EgoBox, Streets
+from cns_drake.traffic.streets import STEP, EgoBox, Streets
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
 from cns_drake.traffic.vehicles import (
     BEFORE_LINE,
     CURRENT,
     SIGHT,
     VEHICLE,
-    Occupants,
+    Traffic,
     find_ahead,
     find_prior,
     free_acceleration,
@@ -60,13 +60,10 @@ class _Run(NamedTuple):
     parts: float = 0.0
 
 
-def find_runs(graph: LaneGraph, points: np.ndarray, step: float) -> list[_Run]:
+def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
     """Returns the pieces along a way, those that fit best as a whole.
 
-    Args:
-        graph: the lanes.
-        points: (N, 2) places on the way [m].
-        step: their distance [m].
+    The way is through (N, 2) points, `_STEP` apart [m].
     """
     lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     tree = shapely.STRtree(lines)
@@ -114,12 +111,12 @@ def find_runs(graph: LaneGraph, points: np.ndarray, step: float) -> list[_Run]:
         best[row - 1] = before[row, best[row]]
     starts = np.flatnonzero(np.diff(best, prepend=-1))
     pieces = np.append(near, -1)[best[starts]].tolist()
-    firsts, s = step * starts.astype(float), place[starts, best[starts]]
+    firsts, s = _STEP * starts, place[starts, best[starts]]
     for k, (before_it, piece) in enumerate(pairwise(pieces), 1):
         if before_it >= 0 and piece in graph.pieces[before_it].after:
             # The boundary is between two of the points.
             firsts[k], s[k] = firsts[k] - s[k], 0.0
-    firsts = np.append(firsts, step * len(points))
+    firsts = np.append(firsts, _STEP * len(points))
     runs: list[_Run] = []
     for k, piece in enumerate(pieces):
         enters, leaves = firsts[k : k + 2].tolist()
@@ -128,16 +125,14 @@ def find_runs(graph: LaneGraph, points: np.ndarray, step: float) -> list[_Run]:
         lane = graph.pieces[last.piece]
         if min(last.piece, piece) >= 0 and piece in (lane.left, lane.right):
             earlier = min(run.first - run.last + _ASKS, run.s)
-            earlier = max(0.0, min(earlier, run.first - last.first - step))
+            earlier = max(0.0, min(earlier, run.first - last.first - _STEP))
             first = run.first - earlier
             runs[-1] = last._replace(last=first)
-            run = _Run(
-                piece,
-                first,
-                run.last,
-                run.s - earlier,
-                last.piece,
-                run.first + _CHANGES,
+            run = run._replace(
+                first=first,
+                s=run.s - earlier,
+                beside=last.piece,
+                parts=run.first + _CHANGES,
             )
         runs.append(run)
     return runs
@@ -155,28 +150,23 @@ class Follower:
     """
 
     def __init__(
-        self,
-        trajectory: Trajectory,
-        runs: list[_Run],
-        box: EgoBox,
-        start: int,
-        dt: float,
+        self, graph: LaneGraph, trajectory: Trajectory, box: EgoBox, start: int
     ):
-        """Puts the car at the beginning of its path.
+        """Puts a car to the beginning of its path.
 
-        Args:
-            trajectory: the path, and the bounds of its drive.
-            runs: the pieces along its front bumper's way; see `front_points`.
-            box: the car's size.
-            start: number of the step at which the drive begins.
-            dt: the step [s].
+        Its drive has the bounds of a trajectory, and begins at the step of a
+        number.
         """
         self._path, self._profile = trajectory.path, trajectory.speed_profile
         self._square = self._profile.speed**2
-        self._runs, self._box, self._dt = runs, box, dt
-        self._start = start
+        # The way of the front bumper, which goes on straight beyond the path.
+        u = _STEP * np.arange(int((self._path.end + box.front) / _STEP) + 1)
+        jet = self._path.evaluate(u)
+        beyond = np.maximum(u - self._path.end, 0.0)[:, None]
+        self._runs = find_runs(graph, jet.p[:, :2] + beyond * jet.dp[:, :2])
+        self._box, self._start = box, start
         # The drive begins with a rest, as any other.
-        self._leaves = start + round(REACH * KNOT_PERIOD / dt)
+        self._leaves = start + round(REACH * KNOT_PERIOD / STEP)
         self._run = 0
         self._held: _Run | None = None
         self.u = [0.0]
@@ -202,23 +192,15 @@ class Follower:
         self._place(streets, car[0])
         return car
 
-    def step(
-        self,
-        streets: Streets,
-        cars: np.ndarray,
-        occupants: Occupants,
-        crossings: np.ndarray,
-        k: int,
-    ) -> None:
-        """Moves the car on, the last one of N records `VEHICLE`."""
-        car, dt, u = cars[-1], self._dt, self.u[-1]
+    def step(self, traffic: Traffic, k: int) -> None:
+        """Moves the car on, the last of the vehicles, at the k-th step."""
+        car, u = traffic.cars[-1], self.u[-1]
         if k < self._leaves or self.arrived:
             self.u.append(u)
             return
         wanted = free_acceleration(car, car["top"])
-        who = len(cars) - 1
-        gap, speed, line = self._ahead(streets, car, occupants, who)
-        stop, gap_2, speed_2 = find_prior(streets, cars, crossings, who)
+        gap, speed, line = self._ahead(traffic, car)
+        stop, gap_2, speed_2 = find_prior(traffic, len(traffic.cars) - 1)
         line = min(line, stop)
         if gap_2 < gap:
             gap, speed = gap_2, speed_2
@@ -228,38 +210,39 @@ class Follower:
         if gap < SIGHT:
             loss = max(loss, interaction(car, gap, car["v"] - speed))
         bound = _PART * self._profile.acceleration
-        v = max(0.0, car["v"] + max(wanted - loss, -bound) * dt)
-        ahead = u + max(car["v"] * dt, _AHEAD)
+        v = max(0.0, car["v"] + max(wanted - loss, -bound) * STEP)
+        ahead = u + max(car["v"] * STEP, _AHEAD)
         v = min(v, np.interp(ahead, self._profile.u, self._square) ** 0.5)
-        u += 0.5 * (car["v"] + v) * dt
+        u += 0.5 * (car["v"] + v) * STEP
         if u > self._path.end - 2 * _AHEAD and v < 0.1:
             u, v, self.arrived = self._path.end, 0.0, True
         self.u.append(u)
         car["v"] = v
-        self._place(streets, car)
+        self._place(traffic.streets, car)
 
     def _ahead(
-        self, streets: Streets, car: np.void, occupants: Occupants, who: int
+        self, traffic: Traffic, car: np.void
     ) -> tuple[float, float, float]:
         """Returns the gap to the car ahead [m], its speed, and the stop line.
 
         The distance of the stop line is inf where the car may go on [m].
         """
         front = self.u[-1] + self._box.front
+        who, pieces = len(traffic.cars) - 1, traffic.streets.pieces
         gap, speed = np.inf, 0.0
         other = int(car["left_lane"])
         if other >= 0:
-            length = streets.pieces["length"]
+            length = pieces["length"]
             scale = length[other] / length[car["path"][CURRENT]]
-            gap, speed = find_ahead(occupants, other, car["s"] * scale, who)
+            gap, speed = find_ahead(traffic, other, car["s"] * scale, who)
         for run in self._runs[self._run :]:
             if run.piece < 0 or run.first - front > SIGHT:
                 break
             is_next = run.first > front and run is not self._held
-            if is_next and streets.pieces[run.piece]["is_way"]:
+            if is_next and pieces[run.piece]["is_way"]:
                 return gap, speed, run.first - front
             gap_2, speed_2 = find_ahead(
-                occupants, run.piece, run.s + front - run.first, who
+                traffic, run.piece, run.s + front - run.first, who
             )
             if gap_2 < gap:
                 gap, speed = gap_2, speed_2
@@ -318,7 +301,7 @@ class Follower:
 
     def positions(self) -> np.ndarray:
         """Returns places on the path at each `KNOT_PERIOD` of the drive [m]."""
-        every = round(KNOT_PERIOD / self._dt)
+        every = round(KNOT_PERIOD / STEP)
         u = np.array(self.u[self._start :: every])
         return u[: np.count_nonzero(u < self._path.end) + REACH + 1]
 
@@ -328,27 +311,3 @@ def _leads(streets: Streets, piece: int, other: int) -> bool:
     row = streets.pieces[piece]
     first = row["after_first"]
     return other in streets.after[first : first + row["after_count"]]
-
-
-def front_points(trajectory: Trajectory, box: EgoBox) -> np.ndarray:
-    """Returns the (N, 2) way of a car's front bumper, `_STEP` apart [m].
-
-    It begins where the path does, and goes on straight beyond its end.
-    """
-    path = trajectory.path
-    u = _STEP * np.arange(int((path.end + box.front) / _STEP) + 1)
-    jet = path.evaluate(u)
-    beyond = np.maximum(u - path.end, 0.0)[:, None]
-    return jet.p[:, :2] + beyond * jet.dp[:, :2]
-
-
-def make_follower(
-    graph: LaneGraph,
-    trajectory: Trajectory,
-    box: EgoBox,
-    start: int,
-    dt: float,
-) -> Follower:
-    """Returns the ego car among the vehicles of a graph; see `Follower`."""
-    runs = find_runs(graph, front_points(trajectory, box), _STEP)
-    return Follower(trajectory, runs, box, start, dt)

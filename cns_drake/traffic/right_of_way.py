@@ -7,16 +7,22 @@ is slower than expected, it waits on its way for those that entered before it,
 which never wait for it: none waits for ever.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.traffic.lane_graph import LaneGraph
-from cns_drake.traffic.streets import MERGE, SPLIT, WAIT, Streets, is_ego_far
+from cns_drake.traffic.streets import (
+    MERGE,
+    SPLIT,
+    STEP,
+    WAIT,
+    Streets,
+    is_ego_far,
+)
 from cns_drake.traffic.vehicles import (
     CURRENT,
-    Occupants,
+    Traffic,
     choose_way,
     is_walked,
     lane_over,
@@ -63,75 +69,12 @@ _REST = 30.0
 # Where there are no marks, walkers begin if no vehicle comes so soon [s].
 _WALKERS_GAP = 6.0
 
-CROSSING = np.dtype(
-    [
-        ("waits", float),  # Time since which walkers wait, inf for none [s].
-        ("opened", float),  # Time at which it was opened [s].
-        ("closed", float),  # Time at which it was last left [s].
-        ("length", float),  # [m]
-        ("order", int),  # As of `VEHICLE`, 0 while no walkers ask.
-        ("is_open", bool),  # Whether walkers are on it.
-        ("marked", bool),  # See `Crossing`.
-        # Places on its line from which walkers have yet to go on to its end,
-        # and to its beginning [m].
-        ("to_end", float),
-        ("to_start", float),
-    ]
-)
-
-
-class Permits(NamedTuple):
-    """The walkers on C crossings.
-
-    Attributes:
-        users: (C,) numbers of walkers with a permit.
-        crossings: (C,) records `CROSSING`.
-        lines: (C, 2, 2) where each begins [m], and its direction.
-    """
-
-    users: np.ndarray
-    crossings: np.ndarray
-    lines: np.ndarray
-
-
-def make_permits(graph: LaneGraph) -> Permits:
-    """Returns permits without any holder."""
-    crossings = np.zeros(len(graph.crossings), CROSSING)
-    crossings["waits"] = np.inf
-    crossings["opened"] = crossings["closed"] = -np.inf
-    crossings["to_end"], crossings["to_start"] = -np.inf, np.inf
-    crossings["marked"] = [one.marked for one in graph.crossings]
-    ends = np.array([one.line[[0, -1], :2] for one in graph.crossings])
-    lines = np.diff(ends.reshape(-1, 2, 2), axis=1, prepend=0.0)
-    x, y = lines[:, 1].T
-    crossings["length"] = np.sqrt(x * x + y * y)
-    lines[:, 1] /= crossings["length"][:, None]
-    return Permits(np.zeros(len(crossings), int), crossings, lines)
-
 
 @compiled
-def grant_ways(
-    streets: Streets,
-    cars: np.ndarray,
-    occupants: Occupants,
-    permits: Permits,
-    k: int,
-    dt: float,
-    seed: int,
-) -> None:
-    """Gives permits in the order of arrival, at the k-th time.
-
-    Args:
-        streets: the lanes, and the ego car.
-        cars: (N,) records `VEHICLE`.
-        occupants: the vehicles on each piece.
-        permits: the users so far.
-        k: number of the time.
-        dt: the step [s].
-        seed: seed of the drawn ways.
-    """
-    t, pieces, num_cars = k * dt, streets.pieces, len(cars)
-    users, crossings = permits.users, permits.crossings
+def grant_ways(traffic: Traffic, k: int) -> None:
+    """Gives ways and crossings in the order of arrival, at the k-th time."""
+    streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
+    t, pieces, num_cars = k * STEP, streets.pieces, len(cars)
     first = np.full(len(pieces), -1)
     for i in range(num_cars):
         lane = cars[i].path[CURRENT]
@@ -142,7 +85,7 @@ def grant_ways(
             if (
                 pieces[cars[i].held].phase < 0
                 or left <= _stops_within(cars[i])
-                or _is_ready(streets, cars[i], k, dt)
+                or _is_ready(streets, cars[i], k)
             ):
                 continue
             # Its signal has changed, and it can stop.
@@ -199,8 +142,9 @@ def grant_ways(
                 since[first[lane]] = min(since[first[lane]], t)
     for c in range(len(crossings)):
         since[num_cars + c] = crossings[c].waits
-        if users[c] == 0 and (crossings[c].is_open or since[num_cars + c] > t):
-            crossings[c].order, crossings[c].is_open = 0, False
+        one = crossings[c]
+        if one.users == 0 and (one.is_open or one.waits > t):
+            one.order, one.is_open = 0, False
     # What small and what large vehicles must not enter now.
     taken = np.zeros((2, len(pieces)), np.bool_)
     last = 1
@@ -216,22 +160,22 @@ def grant_ways(
             )
     for c in range(len(crossings)):
         last = max(last, crossings[c].order)
-        _take_crossing(streets, taken, crossings, c)
+        _take_crossing(traffic, taken, c)
     blocked = np.zeros(len(pieces), np.bool_)
     for who in np.argsort(since):
         if since[who] == np.inf:
             break
         if who >= num_cars:
-            last = _serve(streets, cars, permits, who - num_cars, k, dt, last)
-            _take_crossing(streets, taken, crossings, who - num_cars)
+            last = _serve(traffic, who - num_cars, k, last)
+            _take_crossing(traffic, taken, who - num_cars)
             continue
         car = cars[who]
         if car.path[CURRENT + 1] < 0:
-            choose_way(streets, cars, who, seed)
+            choose_way(traffic, who)
         way, is_large = car.path[CURRENT + 1], car.large
-        if blocked[way] or not _is_ready(streets, car, k, dt):
+        if blocked[way] or not _is_ready(streets, car, k):
             continue
-        if not _has_room(streets, cars, occupants, who, k, dt, seed):
+        if not _has_room(traffic, who, k):
             if car.guided and t > since[who] + _LONG:
                 # It cannot take another way: the next room is for it.
                 for other in range(len(pieces)):
@@ -241,7 +185,7 @@ def grant_ways(
         # The ego car's plan leaves no time to wait on a way.
         is_near = streets.until[k, way] < _EGO_COMES
         if taken[int(is_large), way] and (
-            is_near or not _is_soon_free(streets, cars, crossings, who, way, t)
+            is_near or not _is_soon_free(traffic, who, way, t)
         ):
             if is_near or t > since[who] + _LONG:
                 # Later arrivals must not always go first.
@@ -255,34 +199,19 @@ def grant_ways(
 
 
 @compiled
-def _is_soon_free(
-    streets: Streets,
-    cars: np.ndarray,
-    crossings: np.ndarray,
-    i: int,
-    way: int,
-    t: float,
-) -> bool:
-    """Returns whether the i-th vehicle need hardly wait on a way.
+def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
+    """Returns whether the i-th vehicle need hardly wait on the way before it.
 
     Walkers, and vehicles on other ways, will have passed the places where they
     meet it when it comes there.
-
-    Args:
-        streets: the lanes.
-        cars: (N,) records `VEHICLE`.
-        crossings: (C,) records `CROSSING`.
-        i: number of the vehicle, in the lane before the way.
-        way: its way.
-        t: time [s].
     """
+    streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     car, pieces = cars[i], streets.pieces
-    size = int(car.large)
     front = car.s - pieces[car.path[CURRENT]].length
     pace = streets.speed[pieces[way].first]
     for c in range(len(crossings)):
-        place = streets.begin[size, way, len(pieces) + c]
-        if place < np.inf and is_walked(streets, crossings, c, way, size):
+        place = streets.begin[int(car.large), way, len(pieces) + c]
+        if place < np.inf and is_walked(traffic, c, way, car.large):
             lasts = crossings[c].length / _WALKING + _DAWDLING
             if crossings[c].opened >= 0.0:
                 lasts += WALK_GROUP + crossings[c].opened - t
@@ -329,37 +258,20 @@ def _duration(distance: float, v: float, a: float, pace: float) -> float:
 
 
 @compiled
-def _serve(
-    streets: Streets,
-    cars: np.ndarray,
-    permits: Permits,
-    c: int,
-    k: int,
-    dt: float,
-    last: int,
-) -> int:
+def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
     """Opens a crossing for walkers once the vehicles before them have passed.
 
-    Args:
-        streets: the lanes, and the ego car.
-        cars: (N,) records `VEHICLE`.
-        permits: the users so far.
-        c: number of the crossing, where walkers wait.
-        k: number of the time.
-        dt: the step [s].
-        last: the highest `order` so far.
-
-    Returns:
-        The highest `order`.
+    Takes the highest `order` so far, and returns it.
     """
-    one, place, t = permits.crossings[c], len(streets.pieces) + c, k * dt
-    if permits.users[c] > 0:
+    streets, cars = traffic.streets, traffic.cars
+    one, place, t = traffic.crossings[c], len(streets.pieces) + c, k * STEP
+    if one.users > 0:
         return last
     needed = one.length / _WALKING + WALK_GROUP + _DAWDLING
     if one.order == 0:
         if t < one.closed + _REST:
             return last
-        if not one.marked and not _is_gap(streets, cars, c):
+        if not one.marked and not _is_gap(traffic, c):
             return last
         if _until_red(streets, place, t) < min(
             needed, streets.signals.green_for[place] - _LATE
@@ -381,18 +293,18 @@ def _serve(
         ] and ahead < _stops_within(car):
             return last
     # A placeholder holds the permit until the group has begun to walk.
-    permits.users[c], one.opened, one.is_open = 1, t, True
+    one.users, one.opened, one.is_open = 1, t, True
     # Vehicles that are not yet there wait for it, whenever they came.
     one.order = 1
     return last
 
 
 @compiled
-def _is_gap(streets: Streets, cars: np.ndarray, c: int) -> bool:
+def _is_gap(traffic: Traffic, c: int) -> bool:
     """Returns whether no vehicle is on the c-th crossing, or will be soon."""
-    for i in range(len(cars)):
-        car = cars[i]
-        _, enters, leaves = lane_over(streets, car, c)
+    for i in range(len(traffic.cars)):
+        car = traffic.cars[i]
+        _, enters, leaves = lane_over(traffic.streets, car, c)
         reach = max(_stops_within(car), _WALKERS_GAP * car.v)
         if enters < reach and leaves > 0.0:
             return False
@@ -421,14 +333,9 @@ def _stops_within(car: Any) -> float:
 def _take(
     streets: Streets, taken: np.ndarray, place: int, is_large: bool, rear: float
 ) -> None:
-    """Notes what a vehicle on a way excludes.
+    """Notes what a vehicle on a way excludes, by the place of its rear [m].
 
-    Args:
-        streets: the lanes.
-        taken: (2, P) what small and what large vehicles must not enter.
-        place: the way.
-        is_large: whether the vehicle is large.
-        rear: of the vehicle, along the way [m].
+    What small and what large vehicles must not enter is `taken`, (2, P).
     """
     for other in range(taken.shape[1]):
         is_near = rear < streets.clear[1, place, other]
@@ -439,27 +346,19 @@ def _take(
 
 
 @compiled
-def _take_crossing(
-    streets: Streets, taken: np.ndarray, crossings: np.ndarray, c: int
-) -> None:
+def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
     """Notes the ways that walkers on the c-th crossing exclude."""
-    for way in range(len(streets.pieces)):
+    begin, num_pieces = traffic.streets.begin, taken.shape[1]
+    for way in range(num_pieces):
         for size in range(2):
-            if streets.begin[size, way, len(streets.pieces) + c] < np.inf:
-                taken[size, way] |= is_walked(streets, crossings, c, way, size)
+            if begin[size, way, num_pieces + c] < np.inf:
+                taken[size, way] |= is_walked(traffic, c, way, size == 1)
 
 
 @compiled
-def _is_ready(streets: Streets, car: Any, k: int, dt: float) -> bool:
-    """Returns whether a vehicle has waited for a signal, or at a stop line.
-
-    Args:
-        streets: the lanes, and the ego car.
-        car: a record `VEHICLE`, in a lane.
-        k: number of the time.
-        dt: the step [s].
-    """
-    t, way = k * dt, car.path[CURRENT + 1]
+def _is_ready(streets: Streets, car: Any, k: int) -> bool:
+    """Returns whether a vehicle has waited for a signal, or at a stop line."""
+    t, way = k * STEP, car.path[CURRENT + 1]
     row = streets.pieces[way]
     if 0.0 < streets.until[k, car.path[CURRENT]] < _EGO_IS_NEAR:
         return True
@@ -469,19 +368,12 @@ def _is_ready(streets: Streets, car: Any, k: int, dt: float) -> bool:
 
 
 @compiled
-def _has_room(
-    streets: Streets,
-    cars: np.ndarray,
-    occupants: Occupants,
-    i: int,
-    k: int,
-    dt: float,
-    seed: int,
-) -> bool:
+def _has_room(traffic: Traffic, i: int, k: int) -> bool:
     """Returns whether there is room beyond the i-th vehicle's way.
 
     Without room for some time it draws another way; see `grant_ways`.
     """
+    streets, cars = traffic.streets, traffic.cars
     car, pieces = cars[i], streets.pieces
     lane, way = car.path[CURRENT], car.path[CURRENT + 1]
     beyond = car.path[CURRENT + 2]
@@ -495,9 +387,9 @@ def _has_room(
         streets, k, beyond, 0.0, wait
     ):
         end = pieces[beyond].length
-        at = occupants.head[beyond]
+        at = traffic.head[beyond]
         while at >= 0:
-            other = occupants.entries[at]
+            other = traffic.entries[at]
             if other.who != i and other.rear >= 0.0:
                 speed = max(other.speed, 0.0)
                 end = min(end, other.rear + speed**2 / (2 * _LAST_BRAKES))
@@ -514,8 +406,8 @@ def _has_room(
                 end -= one.length + _ROOM
         has_room = end >= car.length + _ROOM
     if not has_room and not car.guided:
-        car.refused += dt
+        car.refused += STEP
         if car.refused > _PATIENCE or is_ego_near:
             car.refused = 0.0
-            choose_way(streets, cars, i, seed)
+            choose_way(traffic, i)
     return has_room

@@ -29,6 +29,8 @@ _HALF_LANE = 1.45
 # the speed limit, and this wait at its end [s].
 _SLOW_PART, WAIT = 0.6, 20.0
 
+# The step of planning [s].
+STEP = 0.1
 # How two ways meet that share the lane before them, or that behind them.
 SPLIT, MERGE = 1, 2
 
@@ -128,16 +130,11 @@ class EgoBox(NamedTuple):
 
 
 def make_streets(
-    graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray, dt: float
+    graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray
 ) -> Streets:
-    """Returns the arrays of a graph and of the ego car.
+    """Returns the arrays of a graph, and of the ego car at K steps.
 
-    Args:
-        graph: lanes, ways and crossings.
-        box: the car's size.
-        xy: (K, 2) places of its frame [m].
-        yaw: (K,) headings [rad].
-        dt: distance of the K times [s].
+    Its frame is at (K, 2) places [m] with (K,) headings [rad].
     """
     pieces = graph.pieces
     rows = np.zeros(len(pieces), PIECE)
@@ -161,7 +158,7 @@ def make_streets(
         make_signals(graph, conflicts[0][0]),
         *conflicts,
         _places_on_crossings(graph),
-        *_find_ego(graph, box, xy, yaw, dt),
+        *_find_ego(graph, box, xy, yaw),
     )
 
 
@@ -321,7 +318,7 @@ def swept_hulls(
 
 
 def _find_ego(
-    graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray, dt: float
+    graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """Returns the fields of `Streets` from `until` on; see `make_streets`."""
     # A car that stands is looked at once.
@@ -357,12 +354,12 @@ def _find_ego(
     )
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-6)[:, None]
     x[which, places], y[which, places] = tangent.T
-    velocity = np.gradient(xy, dt, axis=0)
+    velocity = np.gradient(xy, STEP, axis=0)
     pose = np.cumsum(is_new) - 1
     speed = velocity[:, :1] * x[pose] + velocity[:, 1:] * y[pose]
     until = until[pose]
     for k in range(len(xy) - 2, -1, -1):
-        np.minimum(until[k], until[k + 1] + dt, out=until[k])
+        np.minimum(until[k], until[k + 1] + STEP, out=until[k])
     return until, *(
         each.astype(np.float32) for each in (rear[pose], front[pose], speed)
     )

@@ -5,36 +5,24 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import (
-    Box,
-    Capsule,
-    Cylinder,
     FrameId,
     GeometryFrame,
     GeometryInstance,
     IllustrationProperties,
-    Mesh,
     PerceptionProperties,
     Rgba,
     SceneGraph,
-    Shape,
     SourceId,
 )
-from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.scene.structure_table import (
     MAX_INSTANCE,
     StructureEntry,
     StructureTable,
 )
-from cns_drake.traffic.body_shapes import (
-    BodyShape,
-    Limb,
-    vehicle_limbs,
-    walker_limbs,
-)
+from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.traffic_motion import TrafficBody, TrafficMotion
 from cns_drake.traffic.traffic_plan import TrafficPlan
 
@@ -152,15 +140,10 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects traffic with a LiDAR.
+    """Connects traffic with a LiDAR, which labels moving bodies as moving.
 
-    Args:
-        builder: builder of the diagram.
-        traffic: the traffic.
-        lidar: labels moving bodies as moving; its port `frame_poses` may be
-            connected already.
-        goes_on: whether traffic moves during its turn; the LiDAR then has the
-            `moving_frames` of `traffic` as `moving_bodies`.
+    Its port `frame_poses` may be connected already. If traffic goes on during
+    its turn, the LiDAR has the `moving_frames` of `traffic` as `moving_bodies`.
     """
     for name in ("moving_instances", "frame_poses", "body_spatial_velocities"):
         if goes_on or name != "body_spatial_velocities":
@@ -186,7 +169,7 @@ def _register(
                 source,
                 frame,
                 GeometryInstance(
-                    _pose(one), _shape(one), f"{name}/{limb.name}_{one.name}"
+                    one.X_LS, one.shape, f"{name}/{limb.name}_{one.name}"
                 ),
             )
             for properties in (
@@ -196,22 +179,3 @@ def _register(
                 properties.AddProperty("phong", "diffuse", Rgba(*one.rgb, 1.0))
                 scene_graph.AssignRole(source, geometry, properties)
     return tuple(frames)
-
-
-def _shape(one: BodyShape) -> Shape:
-    if one.kind == "mesh":
-        return Mesh(str(FOLDER / f"{one.mesh}.obj"))
-    if one.kind == "box":
-        return Box(*one.size)
-    if one.kind == "cylinder":
-        return Cylinder(*one.size)
-    return Capsule(*one.size)
-
-
-def _pose(one: BodyShape) -> RigidTransform:
-    """Returns the pose of a shape in its limb."""
-    start, end = np.array(one.start, float), np.array(one.end, float)
-    if not (end - start).any():
-        return RigidTransform(start)
-    R = RotationMatrix.MakeFromOneVector(end - start, 2)
-    return RigidTransform(R, (start + end) / 2)

@@ -11,26 +11,15 @@ import shapely
 
 from cns_drake.base.elementary import arcsin, arctan2
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.traffic.follower import Follower, make_follower
+from cns_drake.traffic import vehicles as motion
+from cns_drake.traffic.follower import Follower
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
-from cns_drake.traffic.right_of_way import grant_ways, make_permits
-from cns_drake.traffic.streets import EgoBox, Streets, make_streets
+from cns_drake.traffic.right_of_way import grant_ways
+from cns_drake.traffic.streets import STEP, EgoBox, Streets, make_streets
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind, draw_kinds
-from cns_drake.traffic.vehicles import (
-    accelerations,
-    advance,
-    change_lanes,
-    find_occupants,
-    make_occupants,
-    place_vehicles,
-    room_for_vehicles,
-    vehicle_poses,
-)
 from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
 
-# The step of planning [s].
-STEP = 0.1
 # A walker's box, with limbs that swing [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 # Steps for which traffic has moved when the drive begins.
@@ -221,7 +210,7 @@ def plan_traffic(
     task = _Task(
         graph,
         walkways,
-        make_streets(graph, ego_box, *ego(times[::2]), STEP),
+        make_streets(graph, ego_box, *ego(times[::2])),
         ego_box.middles(*ego(times)),
         ego_box,
         vehicles,
@@ -266,27 +255,26 @@ class Trial:
         """Puts vehicles and walkers to their first places."""
         number = min(
             _with_spare(task.vehicles),
-            max(task.vehicles, room_for_vehicles(task.graph)),
+            max(task.vehicles, motion.room_for_vehicles(task.graph)),
         )
         kinds = [KINDS[k] for k in draw_kinds(number, rng)]
         self._task = task
-        self._cars, found = place_vehicles(kinds, task.streets, rng)
+        cars, found = motion.place_vehicles(kinds, task.streets, rng)
         self._kinds = [kinds[k] for k in found]
-        self._permits = make_permits(task.graph)
+        crossings = motion.make_crossings(task.graph)
         self._crowd = Crowd(
-            _with_spare(task.walkers), task.walkways, self._permits, rng
+            _with_spare(task.walkers), task.walkways, crossings, rng
         )
         self._seed = int(rng.integers(2**31))
         self._follower: Follower | None = None
         self._num_steps = 0
         if task.drive is not None:
-            self._follower = make_follower(
-                task.graph, task.drive, task.ego_box, _FIRST, STEP
+            self._follower = Follower(
+                task.graph, task.drive, task.ego_box, _FIRST
             )
-            record = self._follower.record(task.streets)
-            self._cars = np.concatenate([self._cars, record])
-        self._occupants = make_occupants(
-            len(task.graph.pieces), len(self._cars)
+            cars = np.append(cars, self._follower.record(task.streets))
+        self._traffic = motion.begin_traffic(
+            task.streets, cars, crossings, self._seed
         )
         num_steps = len(task.streets.until)
         num_walkers = len(self._crowd.walkers)
@@ -304,13 +292,9 @@ class Trial:
         self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
 
     def run(self, steps: range) -> None:
-        """Moves all bodies, and notes which of them overlap.
-
-        Args:
-            steps: numbers of the steps, which follow those made so far.
-        """
-        streets, occupants = self._task.streets, self._occupants
-        cars, permits, crowd = self._cars, self._permits, self._crowd
+        """Moves all bodies by the next steps; notes which of them overlap."""
+        traffic, crowd = self._traffic, self._crowd
+        cars = traffic.cars
         past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)
         past_walkers = np.empty(
             (len(steps), len(crowd.walkers)), crowd.walkers.dtype
@@ -318,17 +302,16 @@ class Trial:
         for row, k in enumerate(steps):
             past_cars[row] = cars[: len(self._kinds)]
             past_walkers[row] = crowd.walkers
-            find_occupants(occupants, streets, cars, k)
-            grant_ways(streets, cars, occupants, permits, k, STEP, self._seed)
-            crossings = permits.crossings
-            wanted = accelerations(streets, cars, occupants, crossings)
+            motion.find_occupants(traffic, k)
+            grant_ways(traffic, k)
+            wanted = motion.accelerations(traffic)
             if self._follower is not None:
-                self._follower.step(streets, cars, occupants, crossings, k)
-            change_lanes(streets, cars, occupants, k)
-            advance(streets, cars, wanted, STEP, self._seed)
-            crowd.step(k * STEP, STEP, self._seed + 1)
+                self._follower.step(traffic, k)
+            motion.change_lanes(traffic, k)
+            motion.advance(traffic, wanted)
+            crowd.step(k * STEP, self._seed + 1)
         rows = slice(steps.start, steps.stop)
-        self._vehicles[rows] = vehicle_poses(streets, past_cars)
+        self._vehicles[rows] = motion.vehicle_poses(traffic.streets, past_cars)
         self._walkers[rows] = crowd.poses(past_walkers)
         # The step before, for the half step between.
         first = max(steps.start - 1, 0)

@@ -17,6 +17,7 @@ from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.streets import (
     MERGE,
     SPLIT,
+    STEP,
     Streets,
     is_ego_far,
     places_on,
@@ -103,24 +104,71 @@ _ENTRY = np.dtype(
         ("speed", float),  # [m/s]
     ]
 )
+# A crossing, and the walkers on it.
+CROSSING = np.dtype(
+    [
+        ("waits", float),  # Time since which walkers wait, inf for none [s].
+        ("opened", float),  # Time at which it was opened [s].
+        ("closed", float),  # Time at which it was last left [s].
+        ("start", float, 2),  # Where its line begins [m].
+        ("along", float, 2),  # Unit vector along it.
+        ("length", float),  # [m]
+        ("users", int),  # Number of walkers with a permit.
+        ("order", int),  # As of `VEHICLE`, 0 while no walkers ask.
+        ("is_open", bool),  # Whether walkers are on it.
+        ("marked", bool),  # See `Crossing`.
+        # Places on its line from which walkers have yet to go on to its end,
+        # and to its beginning [m].
+        ("to_end", float),
+        ("to_start", float),
+    ]
+)
 
 
-class Occupants(NamedTuple):
-    """The vehicles on each piece, as a linked list.
+class Traffic(NamedTuple):
+    """Vehicles and crossings while they are simulated.
 
     Attributes:
-        head: (P,) the first entry of each piece, -1 for none.
+        streets: the lanes, and the ego car.
+        cars: (N,) records `VEHICLE`.
+        crossings: (C,) records `CROSSING`.
+        seed: seed of the drawn ways.
+        head: (P,) the first entry in the list of what is on each piece, -1 for
+            none; see `find_occupants`.
         entries: records `_ENTRY`.
     """
 
+    streets: Streets
+    cars: np.ndarray
+    crossings: np.ndarray
+    seed: int
     head: np.ndarray
     entries: np.ndarray
 
 
-def make_occupants(num_pieces: int, num_vehicles: int) -> Occupants:
-    """Returns room for the entries of all vehicles and the ego car."""
-    size = _MOST_ENTRIES * num_vehicles + num_pieces
-    return Occupants(np.full(num_pieces, -1), np.zeros(size, _ENTRY))
+def begin_traffic(
+    streets: Streets, cars: np.ndarray, crossings: np.ndarray, seed: int
+) -> Traffic:
+    """Returns traffic with room for the entries of all vehicles."""
+    num_pieces = len(streets.pieces)
+    entries = np.zeros(_MOST_ENTRIES * len(cars) + num_pieces, _ENTRY)
+    head = np.full(num_pieces, -1)
+    return Traffic(streets, cars, crossings, seed, head, entries)
+
+
+def make_crossings(graph: LaneGraph) -> np.ndarray:
+    """Returns the (C,) records `CROSSING` of a graph, without walkers."""
+    crossings = np.zeros(len(graph.crossings), CROSSING)
+    crossings["waits"] = np.inf
+    crossings["opened"] = crossings["closed"] = -np.inf
+    crossings["to_end"], crossings["to_start"] = -np.inf, np.inf
+    for row, one in zip(crossings, graph.crossings, strict=True):
+        start, end = one.line[[0, -1], :2]
+        x, y = end - start
+        row["length"] = np.sqrt(x * x + y * y)
+        row["start"], row["along"] = start, (end - start) / row["length"]
+        row["marked"] = one.marked
+    return crossings
 
 
 def room_for_vehicles(graph: LaneGraph) -> int:
@@ -135,12 +183,7 @@ def room_for_vehicles(graph: LaneGraph) -> int:
 def place_vehicles(
     kinds: Sequence[VehicleKind], streets: Streets, rng: np.random.Generator
 ) -> tuple[np.ndarray, list[int]]:
-    """Puts vehicles into lanes, away from the ego car's first places.
-
-    Args:
-        kinds: N of them, one for each vehicle.
-        streets: the lanes, and the ego car.
-        rng: draws the places.
+    """Puts vehicles of N kinds into lanes, away from the ego car's first place.
 
     Returns:
         Records `VEHICLE`, and the numbers of the kinds for whose vehicles a
@@ -199,15 +242,10 @@ def place_vehicles(
 
 
 def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
-    """Returns the poses of records `VEHICLE`.
+    """Returns the poses of (...) records `VEHICLE`.
 
-    Args:
-        streets: the lanes.
-        cars: (...) records.
-
-    Returns:
-        (..., 5): x, y, z of the middle of each box on the ground [m], yaw and
-        pitch [rad].
+    They are (..., 5): x, y, z of the middle of each box on the ground [m], yaw
+    and pitch [rad].
     """
     half = 0.5 * cars["length"]
     front = _places(streets, cars, half - cars["front_axle"])
@@ -255,12 +293,15 @@ def _places(
 
 
 @compiled
-def find_occupants(
-    occupants: Occupants, streets: Streets, cars: np.ndarray, k: int
-) -> None:
+def find_occupants(traffic: Traffic, k: int) -> None:
     """Notes the places of all vehicles at the k-th time."""
-    occupants.head[:] = -1
-    free, pieces = 0, streets.pieces
+    streets, cars, pieces = (
+        traffic.streets,
+        traffic.cars,
+        traffic.streets.pieces,
+    )
+    traffic.head[:] = -1
+    free = 0
     for i in range(len(cars)):
         car = cars[i]
         rear, front = car.s - car.length, car.s
@@ -269,13 +310,12 @@ def find_occupants(
             piece = car.path[column]
             if piece < 0:
                 break
-            free = _enter(occupants, free, piece, i, rear, front, car.v)
+            free = _enter(traffic, free, piece, i, rear, front, car.v)
             other = car.left_lane
             if column == CURRENT and other >= 0:
                 there = front * (pieces[other].length / pieces[piece].length)
-                free = _enter(
-                    occupants, free, other, i, there - car.length, there, car.v
-                )
+                behind = there - car.length
+                free = _enter(traffic, free, other, i, behind, there, car.v)
             if rear >= 0.0:
                 break
             column -= 1
@@ -285,20 +325,17 @@ def find_occupants(
                 front = pieces[before].length
     for piece in range(len(pieces)):
         if streets.until[k, piece] == 0.0:
-            free = _enter(
-                occupants,
-                free,
-                piece,
-                EGO,
+            rear, front = (
                 streets.ego_rear[k, piece],
                 streets.ego_front[k, piece],
-                streets.ego_speed[k, piece],
             )
+            speed = streets.ego_speed[k, piece]
+            free = _enter(traffic, free, piece, EGO, rear, front, speed)
 
 
 @compiled
 def _enter(
-    occupants: Occupants,
+    traffic: Traffic,
     number: int,
     piece: int,
     who: int,
@@ -307,29 +344,25 @@ def _enter(
     speed: float,
 ) -> int:
     """Fills in an entry of a number; returns the next number."""
-    entry = occupants.entries[number]
-    entry.after = occupants.head[piece]
+    entry = traffic.entries[number]
+    entry.after = traffic.head[piece]
     entry.who, entry.rear, entry.front, entry.speed = who, rear, front, speed
-    occupants.head[piece] = number
+    traffic.head[piece] = number
     return number + 1
 
 
 @compiled
 def find_ahead(
-    occupants: Occupants, piece: int, s: float, who: int
+    traffic: Traffic, piece: int, s: float, who: int
 ) -> tuple[float, float]:
     """Returns the gap to the next one ahead on a piece [m], and its speed.
 
-    Args:
-        occupants: the vehicles on all pieces.
-        piece: to search.
-        s: place of the front bumper [m].
-        who: the vehicle.
+    It is ahead of a vehicle of a number, whose front bumper is at s [m].
     """
     gap, speed = np.inf, 0.0
-    at = occupants.head[piece]
+    at = traffic.head[piece]
     while at >= 0:
-        other = occupants.entries[at]
+        other = traffic.entries[at]
         ahead = other.front > s or (other.front == s and other.who < who)
         if other.who != who and ahead and other.rear - s < gap:
             gap, speed = other.rear - s, other.speed
@@ -352,12 +385,9 @@ def free_acceleration(car: Any, v0: float) -> float:
 def interaction(car: Any, gap: float, approach: float) -> float:
     """Returns the loss of acceleration behind a vehicle [m/s^2].
 
-    That is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
-
-    Args:
-        car: a record `VEHICLE`.
-        gap: from bumper to bumper [m].
-        approach: dv, its speed minus that of the vehicle ahead [m/s].
+    That is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))),
+    where the gap is that from bumper to bumper [m], and dv is the speed minus
+    that of the vehicle ahead [m/s].
     """
     wanted = STANDSTILL_GAP + max(
         0.0,
@@ -367,24 +397,15 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 
 
 @compiled
-def is_walked(
-    streets: Streets, crossings: np.ndarray, c: int, way: int, size: int
-) -> bool:
+def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
     """Returns whether walkers on the c-th crossing have yet to pass a way.
 
-    Args:
-        streets: the lanes.
-        crossings: (C,) records `CROSSING`.
-        c: number of the crossing.
-        way: number of the way, which leads over it.
-        size: 0 for small vehicles, 1 for large ones.
+    They pass a vehicle on it, small or large.
     """
-    one, place = crossings[c], streets.over[way, c]
-    if one.order == 0:
-        return False
-    return not (
-        place + _PASSED[size] < one.to_end
-        and place - _PASSED[size] > one.to_start
+    one, place = traffic.crossings[c], traffic.streets.over[way, c]
+    passed = _PASSED[int(is_large)]
+    return one.order != 0 and not (
+        place + passed < one.to_end and place - passed > one.to_start
     )
 
 
@@ -411,9 +432,7 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 
 
 @compiled
-def find_prior(
-    streets: Streets, cars: np.ndarray, crossings: np.ndarray, i: int
-) -> tuple[float, float, float]:
+def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     """Returns what the i-th vehicle has to wait for on the way it holds.
 
     It stops before a crossing that walkers use, in lanes as well, and before
@@ -423,23 +442,17 @@ def find_prior(
     Thus vehicles wait only for those with a lower `order`, the first for none,
     and never for ever.
 
-    Args:
-        streets: the lanes.
-        cars: (N,) records `VEHICLE`.
-        crossings: (C,) records `CROSSING`.
-        i: number of the vehicle.
-
     Returns:
         The distance to the place where it has to stop, inf for none [m]; gap to
         one it follows, inf for none [m], and its speed.
     """
     line, gap, speed = np.inf, np.inf, 0.0
+    streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     car, pieces = cars[i], streets.pieces
-    size = int(car.large)
     for c in range(len(crossings)):
         if crossings[c].order > 0 and not crossings[c].marked:
             lane, enters, _ = lane_over(streets, car, c)
-            if enters >= 0.0 and is_walked(streets, crossings, c, lane, size):
+            if enters >= 0.0 and is_walked(traffic, c, lane, car.large):
                 line = min(line, enters)
     way = car.held
     if way < 0:
@@ -451,11 +464,11 @@ def find_prior(
     else:
         return line, gap, speed
     for c in range(len(crossings)):
-        place = streets.begin[size, way, len(pieces) + c]
+        place = streets.begin[int(car.large), way, len(pieces) + c]
         if (
             front <= place < np.inf
             and crossings[c].order < car.order
-            and is_walked(streets, crossings, c, way, size)
+            and is_walked(traffic, c, way, car.large)
         ):
             line = min(line, place - front)
     for j in range(len(cars)):
@@ -490,22 +503,14 @@ def rear_on_way(streets: Streets, car: Any) -> float:
 
 
 @compiled
-def accelerations(
-    streets: Streets,
-    cars: np.ndarray,
-    occupants: Occupants,
-    crossings: np.ndarray,
-) -> np.ndarray:
-    """Returns the (N,) accelerations [m/s^2].
-
-    Args:
-        streets: the lanes.
-        cars: (N,) records `VEHICLE`.
-        occupants: the vehicles on each piece.
-        crossings: (C,) records `CROSSING`.
-    """
+def accelerations(traffic: Traffic) -> np.ndarray:
+    """Returns the (N,) accelerations [m/s^2]."""
+    streets, cars, pieces = (
+        traffic.streets,
+        traffic.cars,
+        traffic.streets.pieces,
+    )
     result = np.zeros(len(cars))
-    pieces = streets.pieces
     for i in range(len(cars)):
         car = cars[i]
         if car.guided:
@@ -513,10 +518,10 @@ def accelerations(
         lane, s, v = car.path[CURRENT], car.s, car.v
         v0 = min(car.top, car.factor * speed_on(streets, lane, s))
         wanted = free_acceleration(car, v0)
-        gap, speed = find_ahead(occupants, lane, s, i)
+        gap, speed = find_ahead(traffic, lane, s, i)
         if car.left_lane >= 0:
             scale = pieces[car.left_lane].length / pieces[lane].length
-            gap_2, speed_2 = find_ahead(occupants, car.left_lane, s * scale, i)
+            gap_2, speed_2 = find_ahead(traffic, car.left_lane, s * scale, i)
             if gap_2 < gap:
                 gap, speed = gap_2, speed_2
         column, begin, line = CURRENT, pieces[lane].length - s, np.inf
@@ -533,9 +538,9 @@ def accelerations(
                 if braking > 0.6 * car.b:
                     wanted = min(wanted, -braking)
             if gap == np.inf:
-                gap, speed = find_ahead(occupants, piece, -begin, i)
+                gap, speed = find_ahead(traffic, piece, -begin, i)
             begin += pieces[piece].length
-        stop, gap_2, speed_2 = find_prior(streets, cars, crossings, i)
+        stop, gap_2, speed_2 = find_prior(traffic, i)
         line = min(line, stop)
         if gap_2 < gap:
             gap, speed = gap_2, speed_2
@@ -554,11 +559,9 @@ def accelerations(
 
 
 @compiled
-def change_lanes(
-    streets: Streets, cars: np.ndarray, occupants: Occupants, k: int
-) -> None:
+def change_lanes(traffic: Traffic, k: int) -> None:
     """Begins the change of lane of one vehicle at most, at the k-th time."""
-    pieces = streets.pieces
+    cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
         lane = car.path[CURRENT]
@@ -577,9 +580,7 @@ def change_lanes(
         if left < length + car.length + _BEYOND:
             continue
         for target in (pieces[lane].left, pieces[lane].right):
-            if target >= 0 and _is_better(
-                streets, cars, occupants, k, i, target
-            ):
+            if target >= 0 and _is_better(traffic, k, i, target):
                 # The vehicle goes on as fast; only its lane is shorter or
                 # longer.
                 scale = pieces[target].length / pieces[lane].length
@@ -595,15 +596,9 @@ def change_lanes(
 
 
 @compiled
-def _is_better(
-    streets: Streets,
-    cars: np.ndarray,
-    occupants: Occupants,
-    k: int,
-    i: int,
-    target: int,
-) -> bool:
+def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
     """Returns whether the i-th vehicle gains by a change to a lane."""
+    streets, cars = traffic.streets, traffic.cars
     car = cars[i]
     lane, v = car.path[CURRENT], car.v
     scale = streets.pieces[target].length / streets.pieces[lane].length
@@ -615,22 +610,22 @@ def _is_better(
     rear = there - car.length
     # The next one behind; no vehicle may be beside it, ahead or behind.
     behind, who, is_beside = np.inf, -2, False
-    at = occupants.head[target]
+    at = traffic.head[target]
     while at >= 0:
-        other = occupants.entries[at]
+        other = traffic.entries[at]
         gap = rear - other.front
         if other.who != i and other.rear <= rear and gap < behind:
             behind, who = gap, other.who
         is_beside |= other.rear < there + _GAP and other.front > rear - _GAP
         at = other.after
-    gap, speed = find_ahead(occupants, target, there, i)
+    gap, speed = find_ahead(traffic, target, there, i)
     if gap < _GAP or behind < _GAP or who == EGO or is_beside:
         return False
     free = free_acceleration(
         car, min(car.top, car.factor * speed_on(streets, lane, car.s))
     )
     new = max(free - interaction(car, gap, v - speed), -HARDEST_BRAKING)
-    gap, speed = find_ahead(occupants, lane, car.s, i)
+    gap, speed = find_ahead(traffic, lane, car.s, i)
     old = max(free - interaction(car, gap, v - speed), -HARDEST_BRAKING)
     cost = 0.0
     if who >= 0:
@@ -638,9 +633,7 @@ def _is_better(
         free = free_acceleration(
             it, min(it.top, it.factor * speed_on(streets, target, it.s))
         )
-        gap, speed = find_ahead(
-            occupants, target, there - car.length - behind, who
-        )
+        gap, speed = find_ahead(traffic, target, rear - behind, who)
         now = max(free - interaction(it, gap, it.v - speed), -HARDEST_BRAKING)
         then = max(free - interaction(it, behind, it.v - v), -HARDEST_BRAKING)
         if then < -_OTHERS_BRAKE:
@@ -650,29 +643,15 @@ def _is_better(
 
 
 @compiled
-def advance(
-    streets: Streets,
-    cars: np.ndarray,
-    accelerations: np.ndarray,
-    dt: float,
-    seed: int,
-) -> None:
-    """Moves all vehicles on.
-
-    Args:
-        streets: the lanes.
-        cars: (N,) records `VEHICLE`.
-        accelerations: (N,) [m/s^2].
-        dt: the step [s].
-        seed: seed of the drawn ways.
-    """
-    pieces = streets.pieces
+def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
+    """Moves all vehicles on, at (N,) accelerations [m/s^2]."""
+    cars, pieces = traffic.cars, traffic.streets.pieces
     for i in range(len(cars)):
         car = cars[i]
         if car.guided:
             continue
-        v = max(0.0, car.v + accelerations[i] * dt)
-        s = car.s + 0.5 * (car.v + v) * dt
+        v = max(0.0, car.v + accelerations[i] * STEP)
+        s = car.s + 0.5 * (car.v + v) * STEP
         while True:
             piece = pieces[car.path[CURRENT]]
             left = piece.length - s
@@ -687,7 +666,7 @@ def advance(
             car.path[NUM_PIECES - 1] = -1
             if not pieces[car.path[CURRENT]].is_way:
                 car.granted = False
-                choose_way(streets, cars, i, seed)
+                choose_way(traffic, i)
         car.s, car.v = s, v
         rear = s - car.length
         # A vehicle still before its way keeps the permit it has just got.
@@ -699,18 +678,19 @@ def advance(
 
 
 @compiled
-def choose_way(streets: Streets, cars: np.ndarray, i: int, seed: int) -> None:
+def choose_way(traffic: Traffic, i: int) -> None:
     """Draws the next way of the i-th vehicle, which is in a lane.
 
     It draws two, and takes the one that leads to the emptier lane: no street
     stays empty while vehicles queue in others.
     """
+    streets, cars = traffic.streets, traffic.cars
     car = cars[i]
     lane = streets.pieces[car.path[CURRENT]]
     least = np.inf
     for _ in range(2):
         car.draws += 1
-        pick = uniform(seed, i, car.draws)
+        pick = uniform(traffic.seed, i, car.draws)
         row = lane.after_first
         last = row + lane.after_count - 1
         while row < last and pick >= streets.liked[row]:

@@ -14,7 +14,8 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.traffic.lane_graph import SPACING, Walkway
 from cns_drake.traffic.overlaps import boxes_overlap
-from cns_drake.traffic.right_of_way import WALK_GROUP, Permits
+from cns_drake.traffic.right_of_way import WALK_GROUP
+from cns_drake.traffic.streets import STEP
 from cns_drake.traffic.vehicles import uniform
 
 # The model's wanted speed, and its spread [m/s]; relaxation [s]; strength
@@ -135,19 +136,11 @@ class Crowd:
         self,
         count: int,
         walkways: Sequence[Walkway],
-        permits: Permits,
+        crossings: np.ndarray,
         rng: np.random.Generator,
     ):
-        """Puts walkers onto walkways, except crossings.
-
-        Args:
-            count: wanted number.
-            walkways: where they may go.
-            permits: permits of the crossings.
-            rng: draws the places.
-        """
-        self._permits = permits
-        self._users = permits.users
+        """Puts a number of walkers onto walkways, except (C,) `CROSSING`."""
+        self._crossings = crossings
         self._paths = _make_paths(walkways)
         # Place -> the paths that begin there.
         self._after: dict[int, list[int]] = {}
@@ -157,18 +150,13 @@ class Crowd:
                 self._after.setdefault(way.end, []).append(2 * k + 1)
         self.walkers = _place_walkers(count, walkways, rng)
 
-    def step(self, t: float, dt: float, seed: int) -> None:
-        """Moves all walkers on.
-
-        Args:
-            t, dt: time and step [s].
-            seed: seed of the ways that are drawn.
-        """
-        crossings, walkers = self._permits.crossings, self.walkers
+    def step(self, t: float, seed: int) -> None:
+        """Moves all walkers on from a time [s]; draws their ways by a seed."""
+        crossings, walkers = self._crossings, self.walkers
         opened = crossings["opened"]
         begun = (opened >= 0.0) & (opened + WALK_GROUP <= t)
         # The placeholder's permit ends when the group begins to walk.
-        self._users[begun] -= 1
+        crossings["users"][begun] -= 1
         opened[begun] = -np.inf
         crossings["closed"][begun] = t
         is_waiting = np.zeros(len(walkers), bool)
@@ -177,17 +165,17 @@ class Crowd:
             is_waiting[i] = not self._go_on(i, t, seed, waited)
         crossings["waits"][~waited] = np.inf
         force = _forces(self._paths, walkers, is_waiting)
-        _move(self._paths, walkers, force, dt)
+        _move(self._paths, walkers, force)
         self._note_crossers()
         x, y = walkers["velocity"].T
         speed = np.sqrt(x * x + y * y)
-        walkers["phase"] += gait_rate(speed) * dt
+        walkers["phase"] += gait_rate(speed) * STEP
         paths = self._paths.paths[walkers["path"]]
         # Others may push one back.
         along = self._paths.tangents[paths["first"] + walkers["at"]]
         gets_on = x * along[:, 0] + y * along[:, 1] > _GOING
         is_stuck = ~gets_on & ~is_waiting
-        walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + dt, 0.0)
+        walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + STEP, 0.0)
         back = walkers["stuck"] > _PATIENCE
         # Likewise one who waits where the other wants to leave a crossing.
         apart = walkers["xy"][back, None] - walkers["xy"][is_waiting]
@@ -201,13 +189,13 @@ class Crowd:
 
     def _note_crossers(self) -> None:
         """Notes the parts of crossings that walkers have yet to pass."""
-        crossings, walkers = self._permits.crossings, self.walkers
+        crossings, walkers = self._crossings, self.walkers
         crossings["to_end"], crossings["to_start"] = np.inf, -np.inf
         on = self._paths.paths["crossing"][walkers["path"]]
         rows = np.flatnonzero(on >= 0)
         c, walkers = on[rows], walkers[rows]
-        starts, along = self._permits.lines[c].transpose(1, 0, 2)
-        place = ((walkers["xy"] - starts) * along).sum(axis=1)
+        along = crossings["along"][c]
+        place = ((walkers["xy"] - crossings["start"][c]) * along).sum(axis=1)
         row = self._paths.paths["first"][walkers["path"]] + walkers["at"]
         ahead = (self._paths.tangents[row] * along).sum(axis=1) > 0.0
         np.minimum.at(crossings["to_end"], c[ahead], place[ahead])
@@ -239,13 +227,9 @@ class Crowd:
         )
 
     def _go_on(self, i: int, t: float, seed: int, waited: np.ndarray) -> bool:
-        """Lets a walker begin its next path, unless it has to wait.
+        """Lets the i-th walker begin its next path, unless it has to wait.
 
-        Args:
-            i: number of the walker.
-            t: time [s].
-            seed: seed of the draw.
-            waited: (C,) bool; notes a crossing that a walker asks for.
+        A crossing that it asks for is noted in `waited`, (C,) bool.
 
         Returns:
             Whether it has begun.
@@ -254,11 +238,11 @@ class Crowd:
         if walkers["next_path"][i] < 0:
             walkers["next_path"][i] = self._draw_next(i, seed)
         after = int(walkers["next_path"][i])
-        crossings = self._permits.crossings
+        crossings = self._crossings
         c = paths["crossing"][after]
         # One who turns back on a crossing has its permit.
         if c >= 0 and c != paths["crossing"][walkers["path"][i]]:
-            if self._users[c] == 0:
+            if crossings["users"][c] == 0:
                 crossings["waits"][c] = min(crossings["waits"][c], t)
                 waited[c] = True
                 waits = t - crossings["waits"][c]
@@ -270,7 +254,7 @@ class Crowd:
         for path, change in ((walkers["path"][i], -1), (after, 1)):
             c = paths["crossing"][path]
             if c >= 0:
-                self._users[c] += change
+                crossings["users"][c] += change
                 crossings["closed"][c] = t
         walkers["path"][i], walkers["at"][i] = after, 0
         walkers["next_path"][i] = -1
@@ -284,7 +268,7 @@ class Crowd:
             return path ^ 1
         self.walkers["draws"][i] += 1
         # Few walkers cross, none goes back.
-        marked = self._permits.crossings["marked"]
+        marked = self._crossings["marked"]
         likings = []
         for other in choices:
             over = int(self._paths.paths["crossing"][other])
@@ -304,13 +288,10 @@ class Crowd:
         return path ^ 1 if other // 2 == path // 2 else other
 
     def poses(self, walkers: np.ndarray) -> np.ndarray:
-        """Returns the poses of walkers.
+        """Returns the poses of (...) records, such as those of several times.
 
-        Args:
-            walkers: (...) records, such as those of several times.
-
-        Returns:
-            (..., 5): x, y, z on the ground [m], yaw, phase of the gait [rad].
+        They are (..., 5): x, y, z on the ground [m], yaw, phase of the gait
+        [rad].
         """
         paths, points, *_ = self._paths
         path = paths[walkers["path"]]
@@ -406,15 +387,9 @@ def _place_walkers(
 def _forces(
     paths: Paths, walkers: np.ndarray, is_waiting: np.ndarray
 ) -> np.ndarray:
-    """Returns the forces on all walkers, as accelerations [m/s^2].
+    """Returns the (N, 2) forces on all walkers, as accelerations [m/s^2].
 
-    Args:
-        paths: where they go.
-        walkers: (N,) records.
-        is_waiting: (N,) who waits for a crossing.
-
-    Returns:
-        (N, 2) in the world.
+    Some of them wait for a crossing, (N,) bool.
     """
     force = np.zeros((len(walkers), 2))
     for i in range(len(walkers)):
@@ -476,27 +451,19 @@ def _forces(
 
 
 @compiled
-def _move(
-    paths: Paths, walkers: np.ndarray, force: np.ndarray, dt: float
-) -> None:
-    """Moves each walker as far as its way is free.
+def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
+    """Moves each walker as far as its way is free, by (N, 2) forces [m/s^2].
 
     A walker takes a step if it can stop thereafter on its path, and beside the
     places where all others can stop. Otherwise it brakes: the place where it
     stops is free since the step before.
-
-    Args:
-        paths: where they go.
-        walkers: (N,) records.
-        force: (N, 2) accelerations [m/s^2].
-        dt: the step [s].
     """
     for i in range(len(walkers)):
         one = walkers[i]
         x, y, vx, vy = one.xy[0], one.xy[1], one.velocity[0], one.velocity[1]
         rest_x, rest_y = _stop(x, y, vx, vy)
         off = _distance_off(paths, one, rest_x, rest_y)
-        change_x, change_y = force[i, 0] * dt, force[i, 1] * dt
+        change_x, change_y = force[i, 0] * STEP, force[i, 1] * STEP
         for attempt in range(3):
             if attempt == 1:
                 # Try the lateral part of the step only, and a little back.
@@ -508,13 +475,13 @@ def _move(
             elif attempt == 2:
                 change_x, change_y = -vx, -vy
             part = np.sqrt(change_x * change_x + change_y * change_y)
-            part = min(1.0, _STRONGEST * dt / max(part, 1e-9))
+            part = min(1.0, _STRONGEST * STEP / max(part, 1e-9))
             new_vx, new_vy = vx + part * change_x, vy + part * change_y
             speed = np.sqrt(new_vx * new_vx + new_vy * new_vy)
             part = min(1.0, _HURRY * one.speed / max(speed, 1e-9))
             new_vx, new_vy = part * new_vx, part * new_vy
-            new_x = x + 0.5 * (vx + new_vx) * dt
-            new_y = y + 0.5 * (vy + new_vy) * dt
+            new_x = x + 0.5 * (vx + new_vx) * STEP
+            new_y = y + 0.5 * (vy + new_vy) * STEP
             if attempt == 2 and speed == 0.0:
                 new_x, new_y = rest_x, rest_y
             stop_x, stop_y = _stop(new_x, new_y, new_vx, new_vy)
@@ -528,7 +495,7 @@ def _move(
                     ahead = np.cos(yaw) * tx + np.sin(yaw) * ty
                     turn = np.arctan2(ty, tx) - yaw + np.pi * (ahead < 0.0)
                 turn = (turn + np.pi) % (2 * np.pi) - np.pi
-                yaw += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
+                yaw += min(max(turn, -_TURN_RATE * STEP), _TURN_RATE * STEP)
             if attempt < 2 and (
                 _distance_off(paths, one, stop_x, stop_y) > off + 1e-9
             ):
@@ -566,13 +533,7 @@ def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
 
 @compiled
 def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
-    """Returns the distance of a place from a walker's path [m].
-
-    Args:
-        paths: all of them.
-        walker: its record.
-        x, y: the place [m].
-    """
+    """Returns the distance of a place from a walker's path [m]."""
     path, points = paths.paths[walker.path], paths.points
     row = _nearest(paths, walker, x, y)
     nearest = row - path.first
@@ -599,12 +560,7 @@ def _is_free(
 ) -> bool:
     """Returns whether the i-th walker's box would be free, now and later.
 
-    Args:
-        walkers: all of them.
-        i: number of the walker.
-        place: where it would be [m].
-        stop: where it would be if it braked then [m].
-        yaw: its heading [rad].
+    It would be at a place with a heading, and stop elsewhere if it braked then.
     """
     half = np.array([WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2])
     a, b = np.array([0.0, 0.0, yaw]), np.zeros(3)

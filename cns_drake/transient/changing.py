@@ -45,9 +45,8 @@ def change_world(
     Args:
         world: not yet a part of a diagram; its SceneGraph is changed.
         config: the changes.
-        drive: the way of the vehicle, seen from above [m].
-        kept_free: area where vehicles drive, seen from above [m]; it stays free
-            of new things.
+        drive, kept_free: the way of the vehicle, and the area that stays free
+            of new things, seen from above [m].
 
     Raises:
         InputError: a mesh cannot be read, or there are more structures than
@@ -134,7 +133,7 @@ def _thin_leaves(around: Surroundings, share: float) -> None:
             # The key is the mesh's size, not its file, whose place must not
             # matter.
             order = draws(around.seed, "leaves", str(count)).permutation(count)
-            around.editing.replace_triangles(
+            around.editing.keep_triangles(
                 part, np.sort(order[: round(left * count)])
             )
         if leafy:

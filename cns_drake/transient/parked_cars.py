@@ -52,7 +52,7 @@ class Bay:
     Attributes:
         middle: (2,) of the car [m].
         yaw: heading of its long axis [rad].
-        front, back, left, right: reach of the bay from there [m].
+        reach: (4,) of the bay from there: front, back, left, right [m].
     """
 
     def __init__(self, car: Structure):
@@ -64,8 +64,7 @@ class Bay:
         along = sides[int(lengths.argmax())]
         self.middle = corners.mean(axis=0)
         self.yaw = math.atan2(along[1], along[0])
-        self.front = self.back = float(lengths.max()) / 2
-        self.left = self.right = float(lengths.min()) / 2
+        self.reach = np.repeat([lengths.max() / 2, lengths.min() / 2], 2)
 
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
         """Returns the bay, extended, seen from above [m].
@@ -73,8 +72,7 @@ class Bay:
         Args:
             beyond: lengths at front, back, left and right [m].
         """
-        reach = np.array([self.front, self.back, self.left, self.right])
-        front, back, left, right = reach + beyond
+        front, back, left, right = self.reach + beyond
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         corners = np.array(
             [(front, left), (-back, left), (-back, -right), (front, -right)]
@@ -84,13 +82,7 @@ class Bay:
         )
 
     def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
-        """Grows towards surroundings, and half the way towards other cars.
-
-        Args:
-            car: in the bay.
-            cars: all cars.
-            others: other things that a car must not touch.
-        """
+        """Grows towards other things, and half the way towards other cars."""
         own = (car.name,)
         box = self.box()
         growth = np.zeros(4)
@@ -104,31 +96,20 @@ class Bay:
                 most + _GAP,
             )
             growth[k] = max(room - _GAP, 0.0)
-        self.front += float(growth[0])
-        self.back += float(growth[1])
-        self.left += float(growth[2])
-        self.right += float(growth[3])
+        self.reach = self.reach + growth
 
     def place(
         self, half_size: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, float] | None:
         """Returns middle and yaw of a car in the bay; None if it is too big.
 
-        Args:
-            half_size: (2,) half its length and width [m].
-            rng: draws the place.
+        It has (2,) half its length and width [m].
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
         across, turned = rng.uniform(size=2), rng.uniform() < 0.5
         c, s = math.cos(skew), abs(math.sin(skew))
-        half = np.array(
-            [
-                half_size[0] * c + half_size[1] * s,
-                half_size[0] * s + half_size[1] * c,
-            ]
-        )
-        low = half - (self.back, self.right)
-        high = np.array([self.front, self.left]) - half
+        half = half_size * c + half_size[::-1] * s
+        low, high = half - self.reach[1::2], self.reach[::2] - half
         if (low > high).any():
             return None
         c, s = math.cos(self.yaw), math.sin(self.yaw)
@@ -182,7 +163,7 @@ def _moved(
 ) -> RigidTransform:
     """Returns the transformation of a moved car's points."""
     own = Bay(car)
-    half_size = np.array([own.front, own.left])
+    half_size = own.reach[::2]
     middle, yaw = own.middle, own.yaw + np.pi  # At least turned round.
     for _ in range(_TRIES):
         found = bay.place(half_size, rng)

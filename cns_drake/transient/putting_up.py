@@ -1,5 +1,6 @@
 """Puts up scaffolds and roadworks along a drive."""
 
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -221,39 +222,32 @@ def put_up_works(around: Surroundings, share: float) -> None:
             length = min(float(rng.uniform(*_LENGTHS)), stretch.length)
             spare = max(stretch.length - length, 0.0) / 2
             x = float(rng.uniform(-spare, spare))
-            site = next(
-                (
-                    (x, length, width)
-                    for width in _WIDTHS
-                    if solid.is_free(
-                        stretch.rectangle(x, length, _SITE_INNER, width)
-                    )
-                ),
-                None,
-            )
-            if site is not None:
-                _Site(around, stretch, site, rng).build(every)
+            free = [
+                width
+                for width in _WIDTHS
+                if solid.is_free(
+                    stretch.rectangle(x, length, _SITE_INNER, width)
+                )
+            ]
+            if free:
+                _Site(around, stretch, x, length, free[0], rng).build(every)
                 break
 
 
+@dataclass
 class _Site:
-    """One site under construction."""
+    """One site under construction: its place x, length and width [m]."""
 
-    def __init__(
-        self,
-        around: Surroundings,
-        stretch: _Stretch,
-        site: tuple[float, float, float],
-        rng: np.random.Generator,
-    ):
-        self._around = around
-        self._stretch = stretch
-        self._x, self._length, self._width = site
-        self._rng = rng
+    around: Surroundings
+    stretch: _Stretch
+    x: float
+    length: float
+    width: float
+    rng: np.random.Generator
 
     def build(self, every: Obstacles) -> None:
         """Puts up fences, machines clear of obstacles, and new kerb stones."""
-        x, length, width = self._x, self._length, self._width
+        x, length, width = self.x, self.length, self.width
         middle, across = (_SITE_INNER + width) / 2, width - _SITE_INNER
         sides = (
             (x, _SITE_INNER, 0.0, length),
@@ -262,34 +256,33 @@ class _Site:
             (x + length / 2, middle, np.pi / 2, across),
         )
         for k, (at, y, turn, run) in enumerate(sides):
-            model = OBJECTS["site_fence"].build(self._rng, length=run)
+            model = OBJECTS["site_fence"].build(self.rng, length=run)
             self._add(f"fence_{k}", "fence", model, at, y, turn, run)
         self._add_machines(every, middle)
-        stones = self._stretch.rectangle(x, length, -_KERB_WIDTH, 0.0)
-        if not stones.intersects(self._around.drive.buffer(1.3)):
+        stones = self.stretch.rectangle(x, length, -_KERB_WIDTH, 0.0)
+        if not stones.intersects(self.around.drive.buffer(1.3)):
             size = (length, _KERB_WIDTH, 2 * _KERB_HEIGHT)
             model = assemble(block("stones", size, (0, 0, 0), rgb=_KERB_RGB))
             y = -_KERB_WIDTH / 2
             self._add("kerb", "sidewalk", model, x, y, 0.0, length)
 
     def _add_machines(self, every: Obstacles, y: float) -> None:
-        shares = _WIDE if self._width > 4.0 else _NARROW
+        shares = _WIDE if self.width > 4.0 else _NARROW
         names = list(shares)
         weights = np.array(list(shares.values()), float)
         taken: list[BaseGeometry] = []
         for _ in range(_TRIES):
-            name = names[
-                int(self._rng.choice(len(names), p=weights / weights.sum()))
-            ]
-            x = self._x + float(self._rng.uniform(-0.4, 0.4)) * self._length
-            turn = float(self._rng.uniform(-0.15, 0.15))
+            chances = weights / weights.sum()
+            name = names[int(self.rng.choice(len(names), p=chances))]
+            x = self.x + float(self.rng.uniform(-0.4, 0.4)) * self.length
+            turn = float(self.rng.uniform(-0.15, 0.15))
             builder: Builder = OBJECTS[name]
-            model = builder.build(self._rng)
+            model = builder.build(self.rng)
             if name == "brick_pallets":
                 turn += np.pi / 2  # Its row runs along y.
             area = self._placed(model, x, y, turn)
-            inside = self._stretch.rectangle(
-                self._x, self._length, _SITE_INNER, self._width
+            inside = self.stretch.rectangle(
+                self.x, self.length, _SITE_INNER, self.width
             )
             if (
                 inside.contains(area)
@@ -305,8 +298,8 @@ class _Site:
         self, model: Model, x: float, y: float, turn: float
     ) -> BaseGeometry:
         """Returns the footprint of a model on the site, in the world [m]."""
-        at = self._stretch.place(x, y).tolist()
-        return placed(model.footprint, at, turn + self._stretch.yaw)
+        at = self.stretch.place(x, y).tolist()
+        return placed(model.footprint, at, turn + self.stretch.yaw)
 
     def _add(
         self,
@@ -322,8 +315,8 @@ class _Site:
 
         Without ground the thing is left out.
         """
-        ground, yaw = self._around.ground, self._stretch.yaw + turn
-        middle = self._stretch.place(x, y)
+        ground, yaw = self.around.ground, self.stretch.yaw + turn
+        middle = self.stretch.place(x, y)
         along = np.array([math.cos(yaw), math.sin(yaw)]) * length / 2
         ends = np.array([middle, middle - along, middle + along])
         z = ground.heights(ends, of_road=y < 0.0)
@@ -331,15 +324,15 @@ class _Site:
         if length == 0.0:  # It stands upright.
             at = ground.lowest(self._placed(model, x, y, turn), at)
         if not np.isfinite(at):  # No ground beside the road.
-            edge = self._stretch.place(x, -0.1)[None]
+            edge = self.stretch.place(x, -0.1)[None]
             at = float(ground.heights(edge, of_road=True)[0])
         if not np.isfinite(at):  # Both are in slits of the ground.
             return
         pitch = 0.0
         if length > 0.0 and np.isfinite(z).all():
             pitch = -math.atan2(z[2] - z[1], length)
-        self._around.editing.add(
-            f"{self._stretch.name}_{suffix}",
+        self.around.editing.add(
+            f"{self.stretch.name}_{suffix}",
             semantic_class,
             model,
             RigidTransform(RollPitchYaw(0.0, pitch, yaw), [*middle, at]),

@@ -4,38 +4,19 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pydrake import geometry
 from pydrake.common import MemoryFile
-from pydrake.geometry import (
-    Box,
-    Convex,
-    Cylinder,
-    GeometryInstance,
-    IllustrationProperties,
-    InMemoryMesh,
-    Mesh,
-    PerceptionProperties,
-    Rgba,
-    Shape,
-    Sphere,
-)
 from pydrake.math import RigidTransform, RollPitchYaw
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import product
 from cns_drake.base.errors import InputError
+from cns_drake.city.geometry import structures
 from cns_drake.city.geometry.mesh import FOLDER
-from cns_drake.city.geometry.structures import (
-    BoxShape,
-    CylinderShape,
-    MeshShape,
-    Model,
-    Part,
-    SphereShape,
-)
 from cns_drake.scene.structure_table import (
     MAX_INSTANCE,
     StructureEntry,
@@ -77,13 +58,15 @@ class Look(NamedTuple):
 
 
 class SceneEditing:
-    """Removes things from a world and adds others."""
+    """Removes things from a world and adds others.
+
+    A cause is the scenario's switch that changed a structure.
+    """
 
     def __init__(self, world: World):
-        """Begins with an unchanged world.
+        """Begins with a world that is not yet a part of a diagram.
 
-        Args:
-            world: not yet a part of a diagram; its SceneGraph is changed.
+        Its SceneGraph is changed.
         """
         self._world = world
         self._source = world.plant.get_source_id()
@@ -97,35 +80,27 @@ class SceneEditing:
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:
-        """Keeps the switch that changed a structure."""
+        """Keeps the cause of a change of a structure."""
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
     def remove(self, thing: Structure, cause: str) -> None:
         """Removes a structure."""
         for part in thing.parts:
-            self.remove_part(part)
+            self._remove_part(part)
         self.blame(thing.name, cause)
-
-    def remove_part(self, part: StructurePart) -> None:
-        """Removes a part of a structure."""
-        self._world.scene_graph.RemoveGeometry(
-            self._source, part.geometry.geometry_id
-        )
 
     def move(
         self, thing: Structure, X_new: RigidTransform, name: str, cause: str
     ) -> None:
-        """Moves a structure, and gives it a new name.
-
-        Args:
-            thing: to move.
-            X_new: transformation of its points in the world.
-            name: the new name.
-            cause: the switch.
-        """
+        """Transforms a structure's points in the world; gives it a new name."""
         for part in thing.parts:
-            self._copy_part(part, X_new @ part.X_WG, f"{name}/{part.name}")
+            self._register(
+                f"{name}/{part.name}",
+                X_new @ part.X_WG,
+                self._shape(part),
+                *self._properties(part),
+            )
         self.remove(thing, cause)
         old = self._world.structures[thing.name]
         self._added[name] = (old.semantic_class, old.reflectivity)
@@ -134,91 +109,69 @@ class SceneEditing:
     def cover_part(
         self, part: StructurePart, p_W: np.ndarray, look: Look
     ) -> None:
-        """Moves a part of a structure and paints it.
-
-        Args:
-            part: to change.
-            p_W: (3,) displacement in the world [m].
-            look: its new look.
-        """
-        inspector = self._world.scene_graph.model_inspector()
+        """Moves a part of a structure by p_W (3,) [m], and paints it."""
         self._register(
             f"{part.geometry.structure}/{part.name}_covered",
-            RigidTransform(np.asarray(p_W, float)) @ part.X_WG,
-            inspector.GetShape(part.geometry.geometry_id),
+            RigidTransform(p_W) @ part.X_WG,
+            self._shape(part),
             *_properties(look),
         )
-        self.remove_part(part)
+        self._remove_part(part)
 
     def add(
         self,
         name: str,
         semantic_class: str,
-        model: Model,
+        model: structures.Model,
         X_WS: RigidTransform,
         cause: str,
     ) -> None:
-        """Adds a new structure.
-
-        Args:
-            name: name of the structure; unique.
-            semantic_class: a key of `CLASS_IDS`.
-            model: made of the city generator's meshes.
-            X_WS: its pose in the world.
-            cause: the switch.
-        """
+        """Adds a structure of a unique name, a model of the city generator."""
         for part in model.parts:
             self._register(
                 f"{name}/{part.name}",
                 X_WS @ RigidTransform(RollPitchYaw(*part.rpy), part.xyz),
-                _shape(part, model),
+                _model_shape(part.shape),
                 *_properties(Look(part.rgb or (0.5, 0.5, 0.5))),
             )
         self._added[name] = (semantic_class, None)
         self.blame(name, cause)
 
-    def replace_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
-        """Keeps only some of the triangles of a part.
-
-        Args:
-            part: with a surface of triangles.
-            kept: indices of triangles that stay.
-        """
+    def keep_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
+        """Removes all triangles of a part but those of some indices."""
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
         triangles = surface.triangles[kept]
         if len(triangles):
             # The mesh is unscaled, so that parts of one mesh share one again.
-            scale = self._scale(part)
+            shape, scale = self._shape(part), np.ones(3)
+            # Boxes and cones are the only such shapes without triangles.
+            if isinstance(shape, geometry.Mesh | geometry.Convex):
+                scale = np.array(shape.scale3())
             if np.prod(scale) < 0.0:
                 triangles = triangles[:, ::-1]
             self._register(
                 f"{part.geometry.structure}/{part.name}",
                 part.X_WG,
-                memory_mesh(surface.p_GVset / scale, triangles, scale),
+                _memory_mesh(surface.p_GVset / scale, triangles, scale),
                 *self._properties(part),
             )
-        self.remove_part(part)
+        self._remove_part(part)
 
     def add_triangles(
         self,
         part: StructurePart,
         name: str,
-        vertices: np.ndarray,
+        p_WVs: np.ndarray,
         triangles: np.ndarray,
         look: Look,
     ) -> None:
-        """Adds a surface to the structure of a part.
+        """Adds a part of triangles to the structure of another part.
 
-        Args:
-            part: one of the structure that it joins, in whose frame it is.
-            name: name of the new part.
-            vertices: (N, 3) in the world [m].
-            triangles: (M, 3) vertex indices.
-            look: colour and reflectivity.
+        They are (M, 3) indices of (N, 3) vertices in the world [m].
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
-        mesh = memory_mesh(product(vertices - p, R), triangles)
+        mesh = _memory_mesh(product(p_WVs - p, R), triangles)
         name = f"{part.geometry.structure}/{name}"
         self._register(name, part.X_WG, mesh, *_properties(look))
 
@@ -226,25 +179,19 @@ class SceneEditing:
         self,
         name: str,
         semantic_class: str,
-        vertices: np.ndarray,
+        p_WVs: np.ndarray,
         triangles: np.ndarray,
         look: Look,
         cause: str,
     ) -> None:
-        """Adds a structure of triangles.
-
-        Args:
-            name: name of the structure.
-            semantic_class: a key of `CLASS_IDS`.
-            vertices: (N, 3) in the world [m].
-            triangles: (M, 3) vertex indices.
-            look: colour and reflectivity.
-            cause: the switch.
-        """
-        middle = np.round(vertices.mean(axis=0))
-        mesh = memory_mesh(vertices - middle, triangles)
-        X_WG = RigidTransform(middle)
-        self._register(f"{name}/surface", X_WG, mesh, *_properties(look))
+        """Adds a structure of triangles, see `add_triangles`."""
+        middle = np.round(p_WVs.mean(axis=0))
+        self._register(
+            f"{name}/surface",
+            RigidTransform(middle),
+            _memory_mesh(p_WVs - middle, triangles),
+            *_properties(look),
+        )
         self._added[name] = (semantic_class, None)
         self.blame(name, cause)
 
@@ -283,48 +230,39 @@ class SceneEditing:
         ]
         return replace(entry, causes=(*entry.causes, *new)) if new else entry
 
+    def _shape(self, part: StructurePart) -> geometry.Shape:
+        inspector = self._world.scene_graph.model_inspector()
+        return inspector.GetShape(part.geometry.geometry_id)
+
     def _properties(
         self, part: StructurePart
-    ) -> tuple[PerceptionProperties, IllustrationProperties | None]:
+    ) -> tuple[geometry.GeometryProperties, ...]:
         inspector = self._world.scene_graph.model_inspector()
-        geometry_id = part.geometry.geometry_id
-        return (
-            inspector.GetPerceptionProperties(geometry_id),
-            inspector.GetIllustrationProperties(geometry_id),
-        )
-
-    def _scale(self, part: StructurePart) -> np.ndarray:
-        inspector = self._world.scene_graph.model_inspector()
-        shape = inspector.GetShape(part.geometry.geometry_id)
-        # Boxes and cones are the only such shapes without triangles.
-        if not isinstance(shape, Mesh | Convex):
-            return np.ones(3)
-        return np.array(shape.scale3())
-
-    def _copy_part(
-        self, part: StructurePart, X_WG: RigidTransform, name: str
-    ) -> None:
-        inspector = self._world.scene_graph.model_inspector()
-        shape = inspector.GetShape(part.geometry.geometry_id)
-        self._register(name, X_WG, shape, *self._properties(part))
+        number = part.geometry.geometry_id
+        shown = inspector.GetIllustrationProperties(number)
+        seen = inspector.GetPerceptionProperties(number)
+        return (seen,) if shown is None else (seen, shown)
 
     def _register(
         self,
         name: str,
         X_WG: RigidTransform,
-        shape: Shape,
-        seen: PerceptionProperties,
-        shown: IllustrationProperties | None,
+        shape: geometry.Shape,
+        *properties: geometry.GeometryProperties,
     ) -> None:
         scene_graph = self._world.scene_graph
-        geometry = scene_graph.RegisterGeometry(
+        number = scene_graph.RegisterGeometry(
             self._source,
             scene_graph.world_frame_id(),
-            GeometryInstance(X_WG, shape, name),
+            geometry.GeometryInstance(X_WG, shape, name),
         )
-        scene_graph.AssignRole(self._source, geometry, seen)
-        if shown is not None:
-            scene_graph.AssignRole(self._source, geometry, shown)
+        for one in properties:
+            scene_graph.AssignRole(self._source, number, one)
+
+    def _remove_part(self, part: StructurePart) -> None:
+        self._world.scene_graph.RemoveGeometry(
+            self._source, part.geometry.geometry_id
+        )
 
 
 @dataclass
@@ -362,9 +300,7 @@ class Surroundings:
     ) -> Obstacles:
         """Returns the area that stays free, and footprints of structures.
 
-        Args:
-            ignored: classes of structures that are no obstacles.
-            classes: in place of `ignored`, those that alone are obstacles.
+        Those of some classes are no obstacles, or those of others alone are.
         """
         feet = (
             (thing.name, thing.footprint)
@@ -380,30 +316,21 @@ class Surroundings:
     def chosen(
         self, cause: str, things: Iterable[Named], share: float
     ) -> Iterator[tuple[Named, np.random.Generator]]:
-        """Yields a share of some things, each with its random numbers.
-
-        Args:
-            cause: the switch.
-            things: they have names.
-            share: from 0 to 1.
-        """
+        """Yields a share of some things, each with its random numbers."""
         for thing in things:
             rng = draws(self.seed, cause, thing.name)
             if rng.uniform() < share:
                 yield thing, rng
 
 
-def memory_mesh(
+def _memory_mesh(
     vertices: np.ndarray,
     triangles: np.ndarray,
-    scale: np.ndarray | None = None,
-) -> Mesh:
+    scale: ArrayLike = (1.0, 1.0, 1.0),
+) -> geometry.Mesh:
     """Returns a mesh in memory; readers treat equal ones as the same.
 
-    Args:
-        vertices: (N, 3) before they are scaled [m].
-        triangles: (M, 3) vertex indices.
-        scale: (3,) along the axes; none by default.
+    It has (N, 3) vertices, before they are scaled [m], and (M, 3) triangles.
     """
     used, corners = np.unique(triangles, return_inverse=True)
     # Numbers of Python are formatted several times as fast as those of NumPy.
@@ -415,31 +342,26 @@ def memory_mesh(
     ]
     text = "\n".join(lines) + "\n"
     file = MemoryFile(text.encode(), ".obj", "mesh")
-    return Mesh(
-        InMemoryMesh(mesh_file=file), np.ones(3) if scale is None else scale
-    )
+    return geometry.Mesh(geometry.InMemoryMesh(mesh_file=file), scale)
 
 
-def _properties(
-    look: Look,
-) -> tuple[PerceptionProperties, IllustrationProperties]:
-    seen, shown = PerceptionProperties(), IllustrationProperties()
+def _properties(look: Look) -> tuple[geometry.GeometryProperties, ...]:
+    seen = geometry.PerceptionProperties()
+    shown = geometry.IllustrationProperties()
     for properties in (seen, shown):
-        properties.AddProperty("phong", "diffuse", Rgba(*look.rgb, 1.0))
+        rgba = geometry.Rgba(*look.rgb, 1.0)
+        properties.AddProperty("phong", "diffuse", rgba)
     if look.reflectivity is not None:
         seen.AddProperty("lidar", "reflectivity", look.reflectivity)
     return seen, shown
 
 
-def _shape(part: Part, model: Model) -> Shape:
-    """Returns the shape of a part of the city generator's."""
-    shape = part.shape
-    if isinstance(shape, BoxShape):
-        return Box(*shape.size)
-    if isinstance(shape, CylinderShape):
-        return Cylinder(shape.radius, shape.length)
-    if isinstance(shape, SphereShape):
-        return Sphere(shape.radius)
-    assert isinstance(shape, MeshShape)
-    file: Path = FOLDER / f"{shape.mesh}.obj"
-    return Mesh(str(file), np.array(shape.scale))
+def _model_shape(shape: structures.Shape) -> geometry.Shape:
+    """Returns a shape of the city generator's as one of Drake's."""
+    if isinstance(shape, structures.BoxShape):
+        return geometry.Box(*shape.size)
+    if isinstance(shape, structures.CylinderShape):
+        return geometry.Cylinder(shape.radius, shape.length)
+    if isinstance(shape, structures.SphereShape):
+        return geometry.Sphere(shape.radius)
+    return geometry.Mesh(str(FOLDER / f"{shape.mesh}.obj"), shape.scale)

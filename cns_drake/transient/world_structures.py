@@ -51,12 +51,7 @@ _BOX = np.array(
 
 @dataclass(frozen=True)
 class StructurePart:
-    """One geometry of a structure.
-
-    Attributes:
-        geometry: visible to a LiDAR.
-        X_WG: its pose in the world.
-    """
+    """One geometry of a structure, visible to a LiDAR, and its pose."""
 
     geometry: PerceptionGeometry
     X_WG: RigidTransform
@@ -74,12 +69,11 @@ class StructurePart:
             p_GPs = surface.p_GVset
         elif isinstance(surface, EllipsoidSurface):
             p_GPs = _BOX * surface.semi_axes
-        elif isinstance(surface, CylinderSurface):
-            r = surface.radius
-            p_GPs = _BOX * (r, r, surface.length / 2)
-        elif isinstance(surface, CapsuleSurface):
-            r = surface.radius
-            p_GPs = _BOX * (r, r, surface.length / 2 + r)
+        elif isinstance(surface, CylinderSurface | CapsuleSurface):
+            r, half = surface.radius, surface.length / 2
+            if isinstance(surface, CapsuleSurface):
+                half += r
+            p_GPs = _BOX * (r, r, half)
         else:
             assert isinstance(surface, HalfSpaceSurface)
             p_GPs = np.zeros((0, 3))
@@ -89,13 +83,7 @@ class StructurePart:
 
 @dataclass(frozen=True)
 class Structure:
-    """A structure in the world.
-
-    Attributes:
-        name: name of the structure.
-        semantic_class: a key of `CLASS_IDS`.
-        parts: its geometries.
-    """
+    """A structure in the world, of a class of `CLASS_IDS`."""
 
     name: str
     semantic_class: str
@@ -114,29 +102,26 @@ class Structure:
     @cached_property
     def outline(self) -> BaseGeometry:
         """The convex hull of all of it, seen from above [m]."""
-        hull = shapely.convex_hull(shapely.multipoints(self.p_WPs[:, :2]))
-        return cast(BaseGeometry, hull)
+        return _hull(self.p_WPs)
 
     @cached_property
     def footprint(self) -> BaseGeometry:
         """The convex hull of the parts near its foot, seen from above [m]."""
         p_WPs = self.p_WPs
-        low = p_WPs[p_WPs[:, 2] <= self.bottom + _HEADROOM]
-        hull = shapely.convex_hull(shapely.multipoints(low[:, :2]))
-        return cast(BaseGeometry, hull)
+        return _hull(p_WPs[p_WPs[:, 2] <= self.bottom + _HEADROOM])
+
+
+def _hull(p_WPs: np.ndarray) -> BaseGeometry:
+    points = shapely.multipoints(p_WPs[:, :2])
+    return cast(BaseGeometry, shapely.convex_hull(points))
 
 
 def read_structures(
     world: World, wanted: Callable[[str], bool] = lambda name: True
 ) -> dict[str, Structure]:
-    """Reads the static structures of a world.
+    """Returns the static structures of a world by name, in alphabetical order.
 
-    Args:
-        world: not yet a part of a diagram.
-        wanted: name -> whether to read the structure.
-
-    Returns:
-        Structure name -> structure, in alphabetical order.
+    The world is not yet a part of a diagram.
 
     Raises:
         InputError: a mesh cannot be read.
@@ -171,11 +156,7 @@ class Obstacles:
     """Obstacles of new things, seen from above."""
 
     def __init__(self, areas: Iterable[tuple[str, BaseGeometry]]):
-        """Collects them.
-
-        Args:
-            areas: names, and areas in the world [m].
-        """
+        """Takes names, and areas in the world [m]."""
         pairs = [(n, area) for n, area in areas if not area.is_empty]
         self._names = np.array([name for name, _ in pairs], object)
         self._areas = [area for _, area in pairs]
@@ -184,26 +165,15 @@ class Obstacles:
     def is_free(
         self, area: BaseGeometry, ignored: Collection[str] = ()
     ) -> bool:
-        """Returns whether an area meets no obstacle.
-
-        Args:
-            area: in the world [m].
-            ignored: names of obstacles that do not count.
-        """
+        """Returns whether an area meets no obstacle but those of some names."""
         return not self._met(area, ignored)
 
     def distance(
         self, area: BaseGeometry, within: BaseGeometry, ignored: Collection[str]
     ) -> float:
-        """Returns the distance of the nearest obstacle from an area [m].
+        """Returns the distance of an area from obstacles within another [m].
 
-        Args:
-            area: in the world [m].
-            within: area to search.
-            ignored: names of obstacles that do not count.
-
-        Returns:
-            The distance to the part of obstacles within; inf for none.
+        It is inf for none. Obstacles of some names do not count.
         """
         return min(
             (
@@ -245,19 +215,10 @@ class Kerb(NamedTuple):
 
 
 class GroundSurface:
-    """The ground below things near a drive.
-
-    Attributes:
-        near: its area [m].
-    """
+    """The ground below things near a drive, within the area `near` [m]."""
 
     def __init__(self, things: Mapping[str, Structure], near: BaseGeometry):
-        """Collects it.
-
-        Args:
-            things: all structures.
-            near: the area to collect [m].
-        """
+        """Takes all structures, and the area [m]."""
         shapely.prepare(near)
         self.near = near
         corners, is_road = [np.zeros((0, 3, 3))], [np.zeros(0, bool)]
@@ -289,12 +250,10 @@ class GroundSurface:
     def heights(
         self, xy: np.ndarray, *, of_road: bool | None = None
     ) -> np.ndarray:
-        """Returns the height of the ground at places; NaN without ground.
+        """Returns the heights of the ground at (N, 2) places; NaN without any.
 
-        Args:
-            xy: (N, 2) places [m].
-            of_road: whether of carriageways, or of all other ground; None: of
-                whichever is higher.
+        They are those of carriageways, or of all other ground; with None, of
+        whichever is higher [m].
         """
         kinds = (False, True) if of_road is None else (of_road,)
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)
@@ -303,9 +262,7 @@ class GroundSurface:
     def lowest(self, area: BaseGeometry, default: float) -> float:
         """Returns the least height at the corners of an area [m].
 
-        Args:
-            area: in the world [m].
-            default: height without ground there [m].
+        It is the default without ground there.
         """
         z = self.heights(shapely.get_coordinates(area))
         z = z[np.isfinite(z)]
@@ -322,8 +279,7 @@ class GroundSurface:
     def kerbs(self, spacing: float) -> Iterator[Kerb]:
         """Yields the edges of the carriageway within the area.
 
-        Args:
-            spacing: distance of their points, at most [m].
+        Their points are at most a spacing apart [m].
         """
         inner = self.near.buffer(-1.0)  # The edge of `near` is no kerb.
         shapely.prepare(inner)
@@ -369,11 +325,6 @@ def draws(seed: int, cause: str, name: str) -> np.random.Generator:
     """Returns the random numbers of one structure for one cause.
 
     They do not depend on other structures or other causes.
-
-    Args:
-        seed: seed of the scenario's section.
-        cause: the switch.
-        name: name of the structure.
     """
     digest = hashlib.sha256(f"{seed}/{cause}/{name}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))

@@ -12,20 +12,19 @@ from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import DriverConfig, TrafficConfig
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.loaded_drive import plan_scenario_traffic
-from cns_drake.traffic.follower import find_runs, make_follower
+from cns_drake.traffic.follower import Follower, find_runs
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
-from cns_drake.traffic.right_of_way import make_permits
-from cns_drake.traffic.streets import EgoBox, make_streets
+from cns_drake.traffic.streets import STEP, EgoBox, make_streets
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
 from cns_drake.traffic.vehicles import (
     CURRENT,
     VEHICLE,
+    begin_traffic,
     find_occupants,
-    make_occupants,
+    make_crossings,
 )
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
-DT = 0.1
 ANGLE = 0.6
 AHEAD = np.array([np.cos(ANGLE), np.sin(ANGLE), 0.0])
 
@@ -49,15 +48,15 @@ class Street:
         )
         path = LanePath(line(10, 620)[::4], 2.0, np.full(306, 14.0))
         self.trajectory = Trajectory(path, Speeds())
-        self.follower = make_follower(graph, self.trajectory, BOX, 0, DT)
+        self.follower = Follower(graph, self.trajectory, BOX, 0)
         far = np.tile((1e4, 0.0), (2, 1))
-        self.streets = make_streets(graph, BOX, far, np.zeros(2), DT)
+        streets = make_streets(graph, BOX, far, np.zeros(2))
         self.cars = np.zeros(2, VEHICLE)
         self.cars["path"], self.cars["held"] = -1, -1
         self.cars["left_lane"] = -1
-        self.cars[1] = self.follower.record(self.streets)[0]
-        self.occupants = make_occupants(3, 2)
-        self.crossings = make_permits(graph).crossings
+        self.cars[1] = self.follower.record(streets)[0]
+        crossings = make_crossings(graph)
+        self.traffic = begin_traffic(streets, self.cars, crossings, 0)
 
     def put(self, s, v):
         """Puts the other vehicle, of 4 m, to a place of the first lane."""
@@ -66,14 +65,8 @@ class Street:
         self.cars[0]["length"] = 4.0
 
     def step(self):
-        find_occupants(self.occupants, self.streets, self.cars, 0)
-        self.follower.step(
-            self.streets,
-            self.cars,
-            self.occupants,
-            self.crossings,
-            len(self.follower.u) - 1,
-        )
+        find_occupants(self.traffic, 0)
+        self.follower.step(self.traffic, len(self.follower.u) - 1)
 
     def drive(self):
         """Returns places at each step, until the car has arrived."""
@@ -91,7 +84,7 @@ def test_keeps_the_equilibrium_gap():
     while s < 290.0:
         street.put(s, v)
         street.step()
-        s += v * DT
+        s += v * STEP
     ego = street.cars[1]
     ratio = v / float(ego["top"])
     expected = (STANDSTILL_GAP + v * ego["headway"]) / np.sqrt(1 - ratio**4)
@@ -188,7 +181,7 @@ def test_changes_to_the_lane_of_its_way_in_time():
     )
     share = np.clip((100.0 - np.arange(0.0, 180.0)) / 4.0 + 0.5, 0.0, 1.0)
     points = line(0, 179)[::2] + share[:, None] * aside
-    runs = find_runs(graph, points[:, :2], 1.0)
+    runs = find_runs(graph, points[:, :2])
     assert [run.piece for run in runs] == [1, 0, 2, 4]
     lane = runs[1]
     assert lane.last == pytest.approx(100.0, abs=1e-6)
@@ -210,13 +203,13 @@ def test_leaves_the_lanes_where_it_drives_away_from_them():
     points = np.concatenate(
         [line(0, 49)[::2, :2], line(50, 50)[0, :2] + s * away]
     )
-    lane, outside = find_runs(graph, points, 1.0)
+    lane, outside = find_runs(graph, points)
     assert (lane.piece, lane.first, lane.s) == (0, 0.0, pytest.approx(0.0))
     assert outside.piece == -1
     # A place is on the lane while its square distance is at most 4 m^2.
     assert lane.last == outside.first == 55.0
     assert outside.last == len(points)
-    (alone,) = find_runs(graph, points[60:], 1.0)
+    (alone,) = find_runs(graph, points[60:])
     assert (alone.piece, alone.beside) == (-1, -1)
 
 
@@ -229,7 +222,7 @@ def test_goes_on_along_many_pieces(aside, is_on):
     ]
     pieces[-1] = Piece(pieces[-1].points, 14.0, True, (0,), junction=0)
     points = line(0, 60)[::2, :2] + aside * np.array([-AHEAD[1], AHEAD[0]])
-    runs = find_runs(LaneGraph(tuple(pieces)), points, 1.0)
+    runs = find_runs(LaneGraph(tuple(pieces)), points)
     assert [run.piece for run in runs] == ([*range(30)] if is_on else [-1])
     for run in runs[1:]:
         assert run.first == pytest.approx(2.0 * run.piece, abs=1e-6)

@@ -8,12 +8,13 @@ from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.streets import EgoBox, make_streets
 from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP
 from cns_drake.traffic.vehicles import (
+    CROSSING,
     CURRENT,
+    begin_traffic,
     change_lanes,
     choose_way,
     find_ahead,
     find_occupants,
-    make_occupants,
     place_vehicles,
     uniform,
 )
@@ -38,7 +39,7 @@ def two_lanes(length=400.0):
     ]  # fmt: skip
     far = np.tile((1e4, 0.0), (12, 1))
     graph = LaneGraph((*lanes, *ways))
-    return make_streets(graph, EgoBox(-1, 3, 1), far, np.zeros(12), 0.1)
+    return make_streets(graph, EgoBox(-1, 3, 1), far, np.zeros(12))
 
 
 STREETS = two_lanes()
@@ -50,14 +51,18 @@ def vehicles(*states):
     return make_vehicles(*states, top=40.0, a=A, b=B, headway=T)
 
 
+def traffic_of(streets, cars, seed=0):
+    return begin_traffic(streets, cars, np.zeros(0, CROSSING), seed)
+
+
 def changes(*states, k=0, **fields):
     """Returns whether the first vehicle changes to the left lane, and all."""
     cars = vehicles(*states)
     for name, value in fields.items():
         cars[name][0] = value
-    occupants = make_occupants(4, len(cars))
-    find_occupants(occupants, STREETS, cars, 0)
-    change_lanes(STREETS, cars, occupants, k)
+    traffic = traffic_of(STREETS, cars)
+    find_occupants(traffic, 0)
+    change_lanes(traffic, k)
     return bool(cars["path"][0, CURRENT] == 1), cars
 
 
@@ -135,13 +140,13 @@ def test_the_ego_car_is_another_one_than_all_vehicles():
     for name, value in zip(names, (0.0, 140.0, 144.0, 3.0), strict=True):
         getattr(streets, name)[0, 0] = value
     cars = vehicles((0, 100.0, V), (0, 110.0, V), (0, 170.0, V))
-    occupants = make_occupants(4, 3)
-    find_occupants(occupants, streets, cars, 0)
-    assert find_ahead(occupants, 0, 110.0, 1) == (30.0, 3.0)
-    assert find_ahead(occupants, 0, 100.0, 0) == (6.0, V)
-    assert find_ahead(occupants, 0, 170.0, 2)[0] == np.inf
+    traffic = traffic_of(streets, cars)
+    find_occupants(traffic, 0)
+    assert find_ahead(traffic, 0, 110.0, 1) == (30.0, 3.0)
+    assert find_ahead(traffic, 0, 100.0, 0) == (6.0, V)
+    assert find_ahead(traffic, 0, 170.0, 2)[0] == np.inf
     # The first of two at one place is ahead.
-    assert find_ahead(occupants, 0, 170.0, 3) == (-4.0, V)
+    assert find_ahead(traffic, 0, 170.0, 3) == (-4.0, V)
 
 
 def test_vehicles_begin_apart_from_each_other_and_from_the_lines():
@@ -191,9 +196,10 @@ def test_of_two_drawn_ways_that_to_the_emptier_lane(others, expected):
     if others != (0,):
         cars = np.append(cars, vehicles((1, 200.0, V)))
         cars["path"][-1, CURRENT + 1 :] = -1
+    traffic = traffic_of(streets, cars, seed=7)
     number, first = 600, 0
     for _ in range(number):
-        choose_way(streets, cars, 0, 7)
+        choose_way(traffic, 0)
         way, beyond = cars["path"][0, CURRENT + 1 : CURRENT + 3]
         assert way == beyond + 2
         first += way == 2

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, make_crossing
-from cns_drake.traffic.right_of_way import grant_ways, make_permits
-from cns_drake.traffic.streets import MERGE, SPLIT, EgoBox, make_streets
+from cns_drake.traffic.right_of_way import grant_ways
+from cns_drake.traffic.streets import MERGE, SPLIT, STEP, EgoBox, make_streets
 from cns_drake.traffic.vehicles import (
     CURRENT,
     accelerations,
     advance,
+    begin_traffic,
     find_occupants,
     find_prior,
-    make_occupants,
+    make_crossings,
 )
 
-DT = 0.1
 C, S = np.cos(0.4), np.sin(0.4)
 R = np.array([[C, -S, 0.0], [S, C, 0.0], [0.0, 0.0, 1.0]])
 
@@ -69,9 +69,7 @@ def junction(phases=(-1, -1), walkers=False):
         crossings = [make_crossing(ends, 2.4)]
     graph = LaneGraph(tuple(pieces), tuple(crossings))
     far = np.tile((1e4, 0.0), (1200, 1))
-    streets = make_streets(
-        graph, EgoBox(-1.0, 3.0, 1.0), far, np.zeros(1200), DT
-    )
+    streets = make_streets(graph, EgoBox(-1.0, 3.0, 1.0), far, np.zeros(1200))
     return graph, streets
 
 
@@ -82,40 +80,42 @@ def vehicles(*states):
     )
 
 
+def traffic_of(graph, streets, cars):
+    return begin_traffic(streets, cars, make_crossings(graph), 1)
+
+
 def on_way(cars, i, way, s, order):
     cars["path"][i, CURRENT - 1 : CURRENT + 2] = way - 1, way, way + 1
     cars["s"][i], cars["held"][i], cars["order"][i] = s, way, order
 
 
 def test_later_ones_wait_for_earlier_ones_alone():
-    _, streets = junction()
     cars = vehicles((0, 0, 0), (3, 0, 0))
-    none = np.zeros(0, make_permits(LaneGraph(())).crossings.dtype)
+    traffic = traffic_of(*junction(), cars)
     on_way(cars, 0, 1, 5.0, 7)
     on_way(cars, 1, 4, 8.0, 8)
     # The strips are 2.26 m wide, with 0.25 m beside them.
     before = 20.0 - 2.26 / 2 - 0.25
-    stop, gap, _ = find_prior(streets, cars, none, 1)
+    stop, gap, _ = find_prior(traffic, 1)
     assert before - 8.0 - 1.01 <= stop <= before - 8.0
     assert gap == np.inf
-    assert find_prior(streets, cars, none, 0)[:2] == (np.inf, np.inf)
+    assert find_prior(traffic, 0)[:2] == (np.inf, np.inf)
     cars["order"] = 8, 7
-    assert find_prior(streets, cars, none, 1)[:2] == (np.inf, np.inf)
+    assert find_prior(traffic, 1)[:2] == (np.inf, np.inf)
     # Once the rear of the first has passed, the second goes on.
     cars["order"] = 7, 8
     for rear, waits in ((21.0, True), (22.6, False)):
         cars["s"][0] = rear + 4.0
-        assert np.isfinite(find_prior(streets, cars, none, 1)[0]) == waits
+        assert np.isfinite(find_prior(traffic, 1)[0]) == waits
 
 
 @pytest.mark.parametrize("order", [3, 9])
 def test_vehicles_wait_for_walkers_who_asked_before(order):
-    graph, streets = junction(walkers=True)
-    permits = make_permits(graph)
-    permits.crossings["order"] = order
     cars = vehicles((0, 0, 0))
+    traffic = traffic_of(*junction(walkers=True), cars)
+    traffic.crossings["order"] = order
     on_way(cars, 0, 1, 12.0, 5)
-    stop, *_ = find_prior(streets, cars, permits.crossings, 0)
+    stop, *_ = find_prior(traffic, 0)
     if order == 3:
         # The crossing begins at 28.8 m.
         assert 28.8 - 12.0 - 1.01 <= stop <= 28.8 - 12.0
@@ -145,7 +145,7 @@ def test_follows_on_ways_from_one_lane_and_to_one():
         if kind == SPLIT:
             pieces[0] = Piece(lanes[0] @ R.T, 9.0, False, (1, 2), junction=0)
         graph = LaneGraph(tuple(pieces))
-        streets = make_streets(graph, box, far, np.zeros(2), DT)
+        streets = make_streets(graph, box, far, np.zeros(2))
         assert streets.joint[0, 1, 2] == streets.joint[0, 2, 1] == kind
         cars = vehicles((0, 0, 0), (0, 0, 0))
         cars["path"] = -1
@@ -154,8 +154,8 @@ def test_follows_on_ways_from_one_lane_and_to_one():
         for i, s in enumerate(places):
             cars["path"][i, CURRENT], cars["s"][i] = 1 + i, s
             cars["held"][i], cars["order"][i], cars["v"][i] = 1 + i, i, 6.0 - i
-        none = np.zeros(0, make_permits(LaneGraph(())).crossings.dtype)
-        stop, gap, speed = find_prior(streets, cars, none, 1)
+        traffic = traffic_of(graph, streets, cars)
+        stop, gap, speed = find_prior(traffic, 1)
         assert stop == np.inf
         assert gap == pytest.approx(1.0, abs=0.01)
         assert speed == 6.0
@@ -164,16 +164,15 @@ def test_follows_on_ways_from_one_lane_and_to_one():
 def drive(phases, states, steps=600, walkers=False):
     """Returns places and speeds (T, N) along the way of vehicles."""
     graph, streets = junction(phases, walkers)
-    cars, permits = vehicles(*states), make_permits(graph)
-    occupants = make_occupants(len(graph.pieces), len(cars))
+    cars = vehicles(*states)
+    traffic = traffic_of(graph, streets, cars)
     along = {0: -100.0, 1: 0.0, 2: 40.0, 3: -100.0, 4: 0.0, 5: 40.0}
     places = []
     for k in range(steps):
         places.append([along[c["path"][CURRENT]] + c["s"] for c in cars])
-        find_occupants(occupants, streets, cars, k)
-        grant_ways(streets, cars, occupants, permits, k, DT, 1)
-        wanted = accelerations(streets, cars, occupants, permits.crossings)
-        advance(streets, cars, wanted, DT, 1)
+        find_occupants(traffic, k)
+        grant_ways(traffic, k)
+        advance(traffic, accelerations(traffic))
     return SimpleNamespace(s=np.array(places), cars=cars)
 
 
@@ -186,10 +185,10 @@ def test_two_who_cross_never_are_there_together():
 
 def test_every_driver_stops_where_there_is_no_signal():
     found = drive((-1, -1), ((0, 40.0, 9.0),), 300)
-    speed = np.diff(found.s[:, 0]) / DT
+    speed = np.diff(found.s[:, 0]) / STEP
     stands = np.flatnonzero(speed < 0.5)
     # For 3 s, and the time of slowing down and starting.
-    assert 3.0 <= len(stands) * DT < 5.0
+    assert 3.0 <= len(stands) * STEP < 5.0
     assert (np.abs(found.s[stands, 0] + 1.0) < 3.0).all()
     assert found.s[-1, 0] > 60.0
 
@@ -197,12 +196,12 @@ def test_every_driver_stops_where_there_is_no_signal():
 def test_red_holds_vehicles_while_others_have_green():
     """Green is from 0 to 26 s and from 30 to 56 s; one of each at 20 m."""
     found = drive((0, 1), ((0, 80.0, 9.0), (3, 80.0, 9.0)))
-    entered = (found.s > 0.0).argmax(axis=0) * DT
+    entered = (found.s > 0.0).argmax(axis=0) * STEP
     assert entered[0] < 5.0
     assert 30.0 < entered[1] < 33.0
     queue = tuple((0, 98.0 - 7.0 * k, 0.0) for k in range(14))
     found = drive((0, 1), ((3, 98.0, 0.0), *queue))
-    entered = (found.s > 0.0).argmax(axis=0) * DT
+    entered = (found.s > 0.0).argmax(axis=0) * STEP
     assert 30.0 < entered[0] < 33.0
     # Real columns: at first 3 s from vehicle to vehicle, soon 2 to 2.5 s.
     headways = np.diff(entered[1:])
@@ -214,13 +213,12 @@ def test_red_holds_vehicles_while_others_have_green():
 
 @pytest.mark.parametrize(("v", "loses"), [(0.0, True), (5.0, False)])
 def test_who_stands_behind_another_loses_the_permit(v, loses):
-    graph, streets = junction()
     cars = vehicles((0, 80.0, v), (0, 99.0, 0.0))
+    traffic = traffic_of(*junction(), cars)
     cars["granted"][0], cars["held"][0] = True, 1
     cars["since"][1] = 0.0
-    permits, occupants = make_permits(graph), make_occupants(6, 2)
-    find_occupants(occupants, streets, cars, 1)
-    grant_ways(streets, cars, occupants, permits, 1, DT, 1)
+    find_occupants(traffic, 1)
+    grant_ways(traffic, 1)
     assert cars["granted"].tolist() == [not loses, False]
     assert cars["held"].tolist() == [-1 if loses else 1, -1]
 
@@ -229,23 +227,21 @@ def test_who_stands_behind_another_loses_the_permit(v, loses):
 @pytest.mark.parametrize("lane", [0, 3])
 def test_a_car_in_two_lanes_asks_as_the_first_in_both(other, lane):
     """The ego car stands 2 m before the line, in lanes of 100 m."""
-    graph, streets = junction((0, 0))
     cars = vehicles((lane, other, 0.0), (0, 98.0, 0.0))
+    traffic = traffic_of(*junction((0, 0)), cars)
     cars["guided"][1], cars["left_lane"][1] = True, 3
-    permits, occupants = make_permits(graph), make_occupants(6, 2)
-    find_occupants(occupants, streets, cars, 1)
-    grant_ways(streets, cars, occupants, permits, 1, DT, 1)
+    find_occupants(traffic, 1)
+    grant_ways(traffic, 1)
     is_ahead = other > 98.0
     assert cars["granted"].tolist() == [is_ahead, not is_ahead]
 
 
 def granted(graph, streets, cars, t):
     """Returns who has a permit after the first step at a time [s]."""
-    permits = make_permits(graph)
-    occupants = make_occupants(len(graph.pieces), len(cars))
-    k = round(t / DT)
-    find_occupants(occupants, streets, cars, k)
-    grant_ways(streets, cars, occupants, permits, k, DT, 1)
+    traffic = traffic_of(graph, streets, cars)
+    k = round(t / STEP)
+    find_occupants(traffic, k)
+    grant_ways(traffic, k)
     return cars["granted"].tolist()
 
 
@@ -267,7 +263,7 @@ def test_nobody_enters_without_room_behind_the_way(v, comes, more):
     is_granted = granted(graph, streets, cars, 5.0)[0]
     assert is_granted == (more > 0)
     # Otherwise it looks for another way after some time.
-    assert cars["refused"][0] == (0.0 if is_granted else DT)
+    assert cars["refused"][0] == (0.0 if is_granted else STEP)
 
 
 @pytest.mark.parametrize(("t", "waits"), [(24.9, False), (25.1, True)])
@@ -278,9 +274,7 @@ def test_room_is_kept_for_the_ego_car_after_a_long_wait(t, waits):
     pieces[4] = replace(pieces[4], after=(2,))
     far = np.tile((1e4, 0.0), (300, 1))
     graph = LaneGraph(tuple(pieces))
-    streets = make_streets(
-        graph, EgoBox(-1.0, 3.0, 1.0), far, np.zeros(300), DT
-    )
+    streets = make_streets(graph, EgoBox(-1.0, 3.0, 1.0), far, np.zeros(300))
     cars = vehicles((3, 99.0, 0.0), (2, 10.0, 0.0), (0, 99.0, 0.0))
     cars["path"][0, CURRENT + 2] = 2
     cars["length"], cars["since"] = (2.0, 4.0, 10.0), (6.0, np.inf, 5.0)

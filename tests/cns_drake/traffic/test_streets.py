@@ -6,6 +6,7 @@ import shapely
 
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, make_crossing
 from cns_drake.traffic.streets import (
+    STEP,
     EgoBox,
     find_conflicts,
     is_ego_far,
@@ -17,7 +18,7 @@ from cns_drake.traffic.streets import (
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 
 BOX = EgoBox(-1.0, 3.0, 1.1)
-ANGLE, DT = 0.4, 0.1
+ANGLE = 0.4
 AHEAD = np.array([np.cos(ANGLE), np.sin(ANGLE)])
 LEFT = np.array([-AHEAD[1], AHEAD[0]])
 
@@ -55,10 +56,10 @@ def drive(sign=1, aside=0.0):
     They are those of its frame, from 20 m before the lanes to 10 m before
     their end.
     """
-    s = -20.0 + 8.0 * DT * np.arange(288)
+    s = -20.0 + 8.0 * STEP * np.arange(288)
     yaw = np.full(len(s), ANGLE + np.pi * (sign < 0))
     s = s[::sign]
-    return make_streets(GRAPH, BOX, place(s, aside), yaw, DT), s
+    return make_streets(GRAPH, BOX, place(s, aside), yaw), s
 
 
 def test_the_outline_of_the_ego_car():
@@ -92,7 +93,7 @@ def test_when_the_ego_car_is_on_a_lane(sign):
         here = (high >= begin) & (low <= end)
         np.testing.assert_array_equal(until == 0.0, here)
         first, last = np.flatnonzero(here)[[0, -1]]
-        expected = DT * (first - np.arange(first))
+        expected = STEP * (first - np.arange(first))
         np.testing.assert_allclose(until[:first], expected, rtol=1e-5)
         assert np.isinf(until[last + 1 :]).all()
         if column < 3:
@@ -119,7 +120,7 @@ def test_vehicles_leave_a_lane_before_the_ego_car_is_there():
     """At 0.6 of the limit of 10 m/s, and with a wait at the lane's end."""
     streets, s = drive()
     # Lane 2 begins at 120 m.
-    until = np.flatnonzero(s + 3.0 >= 120.0)[0] * DT
+    until = np.flatnonzero(s + 3.0 >= 120.0)[0] * STEP
     for wait in (5.0, 10.0):
         s_free = LENGTH - 6.0 * (until - wait)
         for beyond in (-0.01, 0.01):
@@ -161,7 +162,7 @@ def test_vehicles_brake_before_a_bend(radius, speed):
     xy = xy @ np.array([AHEAD, LEFT])
     lane = Piece(np.column_stack([xy, 0 * xy[:, 0]]), 14.0, False, (0,))
     far = np.tile((1e4, 0.0), (2, 1))
-    streets = make_streets(LaneGraph((lane,)), BOX, far, np.zeros(2), DT)
+    streets = make_streets(LaneGraph((lane,)), BOX, far, np.zeros(2))
     middle = 60.0 + 0.5 * np.pi * radius
     assert speed_on(streets, 0, middle) == pytest.approx(speed, rel=0.01)
     # Before it, 1.5 m/s^2; all of a chord of 2 m is then in the bend.

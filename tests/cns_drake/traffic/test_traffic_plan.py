@@ -21,12 +21,11 @@ from cns_drake.traffic.lane_graph import (
     kept_clear,
     make_crossing,
 )
-from cns_drake.traffic.right_of_way import make_permits
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox, find_conflicts
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
-from cns_drake.traffic.vehicles import room_for_vehicles
+from cns_drake.traffic.vehicles import make_crossings, room_for_vehicles
 from cns_drake.traffic.walkers import Crowd
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
@@ -495,14 +494,14 @@ def test_who_waits_lets_others_off_a_crossing(apart, turns):
     y = np.arange(8.0, -0.1, -0.5)
     walk = Walkway(np.column_stack([0 * y, y, 0 * y]), 0.8, 2, 0)
     graph = LaneGraph((), (make_crossing(crossing.points[[0, -1]], 1.6),))
-    permits = make_permits(graph)
-    permits.users[0] = 1
-    crowd = Crowd(2, [walk, crossing], permits, np.random.default_rng(1))
+    crossings = make_crossings(graph)
+    crossings["users"] = 1
+    crowd = Crowd(2, [walk, crossing], crossings, np.random.default_rng(1))
     walkers = crowd.walkers
     walkers["speed"], walkers["velocity"] = 0.1, 0.0
     walkers["xy"] = (apart, 0.5), (0.0, 0.5)
     walkers["path"], walkers["stuck"] = (3, 0), (4.0, 0.0)
     walkers["at"] = 28 - 3, len(y) - 2
     walkers["next_path"] = -1, 2
-    crowd.step(1.0, 0.1, 1)
+    crowd.step(1.0, 1)
     assert walkers["path"].tolist() == [2, 1 if turns else 0]

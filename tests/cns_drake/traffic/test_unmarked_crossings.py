@@ -15,20 +15,20 @@ from cns_drake.traffic.lane_graph import (
     make_crossing,
     with_unmarked_crossings,
 )
-from cns_drake.traffic.right_of_way import grant_ways, make_permits
+from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox, make_streets
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
 from cns_drake.traffic.vehicles import (
     accelerations,
     advance,
+    begin_traffic,
     find_occupants,
     find_prior,
-    make_occupants,
+    make_crossings,
 )
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
-DT = 0.1
 TURN = 0.4
 C, S = np.cos(TURN), np.sin(TURN)
 R = np.array([[C, -S, 0.0], [S, C, 0.0], [0.0, 0.0, 1.0]])
@@ -130,8 +130,8 @@ def vehicles(*states):
     return make_vehicles(*(((0, 1), s, v) for s, v in states))
 
 
-def lane_with_crossing(marked=False, ego=1e4):
-    """A lane of 200 m, with a crossing of 2.4 m width at its 100 m."""
+def lane_with_crossing(cars, marked=False, ego=1e4):
+    """Traffic on 200 m, with a crossing of 2.4 m width at their 100 m."""
     pieces = (
         Piece(turned((0, 0, 0), (200, 0, 0)), 10.0, False, (1,)),
         Piece(turned((200, 0, 0), (240, 0, 0)), 10.0, True, (0,)),
@@ -140,9 +140,8 @@ def lane_with_crossing(marked=False, ego=1e4):
     graph = LaneGraph(pieces, (make_crossing(line, 2.4, marked),))
     # The ego car stands there.
     xy = np.tile((np.array([ego, 1.0, 0.0]) @ R.T)[:2], (1200, 1))
-    streets = make_streets(graph, BOX, xy, np.full(1200, TURN), DT)
-    permits = make_permits(graph)
-    return streets, permits
+    streets = make_streets(graph, BOX, xy, np.full(1200, TURN))
+    return begin_traffic(streets, cars, make_crossings(graph), 1)
 
 
 @pytest.mark.parametrize(
@@ -162,15 +161,14 @@ def lane_with_crossing(marked=False, ego=1e4):
     ],
 )
 def test_walkers_begin_in_a_gap(s, v, opens):
-    streets, permits = lane_with_crossing()
-    cars, occupants = vehicles((s, v)), make_occupants(2, 1)
-    permits.crossings["waits"] = 0.0
-    find_occupants(occupants, streets, cars, 1)
-    grant_ways(streets, cars, occupants, permits, 1, DT, 1)
-    assert permits.crossings["is_open"].tolist() == [opens]
-    assert permits.users.tolist() == [opens]
+    traffic = lane_with_crossing(vehicles((s, v)))
+    traffic.crossings["waits"] = 0.0
+    find_occupants(traffic, 1)
+    grant_ways(traffic, 1)
+    assert traffic.crossings["is_open"].tolist() == [opens]
+    assert traffic.crossings["users"].tolist() == [opens]
     # No vehicle waits for walkers who wait.
-    stop, *_ = find_prior(streets, cars, permits.crossings, 0)
+    stop, *_ = find_prior(traffic, 0)
     if opens and s < 98.8:
         assert stop == pytest.approx(98.8 - s, abs=1e-6)
     else:
@@ -179,35 +177,33 @@ def test_walkers_begin_in_a_gap(s, v, opens):
 
 def test_no_walker_begins_where_the_ego_car_is():
     for ego, opens in ((100.0, False), (120.0, True)):
-        streets, permits = lane_with_crossing(ego=ego)
-        cars, occupants = vehicles((10.0, 0.0)), make_occupants(2, 1)
-        permits.crossings["waits"] = 0.0
-        grant_ways(streets, cars, occupants, permits, 1, DT, 1)
-        assert permits.crossings["is_open"].tolist() == [opens]
+        traffic = lane_with_crossing(vehicles((10.0, 0.0)), ego=ego)
+        traffic.crossings["waits"] = 0.0
+        grant_ways(traffic, 1)
+        assert traffic.crossings["is_open"].tolist() == [opens]
 
 
 def test_drivers_stop_for_walkers_on_the_lane():
     """From the smallest gap at all speeds, with comfort."""
-    streets, permits = lane_with_crossing()
     for v in (2.0, 6.0, 10.0):
         gap = 6.0 * v if v > 2.0 else 12.0
         cars = vehicles((98.8 - gap, v))
-        occupants = make_occupants(2, 1)
-        permits.crossings["order"] = 1
+        traffic = lane_with_crossing(cars)
+        crossings = traffic.crossings
+        crossings["order"] = 1
         hardest = 0.0
         for k in range(400):
-            find_occupants(occupants, streets, cars, k)
-            wanted = accelerations(streets, cars, occupants, permits.crossings)
+            find_occupants(traffic, k)
+            wanted = accelerations(traffic)
             hardest = min(hardest, wanted.min())
-            advance(streets, cars, wanted, DT, 1)
+            advance(traffic, wanted)
         assert -3.2 <= hardest < -0.5
         assert 97.0 < cars["s"][0] < 98.8
         # Behind walkers who have passed them, they go on.
-        crossings = permits.crossings.copy()
         crossings["to_end"], crossings["to_start"] = 8.1, -np.inf
-        assert find_prior(streets, cars, crossings, 0)[0] == np.inf
+        assert find_prior(traffic, 0)[0] == np.inf
         crossings["to_end"] = 7.9
-        assert find_prior(streets, cars, crossings, 0)[0] < 2.0
+        assert find_prior(traffic, 0)[0] < 2.0
 
 
 def far(t):

@@ -7,10 +7,10 @@ import pytest
 import shapely
 
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway, make_crossing
-from cns_drake.traffic.right_of_way import make_permits
+from cns_drake.traffic.streets import STEP
+from cns_drake.traffic.vehicles import make_crossings
 from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
 
-DT = 0.1
 # Where all walkways begin [m].
 ORIGIN = np.array([4.0, -2.0])
 
@@ -30,9 +30,9 @@ class Street:
         self.right = np.array([self.ahead[1], -self.ahead[0]])
         way = straight(angle, half_width)
         way = replace(way, narrow=np.full(len(way.points), narrow))
-        permits = make_permits(LaneGraph(()))
+        crossings = make_crossings(LaneGraph(()))
         rng = np.random.default_rng(1)
-        self.crowd = Crowd(len(places), [way], permits, rng)
+        self.crowd = Crowd(len(places), [way], crossings, rng)
         self.walkers = self.crowd.walkers
         walkers = self.walkers
         assert len(walkers) == len(places)
@@ -51,7 +51,7 @@ class Street:
         return xy @ self.ahead, xy @ self.right
 
     def step(self):
-        self.crowd.step(0.0, DT, 1)
+        self.crowd.step(0.0, 1)
 
 
 ANGLES = pytest.mark.parametrize("angle", [0.7, np.pi / 2, -2.0])
@@ -69,12 +69,12 @@ def test_a_walker_alone_relaxes_to_its_speed(angle):
         speed = 1.0 - 0.8**k
         velocity = street.walkers["velocity"][0]
         np.testing.assert_allclose(velocity, speed * street.ahead, atol=1e-9)
-        s += 0.5 * (before + speed) * DT
+        s += 0.5 * (before + speed) * STEP
         along, aside = street.place()
         assert along[0] == pytest.approx(s)
         assert aside[0] == pytest.approx(0.0, abs=1e-9)
         # A stride of 0.7 s of its walk and 0.4 m.
-        phase += 2 * np.pi * speed * DT / (0.7 * speed + 0.4)
+        phase += 2 * np.pi * speed * STEP / (0.7 * speed + 0.4)
         assert street.walkers["phase"][0] == pytest.approx(phase)
         x, y, z, yaw, _ = street.crowd.poses(street.walkers)[0]
         np.testing.assert_allclose([x, y], street.walkers["xy"][0])
@@ -91,7 +91,7 @@ def test_walkers_keep_away_from_each_other(angle, apart):
     # Each goes straight on.
     street.walkers["aside"] = -apart / 6, apart / 6
     street.step()
-    push = 7.0 * np.exp(-(apart - 0.95) / 0.3) * DT
+    push = 7.0 * np.exp(-(apart - 0.95) / 0.3) * STEP
     change = street.walkers["velocity"] - street.ahead
     across, along = change @ street.right, change @ street.ahead
     np.testing.assert_allclose(across, [-push, push], rtol=0.05)
@@ -109,8 +109,8 @@ def test_walkers_turn_slowly_and_speed_up_within_bounds():
         before = street.walkers["velocity"][0].copy()
         street.step()
         change = np.linalg.norm(street.walkers["velocity"][0] - before)
-        assert change == pytest.approx(2.5 * DT)
-        yaw -= 2.5 * DT
+        assert change == pytest.approx(2.5 * STEP)
+        yaw -= 2.5 * STEP
         assert street.walkers["yaw"][0] == pytest.approx(yaw)
     for _ in range(20):
         street.step()
@@ -199,15 +199,15 @@ def test_a_walker_goes_round_a_corner_without_a_stop(angle):
         [s * ahead, (8.0 * ahead + bend)[1:-1], 11.0 * ahead + (3.0 + s) * left]
     )
     way = Walkway(np.column_stack([xy, 0 * xy[:, 0]]), 0.5, 0, 1)
-    permits = make_permits(LaneGraph(()))
-    crowd = Crowd(1, [way], permits, np.random.default_rng(1))
+    crossings = make_crossings(LaneGraph(()))
+    crowd = Crowd(1, [way], crossings, np.random.default_rng(1))
     walkers = crowd.walkers
     walkers["path"], walkers["at"], walkers["xy"] = 0, 4, 2.0 * ahead
     walkers["velocity"], walkers["speed"], walkers["aside"] = ahead, 1.0, 0.0
     walkers["yaw"] = angle
     line = shapely.LineString(xy)
     for _ in range(150):
-        crowd.step(0.0, DT, 1)
+        crowd.step(0.0, 1)
         place = shapely.Point(walkers["xy"][0])
         assert line.distance(place) < 0.5
         assert np.linalg.norm(walkers["velocity"][0]) > 0.5
@@ -223,23 +223,23 @@ def test_few_walkers_cross_and_none_goes_back():
     ]
     line = ways[2].points[[0, -1]]
     graph = LaneGraph((), (make_crossing(line, 1.6),))
-    permits = make_permits(graph)
-    crowd = Crowd(1, ways[:2], permits, np.random.default_rng(2))
-    crowd = Crowd(1, ways, permits, np.random.default_rng(2))
+    crossings = make_crossings(graph)
+    crowd = Crowd(1, ways[:2], crossings, np.random.default_rng(2))
+    crowd = Crowd(1, ways, crossings, np.random.default_rng(2))
     walkers, number, crosses = crowd.walkers, 500, 0
     for seed in range(number):
         walkers["path"], walkers["at"], walkers["next_path"] = 0, 118, -1
         walkers["xy"], walkers["velocity"] = (4.0 + 59.9, -2.0), 0.0
-        crowd.step(3.0, DT, seed)
+        crowd.step(3.0, seed)
         path, after = walkers["path"][0], walkers["next_path"][0]
         if after == 4:
             # It waits for the crossing.
             assert path == 0
-            assert permits.crossings["waits"][0] == 3.0
+            assert crossings["waits"][0] == 3.0
             crosses += 1
         else:
             assert (path, after) == (2, -1)
-            assert np.isinf(permits.crossings["waits"][0])
+            assert np.isinf(crossings["waits"][0])
     assert abs(crosses - 0.2 * number) < 4 * np.sqrt(0.16 * number)
 
 
@@ -247,12 +247,12 @@ def test_walkers_use_a_crossing_that_is_open():
     """Vehicles may pass behind those who walk away from them."""
     over = straight(0.5, 0.8, 12.0, start=1, end=2, crossing=0)
     graph = LaneGraph((), (make_crossing(over.points[[0, -1]], 1.6),))
-    permits = make_permits(graph)
+    crossings = make_crossings(graph)
     ways = [straight(0.5), over]
-    crowd = Crowd(3, ways, permits, np.random.default_rng(2))
+    crowd = Crowd(3, ways, crossings, np.random.default_rng(2))
     walkers, ahead = crowd.walkers, np.array([np.cos(0.5), np.sin(0.5)])
-    permits.users[0] = 3
-    permits.crossings["is_open"] = True
+    crossings["users"] = 3
+    crossings["is_open"] = True
     for one, (s, path) in zip(
         walkers, ((4.0, 2), (6.0, 2), (9.0, 3)), strict=True
     ):
@@ -262,23 +262,23 @@ def test_walkers_use_a_crossing_that_is_open():
         one["yaw"] = 0.5 + np.pi * (path == 3)
     walkers["xy"][2] += 0.7 * np.array([-ahead[1], ahead[0]])
     walkers["speed"], walkers["aside"] = 1.0, 0.0
-    crowd.step(50.0, DT, 1)
+    crowd.step(50.0, 1)
     place = (walkers["xy"] - ORIGIN) @ ahead
-    one = permits.crossings[0]
+    one = crossings[0]
     assert one["to_end"] == pytest.approx(place[0])
     assert one["to_start"] == pytest.approx(place[2])
     # Others may follow while it is being opened.
     one["opened"] = 49.9
-    crowd.step(50.0, DT, 1)
+    crowd.step(50.0, 1)
     assert (one["to_end"], one["to_start"]) == (-np.inf, np.inf)
 
 
 def test_first_places_and_groups():
     """A third of walkers is in groups, of two who are 1.5 m apart."""
     ways = [straight(a, 1.0, 400.0) for a in (0.3, 1.2, 2.1, -0.7, -1.6)]
-    permits = make_permits(LaneGraph(()))
+    crossings = make_crossings(LaneGraph(()))
     rng = np.random.default_rng(4)
-    walkers = Crowd(300, ways, permits, rng).walkers
+    walkers = Crowd(300, ways, crossings, rng).walkers
     assert len(walkers) == 300
     apart = np.linalg.norm(walkers["xy"][:, None] - walkers["xy"], axis=2)
     np.fill_diagonal(apart, np.inf)
