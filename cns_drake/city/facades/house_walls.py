@@ -277,25 +277,25 @@ class Openings:
             reach: reach of awnings out of the wall [m].
         """
         wall = self._wing.wall(edge)
-        head, rng = round(height - 1.15, 2), out.rng
+        head = round(height - 1.15, 2)
         for a, b in bays.stretches(end - start, width, 0.1):
             x0, x1 = round(start + a, 2), round(start + b, 2)
             if x1 - x0 < 2.4:
                 continue
             shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
-            if rng.random() < 0.5:
+            if out.chance(0.5):
                 shop = _reversed(shop)
             self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
-            z, tall = head + 0.08, round(float(rng.uniform(0.55, 0.8)), 2)
+            z, tall = head + 0.08, out.uniform(0.55, 0.8, 2)
             fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
             out.add_to("sign", fascia)
-            if rng.random() < awnings:
+            if out.chance(awnings):
                 shade = details.awning(
                     x0 + 0.3, x1 - 0.3, reach, max(2.4, head - 0.8), head + 0.05
                 )
                 out.add_to("awning", wall.place(shade))
-            if rng.random() < 0.4:
-                x = x0 + 0.25 if rng.random() < 0.5 else x1 - 0.25
+            if out.chance(0.4):
+                x = x0 + 0.25 if out.chance(0.5) else x1 - 0.25
                 # Blades hang above heads, like awnings.
                 z = max(2.4, head + 0.1)
                 blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
