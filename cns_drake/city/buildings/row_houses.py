@@ -2,6 +2,7 @@
 
 import copy
 import math
+from typing import Any
 
 import numpy as np
 
@@ -281,7 +282,7 @@ class Terrace(Building):
 
         It gathers what it is made of where the terrace does.
         """
-        house = copy.copy(self)
+        house: Any = copy.copy(self)
         if self.chance(self.crossed) and k > 0:
             house.roof = "front"
         house.bay = self.house_bay if self.chance(self.bays) else "none"

@@ -8,7 +8,6 @@ points, `across` rising. The roof lies along x, its line in y, unless
 from collections.abc import Sequence
 import itertools
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,21 +15,12 @@ from shapely.geometry import Point, Polygon
 
 from cns_drake.city.facades import bays, massing
 from cns_drake.city.facades.assembly import Assembly, Rgb
+from cns_drake.city.facades.walls import Patch
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]
 # Gables reach this far into the roof above them, lest rays slip between [m].
 _INTO_ROOF = 0.03
-
-
-class Hole(NamedTuple):
-    """A window in a gable: in wall coordinates, `depth` inwards [m]."""
-
-    x0: float
-    x1: float
-    z0: float
-    z1: float
-    depth: float
 
 
 def gable_line(
@@ -118,7 +108,7 @@ def shell(
 
 
 def gable_wall(
-    line: Line, a: float, b: float, z: float, holes: Sequence[Hole] = ()
+    line: Line, a: float, b: float, z: float, holes: Sequence[Patch] = ()
 ) -> Mesh:
     """Returns the wall between z and a roof line, in wall coordinates.
 
@@ -130,7 +120,7 @@ def gable_wall(
     """
     bounds = {a, b, *(u for u, _ in line if a < u < b)}
     bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
-    faces = _Faces()
+    faces = massing.Faces()
 
     def top(x: float) -> float:
         height = line_height(line, x)
@@ -153,32 +143,13 @@ def gable_wall(
     return faces.mesh()
 
 
-def gable_glass(holes: Sequence[Hole]) -> Mesh:
+def gable_glass(holes: Sequence[Patch]) -> Mesh:
     """Returns the panes of a gable wall's windows, in wall coordinates."""
-    faces = _Faces()
+    faces = massing.Faces()
     for h in holes:
         low, high = (h.x0, -h.depth, h.z0), (h.x1, -h.depth, h.z1)
         faces.add(low, (h.x0, -h.depth, h.z1), high, (h.x1, -h.depth, h.z0))
     return faces.mesh()
-
-
-class _Faces:
-    """Collects faces by their corners and drops those without area."""
-
-    def __init__(self) -> None:
-        self._vertices: list[tuple[float, float, float]] = []
-        self._faces: list[tuple[int, ...]] = []
-
-    def add(self, *corners: tuple[float, float, float]) -> None:
-        kept = [c for k, c in enumerate(corners) if c != corners[k - 1]]
-        if len(kept) > 2:
-            first = len(self._vertices)
-            self._faces.append(tuple(range(first, first + len(kept))))
-            self._vertices.extend(kept)
-
-    def mesh(self) -> Mesh:
-        vertices = np.array(self._vertices, dtype=float).reshape(-1, 3)
-        return Mesh(vertices, tuple(self._faces))
 
 
 def hip(
@@ -241,16 +212,9 @@ def add_chimney(
     yaw: float = 0.0,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Stands a shared chimney on a pitched roof.
+    """Stands a shared `chimney` or `chimney_row` on a pitched roof.
 
-    Args:
-        out: the building.
-        part: name of the visual.
-        xyz: xyz of its foot, below the roof's surface [m].
-        rgb: its colour.
-        item: `chimney` or `chimney_row`.
-        yaw: its heading [rad].
-        scale: along its axes.
+    Its foot is at `xyz`, below the roof's surface [m].
     """
     out.place(part, out.shared(f"roof_{item}", scale), xyz, yaw, rgb=rgb)
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 import itertools
 import math
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -54,14 +55,8 @@ class Lot:
         return placed(self.footprint, (self.x, self.y), self.yaw)
 
 
-@dataclass(frozen=True)
-class Station:
-    """A place on a line: position, and the heading of the line there.
-
-    Attributes:
-        x, y: position in W [m].
-        yaw: heading of the line [rad].
-    """
+class Station(NamedTuple):
+    """A place on a line in W [m], and the heading of the line there [rad]."""
 
     x: float
     y: float
