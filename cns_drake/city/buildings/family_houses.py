@@ -22,11 +22,7 @@ def storeys_for(
 ) -> int:
     """Returns the storeys that bring a roof over `span` closest to a pitch.
 
-    Args:
-        height: height of the ridge [m].
-        floor: height of the ground floor [m].
-        span: span of the roof [m].
-        pitch_deg: wanted.
+    The ridge is at `height`, the ground floor at `floor` [m].
     """
     wanted = wings.ridge_rise(span, pitch_deg)
     room = height - ROOF_M - floor - 0.15
@@ -67,13 +63,7 @@ def close_box(
 ) -> None:
     """Adds the walls and the roof around a box's openings.
 
-    Args:
-        out: where to.
-        wing: the box.
-        openings: its windows and doors.
-        plinth: height of the foundation that shows [m].
-        casing: style of the windows' frames on `edges`.
-        edges: walls with framed windows.
+    A `plinth` of the foundation shows [m]; windows on `edges` have a casing.
     """
     openings.add_casings(out, edges, casing)
     bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()

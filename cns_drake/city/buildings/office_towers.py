@@ -84,11 +84,7 @@ def _add_garden(
 ) -> float:
     """Adds an open floor: columns around a smaller glazed core.
 
-    Args:
-        plan: outline of the floor.
-        inner: the smallest outline of the storeys above.
-        z0, height: those of the floor [m].
-        number: number of the garden.
+    It ends at `plan`; `inner` is the smallest outline of the storeys above.
     """
     limit = massing.inset_limit(inner)
     core = massing.inset(inner, min(2.8, 0.6 * limit))

@@ -81,14 +81,9 @@ def square(x: float, y: float, half: float) -> np.ndarray:
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Moves each edge of an outline inwards and intersects them again.
 
-    Args:
-        points: outline.
-        distance: one distance for all edges or one per edge [m]; negative
-            ones move outwards.
-
-    Returns:
-        The outline of the moved edges, corner by corner. The caller keeps
-        the distances small against the lengths of the edges.
+    One distance is for all edges, or there is one per edge [m]; negative ones
+    move outwards. Corners keep their order. The caller keeps the distances
+    small against the lengths of the edges.
     """
     points = np.asarray(points, dtype=float)
     distances = np.broadcast_to(np.asarray(distance, float), len(points))
@@ -119,16 +114,10 @@ def inset_limit(points: ArrayLike) -> float:
 def rounded(
     points: ArrayLike, corners: dict[int, float], step: float
 ) -> np.ndarray:
-    """Rounds convex corners of an outline.
+    """Rounds convex corners of an outline by chords of at most `step` [m].
 
-    Args:
-        points: outline.
-        corners: corner index -> radius [m].
-        step: longest chord of the arcs [m].
-
-    Returns:
-        The outline with each of these corners replaced by chords; its first
-        edge is what the arcs leave of the first edge given.
+    `corners` gives their radii by number [m]. The first edge is what the arcs
+    leave of the first edge given.
     """
 
     def arc(
@@ -265,11 +254,9 @@ def revolved(
 ) -> Mesh:
     """Returns the surface that a profile sweeps around an upright axis.
 
-    Args:
-        profile: (radius, z) pairs from the bottom up [m]; a last radius of
-            zero gives a tip, else the top is closed by a lid.
-        count: sides of the polygon that stands for the circle.
-        center: where the axis stands [m].
+    The profile is (radius, z) pairs from the bottom up [m]; a last radius of
+    zero gives a tip, else the top is closed by a lid. A polygon of `count`
+    sides stands for the circle.
     """
 
     def ring(radius: float) -> np.ndarray:

@@ -112,11 +112,8 @@ def gable_wall(
 ) -> Mesh:
     """Returns the wall between z and a roof line, in wall coordinates.
 
-    Args:
-        line: the underside of the roof, across as the wall's x [m].
-        a, b: ends of the wall [m].
-        z: its bottom, at most the line's height within a..b [m].
-        holes: windows in it, beside one another; `gable_glass` closes them.
+    `line` is the underside of the roof, across as the wall's x, from a to b at
+    least at z. Holes lie beside one another; `gable_glass` closes them.
     """
     bounds = {a, b, *(u for u, _ in line if a < u < b)}
     bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
@@ -157,12 +154,8 @@ def hip(
 ) -> Mesh:
     """Returns a hipped roof over a rectangle, boxed in below its eaves.
 
-    Args:
-        outline: outline of the walls, four corners.
-        z: underside of the eaves [m].
-        top: height of the ridge [m].
-        eaves: overhang, one or one per edge [m].
-        fascia: height of the upright edge [m].
+    The underside of the eaves is at z, the ridge at `top`; `fascia` is the
+    height of their upright edge. `eaves` is one overhang or one per edge [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
     slopes = massing.skirt(outer, _ridge(outer), z + fascia, top)
@@ -229,13 +222,9 @@ def equip_roof(
 ) -> None:
     """Stands equipment on a flat roof without overlaps, as far as it fits.
 
-    Args:
-        out: the building; its `rng` draws places, headings, sizes.
-        roof: outline of the free roof [m].
-        z: height of the roof [m].
-        items: what to stand there, the most important first.
-        clear: distance kept from the edge [m].
-        prefix: start of the names of the visuals.
+    The building's `rng` draws places, headings and sizes. The first items are
+    the most important; all keep `clear` from the edge of the roof [m]. Names of
+    visuals start with `prefix`.
     """
     room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds

@@ -27,12 +27,9 @@ def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
 def divided(
     height: float, storey: float, most: int = 10
 ) -> tuple[int, int, float]:
-    """Divides a height into storeys, and these into equal groups.
+    """Divides a height into storeys, and these into at most so many groups.
 
-    Args:
-        height: to be filled, but for millimetres [m].
-        storey: wanted height of a storey [m].
-        most: greatest number of groups; a group becomes one visual.
+    A group becomes one visual.
 
     Returns:
         Number of groups, storeys in a group, height of a storey in whole
@@ -181,12 +178,9 @@ def shaft_walls(
 ) -> Facade:
     """Returns the walls of a stair: one bay in front, one behind.
 
-    Args:
-        height: height of the walls [m].
-        entry, slit: the bays, in the middle of the front and of the back.
-        room: width that they get [m].
-        rim: height and reach of a band at the top [m].
-        glass: depths of the bays that are glazed on their own [m].
+    Both are in the middle of their walls and get `room`. `rim` is height and
+    reach of a band at the top. Bays at depths of `glass` are glazed on their
+    own [m].
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
     layout = bays.by_edge(layouts, bays.plain)

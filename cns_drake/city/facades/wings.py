@@ -295,14 +295,12 @@ def add_dormer(
     """Adds a dormer on the slope that rises behind a wall, if it fits.
 
     Args:
-        out: gets `glass`, `roof` and `walls`.
-        wall: the wall below the slope.
-        x, width: middle and width of the dormer along the wall [m].
+        x, width: its middle and width along the wall [m].
         base: height of the slope's upper surface above the wall [m].
         slope: its rise per run.
         ridge: its upper end, above the dormer [m].
-        setback: setback of the dormer's front from the wall [m].
-        height: height of its front above the slope [m].
+        setback: of the dormer's front from the wall [m].
+        height: of its front above the slope [m].
         roof: `gable`, `shed` or `flat`.
     """
     a, b = x - width / 2, x + width / 2

@@ -43,13 +43,8 @@ def stage_sdf(
     A static scene is parsed fastest as one link with many visuals, and it
     carries no collision geometry because nothing ever touches it. The
     visual's name is `<structure>/<part>`; Drake keeps it as the geometry
-    name, which is how a LiDAR return finds its structure.
-
-    Args:
-        world: the name of the world and of its model.
-        structures: what stands at this stage.
-        comment: one line for the reader of the file.
-        before: SDF text of other visuals.
+    name, which is how a LiDAR return finds its structure. `comment` is one line
+    for the reader of the file, `before` SDF text of other visuals.
     """
     lines = [
         '<?xml version="1.0"?>',
@@ -150,12 +145,8 @@ def render_city(
 ) -> dict[str, str]:
     """Returns the text of every generated file by its relative path.
 
-    Args:
-        world: folder with `stages.yaml`; gives the world its name.
-        city: made from the folder's `roads.yaml` and `city.yaml`.
-        progress: takes one line at a time.
-        stages_text: the coming content of `stages.yaml`; by default the present
-            one.
+    `stages_text` is the coming content of `stages.yaml`; by default the present
+    one.
 
     Raises:
         InputError: if the stages cannot be used or the city has too many
@@ -183,14 +174,8 @@ def render_stages(
 ) -> dict[str, str]:
     """Returns the text of the files of some stages by their relative paths.
 
-    Args:
-        world: the name of the world.
-        city: the whole city.
-        stages: the differences between the stages.
-        wanted: which stages.
-        source: the file of the stages, for messages.
-        progress: takes one line at a time.
-        origin: the source of the city, one line for readers of its files.
+    `source` is the file of the stages, for messages; `origin`, one line for
+    readers of the files, says where the city is from.
 
     Raises:
         InputError: if a structure cannot be lower or under construction as
@@ -260,11 +245,12 @@ def generate_city(
     """
     world = Path(world)
     files = _rendered(world, progress, repair_stages)
-    with user_errors(world):
+    with user_errors(world / MESH_FOLDER):
         (world / MESH_FOLDER).mkdir(exist_ok=True)
-        for name, content in files.items():
-            write_text(world / name, content)
-        for path in _generated(world) - {world / name for name in files}:
+    for name, content in files.items():
+        write_text(world / name, content)
+    for path in _generated(world) - {world / name for name in files}:
+        with user_errors(path):
             path.unlink()
     return [world / name for name in files if name != STAGES_NAME]
 

@@ -31,14 +31,9 @@ from cns_drake.city.plan.stages import LotUse, Stages
 
 
 def younger(model: Model, height: float) -> Model:
-    """Returns a plant of a height, alike in all its proportions.
+    """Returns a plant with a top at a height [m], alike in all its proportions.
 
-    Args:
-        model: the grown plant, on z = 0.
-        height: height of its top [m].
-
-    Returns:
-        A plant with the same footprint; the model itself if it is lower.
+    The plant stands on z = 0. If it is lower it is returned itself.
     """
     top = max(
         part_mesh(part, model.meshes).vertices[:, 2].max()
@@ -84,14 +79,8 @@ _MOST_SIDES = 12
 def building_site(model: Model, height: float, name: str, seed: int) -> Model:
     """Returns the frame of a building that is being built, with its crane.
 
-    Args:
-        model: the finished building.
-        height: height of the frame [m].
-        name: name of the building.
-        seed: seed of the frame and the crane.
-
-    Returns:
-        A model within the building's footprint, except for the jib.
+    The frame is `height` high [m]. But for the jib the model stays within the
+    building's footprint.
 
     Raises:
         ValueError: there is no room for a frame.
@@ -213,14 +202,7 @@ def lot_objects(
 ) -> Iterator[Structure]:
     """Yields the structures on the lot of a building that is not built yet.
 
-    Args:
-        structure: the building.
-        use: one of `USES`.
-        cars: object -> weight of the parked cars.
-        rng: the only source of variation.
-
-    Yields:
-        Structures called after the building.
+    They are called after the building. `cars` are the weights of parked cars.
     """
     footprint = structure.model.footprint
     if use == "empty" or footprint.area < _SMALLEST:

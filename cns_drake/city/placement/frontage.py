@@ -66,16 +66,10 @@ class Station(NamedTuple):
 def lines_along(
     streets: BaseGeometry, within: BaseGeometry, distance: float
 ) -> list[LineString]:
-    """Returns the lines parallel to the edge of the streets.
+    """Returns the lines within an area, at a distance from the streets [m].
 
-    Args:
-        streets: the area of the streets in W [m].
-        within: the lines are cut to this area.
-        distance: from the edge of the streets [m].
-
-    Returns:
-        Smooth pieces between corners, in fixed order; the street is on the
-        right of each piece.
+    They are smooth pieces between corners, in fixed order; the street is on the
+    right of each piece.
     """
     edge = streets.buffer(distance, quad_segs=_QUAD_SEGMENTS).boundary
     cut = shapely.set_precision(edge.intersection(within), 0.001)
