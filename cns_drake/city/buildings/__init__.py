@@ -40,7 +40,7 @@ ARCHETYPES = {
     for name, values in parse_yaml(
         Path(__file__).with_name("archetypes.yaml").read_bytes()
     ).items()
-    if name != "palettes"
+    if name != "shared"
 }
 # Name -> class, such as `brick_block` -> `BrickBlock`.
 BUILDERS: dict[str, type[Building]] = {

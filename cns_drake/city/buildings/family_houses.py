@@ -1,14 +1,11 @@
 """Houses for a family or two: wings under gables or hips, porches, garages."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cns_drake.city.facades import bays, details, house_walls, massing, wings
-from cns_drake.city.facades.assembly import Assembly, Building, Site
+from cns_drake.city.facades.assembly import Assembly, Building
 from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney
 from cns_drake.city.facades.walls import Band
@@ -25,11 +22,7 @@ def storeys_for(
 ) -> int:
     """Returns the storeys that bring a roof over `span` closest to a pitch.
 
-    Args:
-        height: height of the ridge [m].
-        floor: height of the ground floor [m].
-        span: span of the roof [m].
-        pitch_deg: wanted.
+    The ridge is at `height`, the ground floor at `floor` [m].
     """
     wanted = wings.ridge_rise(span, pitch_deg)
     room = height - ROOF_M - floor - 0.15
@@ -70,13 +63,7 @@ def close_box(
 ) -> None:
     """Adds the walls and the roof around a box's openings.
 
-    Args:
-        out: where to.
-        wing: the box.
-        openings: its windows and doors.
-        plinth: height of the foundation that shows [m].
-        casing: style of the windows' frames on `edges`.
-        edges: walls with framed windows.
+    A `plinth` of the foundation shows [m]; windows on `edges` have a casing.
     """
     openings.add_casings(out, edges, casing)
     bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()
@@ -131,83 +118,90 @@ class DetachedHouse(Building):
 
     def build(self) -> None:
         """Builds the house on a rectangle, its porch in front."""
-        plan = _planned(self, self.site)
-        _add_main(self, plan)
-        for wing in plan.wings:
-            _add_wing(self, plan, wing)
-        if plan.garage is not None:
-            add_garage(self, plan.garage, plan.boxes)
-        _add_chimney(self, plan)
+        self._lay_out()
+        _add_main(self)
+        for wing in self.wings:
+            _add_wing(self, wing)
+        if self.garage_box is not None:
+            add_garage(self, self.garage_box, self.boxes)
+        _add_chimney(self)
+
+    def _lay_out(self) -> None:
+        """Places the boxes of the house.
+
+        The first one is `main`, of `storeys`. In x `free` is the part of its
+        front that no wing hides; `ahead` is the room in front of it [m].
+        """
+        x0, y0, x1, y1 = self.site.bounds
+        left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
+        ahead = self.porch_reach + 0.3 + 1.8 * self.deck
+        self.ahead = min(ahead, 0.3 * (back - y0))
+        front = y0 + self.ahead
+        main_back = front + min(back - front, 10.0)
+        deep = main_back - front
+        garage_width = min(self.garage_width, 0.36 * (right - left))
+        has_garage = self.garage != "none" and garage_width > 2.9
+        split = right - garage_width * has_garage
+        pitch_deg = 48.0 if self.roof == "gambrel" else self.pitch_deg
+        n = storeys_for(self.height, self.deck, deep, pitch_deg)
+        wall_top = wall_top_for(self.height, self.deck, deep, n)
+        slope = 2 * (self.height - wall_top - ROOF_M) / deep
+        roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+        area = (left, front, split, main_back)
+        boxes = [Wing.at(*area, wall_top, self.height, roof)]
+        wide = max(3.2, self.wing_width * (split - left))
+        drop = STOREY_M * (n > 1 and self.low_wing)
+        top = min(wall_top + ROOF_M + slope * wide / 2, self.height - 0.25)
+        kind = "hip" if self.roof == "hip" else "gable"
+        shape = Roof(kind, True, 0.35, 0.3, ROOF_M)
+        middle = (front + main_back) / 2
+        for end in _WING_ENDS[self.plan]:
+            if end == "front":
+                span = (left - 0.02, front - max(0.6, self.ahead - 0.6))
+                area = (*span, left + wide, middle)
+            else:
+                a = left + 0.4 * (split - left - wide)
+                area = (a, middle, a + wide, min(back, main_back + 3.0))
+            if end == "front" or back - main_back > 1.0:
+                boxes.append(Wing.at(*area, wall_top - drop, top - drop, shape))
+        if has_garage:
+            boxes.append(garage_wing(
+                self.garage, split - 0.06, right, front + 0.6,
+                main_back - 0.4, self.height,
+            ))  # fmt: skip
+        taken = left + wide if "front" in _WING_ENDS[self.plan] else left
+        self.free, self.storeys = (taken, split), n
+        if self.mirrored:
+            boxes = [box.mirrored(x0 + x1) for box in boxes]
+            self.free = (x0 + x1 - split, x0 + x1 - taken)
+        self.boxes, self.main = tuple(boxes), boxes[0]
+        self.garage_box = boxes[-1] if has_garage else None
+        self.wings = boxes[1 : -1 if has_garage else None]
 
 
-def _planned(p: DetachedHouse, site: Site) -> _Plan:
-    """Lays the house out."""
-    x0, y0, x1, y1 = site.bounds
-    left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
-    ahead = min(p.porch_reach + 0.3 + 1.8 * p.deck, 0.3 * (back - y0))
-    front = y0 + ahead
-    main_back = front + min(back - front, 10.0)
-    deep = main_back - front
-    garage_width = min(p.garage_width, 0.36 * (right - left))
-    has_garage = p.garage != "none" and garage_width > 2.9
-    split = right - garage_width * has_garage
-    pitch_deg = 48.0 if p.roof == "gambrel" else p.pitch_deg
-    n = storeys_for(p.height, p.deck, deep, pitch_deg)
-    wall_top = wall_top_for(p.height, p.deck, deep, n)
-    slope = 2 * (p.height - wall_top - ROOF_M) / deep
-    roof = Roof(p.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
-    main = Wing.at(left, front, split, main_back, wall_top, p.height, roof)
-    wide = max(3.2, p.wing_width * (split - left))
-    drop = STOREY_M * (n > 1 and p.low_wing)
-    top = min(wall_top + ROOF_M + slope * wide / 2, p.height - 0.25) - drop
-    kind = "hip" if p.roof == "hip" else "gable"
-    shape = Roof(kind, True, 0.35, 0.3, ROOF_M)
-    middle = (front + main_back) / 2
-    parts = []
-    for end in _WING_ENDS[p.plan]:
-        if end == "front":
-            span = (left - 0.02, front - max(0.6, ahead - 0.6))
-            area = (*span, left + wide, middle)
-        else:
-            a = left + 0.4 * (split - left - wide)
-            area = (a, middle, a + wide, min(back, main_back + 3.0))
-        if end == "front" or back - main_back > 1.0:
-            parts.append(Wing.at(*area, wall_top - drop, top, shape))
-    garage = None
-    if has_garage:
-        garage = garage_wing(
-            p.garage, split - 0.06, right, front + 0.6, main_back - 0.4,
-            p.height,
-        )  # fmt: skip
-    taken = left + wide if "front" in _WING_ENDS[p.plan] else left
-    plan = _Plan(main, tuple(parts), garage, n, (taken, split), ahead)
-    return plan.mirrored(x0 + x1) if p.mirrored else plan
-
-
-def _add_main(p: DetachedHouse, plan: _Plan) -> None:
-    main = plan.main
+def _add_main(p: DetachedHouse) -> None:
     openings = window_rows(
-        main, plan.boxes, p.deck, plan.storeys, p.window_pitch, p.window_width
+        p.main, p.boxes, p.deck, p.storeys, p.window_pitch, p.window_width
     )
-    a, b = (x - main.x0 for x in plan.free)
+    a, b = (x - p.main.x0 for x in p.free)
     door = a + 0.5 * (b - a)
     openings.add_door(p, 0, door, p.deck, lights=0.3)
-    _add_porch(p, plan, (a, b))
-    close_box(p, main, openings, p.deck, p.casing)
+    _add_porch(p, (a, b))
+    close_box(p, p.main, openings, p.deck, p.casing)
     if p.roof in ("gable", "gambrel"):
-        wings.add_dormers(p, main, a, b, p.dormers, p.dormer, 3.0)
+        wings.add_dormers(p, p.main, a, b, p.dormers, p.dormer, 3.0)
 
 
-def _add_porch(p: DetachedHouse, plan: _Plan, free: bays.Span) -> None:
+def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
     """Roofs the door; a `full` porch runs along the free front."""
-    wall = plan.main.wall(0)
+    wall = p.main.wall(0)
     a, b = free
     door = (a + b) / 2
-    reach = min(p.porch_reach, plan.ahead - 0.3)
+    reach = min(p.porch_reach, p.ahead - 0.3)
     eaves = p.deck + 2.3
     top = eaves + (0.9 if p.porch == "gable" else 0.45)
-    if plan.storeys == 1:
-        top = min(top, plan.main.wall_top + 0.1)
+    if p.storeys == 1:
+        top = min(top, p.main.wall_top + 0.1)
     full = p.porch == "full" and b - a > 3.5
     x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
     details.add_porch(
@@ -215,32 +209,30 @@ def _add_porch(p: DetachedHouse, plan: _Plan, free: bays.Span) -> None:
         roof="shed" if p.porch == "full" else p.porch,
         posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
     )  # fmt: skip
-    room = plan.ahead - reach - 0.02
+    room = p.ahead - reach - 0.02
     details.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.deck, room)
     if full and p.deck > 0.3:
-        y = reach - 0.15
+        y, rgb = reach - 0.15, p.colours["trim"]
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
-        for k, (start, end) in enumerate(runs):
-            details.add_railing(
-                p, f"railing_{k}", wall, (start, y), (end, y), p.deck,
-                p.colours["trim"],
-            )  # fmt: skip
+        for k, (a, b) in enumerate(runs):
+            part = f"railing_{k}"
+            details.add_railing(p, part, wall, (a, y), (b, y), p.deck, rgb)
 
 
-def _add_wing(p: DetachedHouse, plan: _Plan, wing: Wing) -> None:
+def _add_wing(p: DetachedHouse, wing: Wing) -> None:
     count = max(1, round((wing.wall_top - p.deck) / STOREY_M))
     openings = window_rows(
-        wing, plan.boxes, p.deck, count, p.window_pitch, p.window_width
+        wing, p.boxes, p.deck, count, p.window_pitch, p.window_width
     )
     close_box(p, wing, openings, p.deck, p.casing)
-    is_front = wing.y0 < plan.main.y0
+    is_front = wing.y0 < p.main.y0
     if p.bay_window and is_front and wing.width > 3.0:
         size = (wing.width / 2, 2.2, 0.4, 0.0, p.deck + 2.3)
         details.add_bay_window(p, wing.wall(0), *size)
 
 
-def _add_chimney(p: DetachedHouse, plan: _Plan) -> None:
-    main = plan.main
+def _add_chimney(p: DetachedHouse) -> None:
+    main = p.main
     if p.chimney == "breast":
         wall = main.wall(1 if p.mirrored else 3)
         x = wall.length / 2
@@ -254,43 +246,6 @@ def _add_chimney(p: DetachedHouse, plan: _Plan) -> None:
         add_chimney(p, "chimney", spot, p.kind.choices["bricks"][0])
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """The places of the parts of a house.
-
-    Attributes:
-        main, wings, garage: its boxes.
-        storeys: storeys of the main box.
-        free: part of the main front that no wing hides, in x [m].
-        ahead: room in front of the main front [m].
-    """
-
-    main: Wing
-    wings: tuple[Wing, ...]
-    garage: Wing | None
-    storeys: int
-    free: tuple[float, float]
-    ahead: float
-
-    @property
-    def boxes(self) -> tuple[Wing, ...]:
-        garage = () if self.garage is None else (self.garage,)
-        return (self.main, *self.wings, *garage)
-
-    def mirrored(self, width: float) -> _Plan:
-        """Returns the plan with x replaced by `width` - x."""
-        parts = tuple(wing.mirrored(width) for wing in self.wings)
-        garage = self.garage and self.garage.mirrored(width)
-        a, b = self.free
-        return replace(
-            self,
-            main=self.main.mirrored(width),
-            wings=parts,
-            garage=garage,
-            free=(width - b, width - a),
-        )
-
-
 # Kept free around the walls, for wide eaves [m].
 _BUNGALOW_MARGIN = 0.75
 
@@ -300,75 +255,73 @@ class Bungalow(Building):
 
     def build(self) -> None:
         """Builds the bungalow along the front of a rectangle."""
-        plan = _bungalow_planned(self, self.site)
-        boxes = (plan.main, *plan.fronts)
+        self._lay_out()
+        main, *fronts = self.boxes
         size = (self.floor, 1, self.window_pitch, self.window_width)
-        openings = window_rows(plan.main, boxes, *size)
-        _add_bungalow_main(self, plan, openings, self.site.bounds[1])
-        for k, wing in enumerate(plan.fronts):
-            openings = window_rows(wing, boxes, *size)
+        openings = window_rows(main, self.boxes, *size)
+        _add_bungalow_main(self, main, openings)
+        for k, wing in enumerate(fronts):
+            openings = window_rows(wing, self.boxes, *size)
             if self.parking == "garage" and k == 0:
                 width = min(wing.width - 0.8, 4.8)
                 openings.add_garage_door(self, 0, wing.width / 2, width)
             close_box(self, wing, openings, self.floor, self.casing)
-        if plan.carport is not None:
-            _add_carport(self, plan.carport)
-        main = plan.main
+        if self.carport is not None:
+            _add_carport(self, self.carport)
         x = main.x0 + self.chimney_at * main.width
         spot, scale = (x, main.center[1], main.top - 1.3), (1.5, 1.2, 0.95)
         add_chimney(self, "chimney", spot, self.colours["base"], scale=scale)
 
+    def _lay_out(self) -> None:
+        """Places the main box, wings in front of it and the carport.
 
-def _bungalow_planned(p: Bungalow, site: Site) -> _BungalowPlan:
-    x0, y0, x1, y1 = site.bounds
-    left, right, back = (
-        x0 + _BUNGALOW_MARGIN,
-        x1 - _BUNGALOW_MARGIN,
-        y1 - _BUNGALOW_MARGIN,
-    )
-    width = right - left
-    fronts_wanted = {"long": 0, "ell": 1, "court": 2}[p.plan]
-    fronts_wanted = min(fronts_wanted, int(width / 6.5))
-    depth = back - y0
-    ahead = min(1.9, 0.2 * depth)
-    reach = min(p.reach, 0.3 * depth) if fronts_wanted else 0.0
-    front = y0 + max(ahead, _BUNGALOW_MARGIN + reach)
-    deep = min(back - front, 8.5)
-    carport = None
-    if p.parking == "carport" and width > 13.0:
-        carport = (right - 3.4, front + 0.4, right, front + min(6.0, deep))
-        right -= 3.6
-    top = p.height
-    wall_top = min(
-        p.floor + 2.75, top - ROOF_M - 0.1 * deep, 0.8 * (top - ROOF_M)
-    )
-    shape = Roof(p.roof, eaves=0.6, verge=0.4, thickness=ROOF_M)
-    main = Wing.at(left, front, right, front + deep, wall_top, top, shape)
-    slope = 2 * (top - main.wall_top - ROOF_M) / deep
-    wide = max(3.4, p.wing_width * (right - left))
-    fronts = []
-    taken = [left, right]
-    for k in range(fronts_wanted):
-        a = left - 0.02 if k == 0 else right - wide
+        In x `free` is the part of its front that no wing hides [m].
+        """
+        x0, y0, x1, y1 = self.site.bounds
+        left, right = x0 + _BUNGALOW_MARGIN, x1 - _BUNGALOW_MARGIN
+        back = y1 - _BUNGALOW_MARGIN
+        width, depth = right - left, back - y0
+        wanted = {"long": 0, "ell": 1, "court": 2}[self.plan]
+        count = min(wanted, int(width / 6.5))
+        ahead = min(1.9, 0.2 * depth)
+        reach = min(self.reach, 0.3 * depth) if count else 0.0
+        front = y0 + max(ahead, _BUNGALOW_MARGIN + reach)
+        deep = min(back - front, 8.5)
+        carport: massing.Area | None = None
+        if self.parking == "carport" and width > 13.0:
+            carport = (
+                right - 3.4, front + 0.4, right, front + min(6.0, deep)
+            )  # fmt: skip
+            right -= 3.6
+        top = self.height
+        wall_top = min(
+            self.floor + 2.75, top - ROOF_M - 0.1 * deep, 0.8 * (top - ROOF_M)
+        )
+        shape = Roof(self.roof, eaves=0.6, verge=0.4, thickness=ROOF_M)
+        main = Wing.at(left, front, right, front + deep, wall_top, top, shape)
+        slope = 2 * (top - main.wall_top - ROOF_M) / deep
+        wide = max(3.4, self.wing_width * (right - left))
         end = min(top - 0.2, main.wall_top + ROOF_M + slope * wide / 2)
-        cross = Roof(p.roof, True, 0.5, 0.4, ROOF_M)
-        fronts.append(
-            Wing.at(
-                a, front - reach, a + wide + 0.02, front + deep / 2,
-                main.wall_top, end, cross,
-            )
-        )  # fmt: skip
-        taken[k] = a + wide if k == 0 else a
-    plan = _BungalowPlan(main, tuple(fronts), carport, (taken[0], taken[1]))
-    return plan.mirrored(x0 + x1) if p.mirrored else plan
+        cross = Roof(self.roof, True, 0.5, 0.4, ROOF_M)
+        boxes, taken = [main], [left, right]
+        for k in range(count):
+            a = left - 0.02 if k == 0 else right - wide
+            area = (a, front - reach, a + wide + 0.02, front + deep / 2)
+            boxes.append(Wing.at(*area, main.wall_top, end, cross))
+            taken[k] = a + wide if k == 0 else a
+        if self.mirrored:
+            both = x0 + x1
+            boxes = [box.mirrored(both) for box in boxes]
+            taken = [both - x for x in reversed(taken)]
+            if carport is not None:
+                a, c, b, d = carport
+                carport = (both - b, c, both - a, d)
+        self.boxes, self.carport, self.free = boxes, carport, taken
 
 
-def _add_bungalow_main(
-    p: Bungalow, plan: _BungalowPlan, openings: Openings, y0: float
-) -> None:
-    main = plan.main
+def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
     wall = main.wall(0)
-    a, b = (x - main.x0 for x in plan.free)
+    a, b = (x - main.x0 for x in p.free)
     door = a + 0.3 * (b - a)
     if b - door > p.picture + 1.6:
         x = (door + 0.6 + b) / 2
@@ -376,7 +329,7 @@ def _add_bungalow_main(
         openings.put(0, x, p.picture + 0.7, pane)
     openings.add_door(p, 0, door, p.floor, lights=0.3)
     close_box(p, main, openings, p.floor, p.casing)
-    reach = min(1.6, main.y0 - y0 - 0.4)
+    reach = min(1.6, main.y0 - p.site.bounds[1] - 0.4)
     if p.veranda and b - a > 4.0 and reach > 0.9:
         eaves = min(p.floor + 2.25, main.wall_top - 0.35)
         details.add_porch(
@@ -400,44 +353,13 @@ def _add_carport(p: Bungalow, area: massing.Area) -> None:
     p.add_to("walls", massing.standing(*shed, bottom=True))
 
 
-@dataclass(frozen=True)
-class _BungalowPlan:
-    """The places of the parts; `carport` is x0, y0, x1, y1 or None."""
-
-    main: Wing
-    fronts: tuple[Wing, ...]
-    carport: tuple[float, float, float, float] | None
-    free: tuple[float, float]
-
-    def mirrored(self, width: float) -> _BungalowPlan:
-        a, b = self.free
-        carport = self.carport
-        if carport is not None:
-            x0, y0, x1, y1 = carport
-            carport = (width - x1, y0, width - x0, y1)
-        return _BungalowPlan(
-            self.main.mirrored(width),
-            tuple(wing.mirrored(width) for wing in self.fronts),
-            carport,
-            (width - b, width - a),
-        )
-
-
-# Kept free around the walls, for eaves [m].
-_SEMI_DETACHED_MARGIN = 0.5
-
-
 class SemiDetached(Building):
     """The pair of semi-detached houses: mirrored halves under one roof."""
 
     def build(self) -> None:
         """Builds the pair on a rectangle."""
         x0, y0, x1, y1 = self.site.bounds
-        left, right, back = (
-            x0 + _SEMI_DETACHED_MARGIN,
-            x1 - _SEMI_DETACHED_MARGIN,
-            y1 - _SEMI_DETACHED_MARGIN,
-        )
+        left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
         front = y0 + min(2.4, 0.25 * (y1 - y0))
         deep = min(back - front, 10.0)
         has_garages = self.garages != "none" and right - left > 17.0

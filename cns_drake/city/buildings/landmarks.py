@@ -21,7 +21,7 @@ import numpy as np
 from pydantic import BaseModel
 import yaml
 
-from cns_drake.city.facades.assembly import Building, Dice, Rgb
+from cns_drake.city.facades.assembly import Building, Rgb
 from cns_drake.city.geometry.mesh import Mesh, read_mesh
 from cns_drake.city.geometry.structures import MeshShape, triple
 
@@ -59,13 +59,11 @@ LANDMARKS = _folders()
 class Landmark(Building):
     """One of the models of a landmark, stretched to the lot and the height."""
 
-    def draw(self, d: Dice) -> None:
-        self.folder = d.pick(LANDMARKS[self.kind.name])
-
     def build(self) -> None:
         """Adds the parts of the model on a rectangle."""
         x0, y0, x1, y1 = self.site.bounds
-        model = _read(self.folder)
+        folder = self.pick(LANDMARKS[self.kind.name])
+        model = _read(folder)
         lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
         # Overhanging parts must not reach further out of a wider lot.
         reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
@@ -76,7 +74,7 @@ class Landmark(Building):
         for part in model.parts:
             quarters = round(part.yaw / (np.pi / 2))
             along = stretch[[1, 0, 2]] if quarters % 2 else stretch
-            path = self.folder / f"{part.mesh}.obj"
+            path = folder / f"{part.mesh}.obj"
             if path.exists():
                 name = f"{self.site.name}_{part.mesh}"
                 if name not in self.meshes:

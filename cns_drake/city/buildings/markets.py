@@ -23,14 +23,14 @@ class ShopStrip(Building):
         count = max(1, round((x1 - x0) / self.unit_width))
         shares = self.rng.uniform(0.8, 1.2, count)
         bounds = x0 + (x1 - x0) * np.cumsum([0.0, *shares]) / shares.sum()
-        highest = int(self.rng.integers(count))
+        highest = self.whole(0, count)
         for k in range(count):
             blind = self.site.blind_in(k, count)
             tall = self.height > self.ground + 3.4 and (
-                k == highest or self.rng.random() < self.upper
+                k == highest or self.chance(self.upper)
             )
-            top = self.height if k == highest else _top(self, tall, self.rng)
-            back = y1 - _BACK_M - float(self.rng.uniform(0.0, 0.12)) * (y1 - y0)
+            top = self.height if k == highest else _top(self, tall)
+            back = y1 - _BACK_M - self.uniform(0.0, 0.12) * (y1 - y0)
             area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
             roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
             wing = Wing.at(*area, top - 0.1, top, roof, blind)
@@ -42,21 +42,21 @@ class ShopStrip(Building):
                 )
 
 
-def _top(p: ShopStrip, tall: bool, rng: np.random.Generator) -> float:
+def _top(p: ShopStrip, tall: bool) -> float:
     """Returns the parapet of a unit that is not the highest [m]."""
-    drop = p.steps * int(rng.integers(0, 3))
+    drop = p.steps * p.whole(0, 3)
     if tall or p.height < p.ground + 3.4:
         return round(max(p.height - drop, p.ground + 0.4), 2)
     return round(p.ground + 0.5 + 0.5 * drop, 2)
 
 
 def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
-    openings, rng = Openings(wing), p.rng
+    openings = Openings(wing)
     wall = wing.wall(0)
-    cladding = "walls" if rng.random() < 0.5 else "facing"
+    cladding = "walls" if p.chance(0.5) else "facing"
     upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
     storey = (wing.top - 0.5 - p.ground) / max(upper_floors, 1)
-    width = round(float(rng.uniform(1.1, 2.2)), 2)
+    width = p.uniform(1.1, 2.2, 2)
     openings.add_rows(
         (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
         head=min(2.3, storey - 0.4),
@@ -77,9 +77,9 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
 
 def _add_parapet(p: ShopStrip, wing: Wing, cladding: str) -> None:
     """Frames the parapet's front: a coping, or piers at its ends."""
-    wall, top, rng = wing.wall(0), wing.top, p.rng
+    wall, top = wing.wall(0), wing.top
     length = wall.length
-    if rng.random() < 0.5:
+    if p.chance(0.5):
         coping = (0.02, length - 0.02, -0.05, 0.12, top - 0.2, top - 0.02)
         p.add_to("trim", wall.box(*coping))
     else:
@@ -87,7 +87,7 @@ def _add_parapet(p: ShopStrip, wing: Wing, cladding: str) -> None:
             pier = (x - 0.22, x + 0.22, -0.05, 0.15, 0.0, top - 0.03)
             p.add_to(cladding, wall.box(*pier))
     visible = top - p.ground - 0.1 > 0.6 and top < p.height - 3.0
-    if rng.random() < 0.4 and visible:
+    if p.chance(0.4) and visible:
         sign = (0.25 * length, 0.75 * length, -0.15, 0.1, top - 0.3, top + 0.7)
         p.add_to("sign", wall.box(*sign))
 
@@ -144,7 +144,7 @@ def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
     wall, material = wing.wall(0), ("stalls", "others")[k % 2]
     a, b = 0.3, wall.length - 0.3
     head = min(2.15, wing.wall_top - 0.25)
-    if p.rng.random() < 0.75:
+    if p.chance(0.75):
         openings.add(0, [Patch(a, b, _COUNTER, head, 0.7)])
         shelf = wall.box(a, b, -0.3, 0.3, _COUNTER - 0.08, _COUNTER)
         p.add_to("timber", shelf)

@@ -84,11 +84,7 @@ def _add_garden(
 ) -> float:
     """Adds an open floor: columns around a smaller glazed core.
 
-    Args:
-        plan: outline of the floor.
-        inner: the smallest outline of the storeys above.
-        z0, height: those of the floor [m].
-        number: number of the garden.
+    It ends at `plan`; `inner` is the smallest outline of the storeys above.
     """
     limit = massing.inset_limit(inner)
     core = massing.inset(inner, min(2.8, 0.6 * limit))
@@ -380,7 +376,7 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
     lifts = max(2, int(p.scaffold_top * p.storey / _LIFT_M))
     per_group = -(-lifts // 6)
     groups = -(-lifts // per_group)
-    lifts, rng = per_group * groups, p.rng
+    lifts = per_group * groups
     levels, standards, nets = [], [], []
     for edge in p.scaffolds:
         wall = details.WallFrame(plan, edge)
@@ -397,9 +393,9 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
                 )
                 standards.append(wall.place(mesh))
         for a, b in itertools.pairwise(xs):
-            if rng.random() < p.nets:
-                first = int(rng.integers(0, lifts - 1))
-                last = int(rng.integers(first + 1, lifts + 1))
+            if p.chance(p.nets):
+                first = p.whole(0, lifts - 1)
+                last = p.whole(first + 1, lifts + 1)
                 low, high = first * _LIFT_M + 0.2, last * _LIFT_M - 0.2
                 spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
                 nets.append(wall.box(*spot, low, high))

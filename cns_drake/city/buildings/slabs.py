@@ -371,7 +371,7 @@ def _add_galleries(
     p: GalleryFlats, slab: np.ndarray, edge: int, stack: tuple[int, int, float]
 ) -> None:
     """Adds one gallery per storey, posts through all, and screens."""
-    wall, rng = details.WallFrame(slab, edge), p.rng
+    wall = details.WallFrame(slab, edge)
     end, reach = wall.length, p.gallery - 0.05
     groups, per_group, storey = stack
     storeys, step = groups * per_group, per_group * storey
@@ -388,9 +388,9 @@ def _add_galleries(
     screens = []
     for a, b in cells:
         for k in range(storeys):
-            if rng.random() < p.panels:
+            if p.chance(p.panels):
                 z = p.ground + k * storey
-                u = float(rng.uniform(a + 0.2, b - 1.8))
+                u = p.uniform(a + 0.2, b - 1.8)
                 spot = (round(u, 2), round(u + 1.5, 2), reach, reach + 0.06)
                 screens.append(wall.box(*spot, z + 0.1, z + storey - 0.15))
     p.add("screens", *screens, rgb=p.colours["panel"])

@@ -247,12 +247,8 @@ class Office(Building):
         top = _add_ground(self)
         goal = self.height - self.penthouse_height - self.parapet - 0.5
         if self.style == "grooves":
-            wall = tiers.Grooves(
-                self.storey_height, self.sill, 0.0, self.recess, self.pitch,
-                0.5, self.pier_reach, 0.8,
-            )  # fmt: skip
             top = tiers.add_grooved(
-                self, outline, wall, top, goal, "storey", 0.2, 8, blind
+                self, outline, top, goal, "storey", 0.2, 8, blind
             )
         else:
             top = _add_windows(self, top, goal)

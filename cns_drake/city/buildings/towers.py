@@ -5,45 +5,14 @@ import math
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building, Dice
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 
 class ArtDecoTower(Building):
-    """The art-deco tower: symmetric setbacks, tall piers, a stepped crown.
-
-    `steps` has, for each tier above the base, where it starts (as a
-    fraction of the height) and how far it steps back across the front and
-    along the sides.
-    """
-
-    def draw(self, d: Dice) -> None:
-        starts = d.pick(((0.5,), (0.3, 0.62)))
-        share = 0.24 if len(starts) == 2 else 0.4
-        steps, across, along = ([], 0.0, 0.0)
-        for start in starts:
-            across += share * d.uniform(0.3, 0.9) * d.depth / 2
-            along += share * d.uniform(0.6, 1.2) * d.width / 2
-            jitter = d.uniform(-0.04, 0.04)
-            steps.append((start + jitter, round(across, 1), round(along, 1)))
-        self.ground_height = d.uniform(6.5, 8.5, 2)
-        self.wall = tiers.Grooves(
-            storey_height=d.uniform(3.4, 3.8),
-            spandrel=d.uniform(1.1, 1.6, 2),
-            ledge=0.0,
-            glass_depth=d.uniform(0.2, 0.4, 2),
-            pitch=max(d.uniform(2.6, 3.6), d.site.open_length / 34),
-            width=d.uniform(0.8, 1.4, 2),
-            reach=d.uniform(0.2, 0.34, 2),
-            corner=d.uniform(1.4, 2.4, 2),
-        )
-        self.steps = tuple(steps)
-        self.portal_width = d.uniform(4.0, 5.5, 1)
-        self.crown_steps = d.whole(2, 5)
-        self.spire = d.uniform(0.35, 0.6)
-        self.notch = d.pick((0.0, 1.2, 2.0))
+    """The art-deco tower: symmetric setbacks, tall piers, a stepped crown."""
 
     def build(self) -> None:
         """Builds the tower on a rectangle."""
@@ -51,20 +20,19 @@ class ArtDecoTower(Building):
         plan = massing.notched(base, self.notch) if self.notch else base
         top = _add_ground(self, plan)
         crown_height = round(min(0.16 * self.height, 16.0), 1)
-        goals = [self.height * f for f, _, _ in self.steps] + [
-            self.height - crown_height
-        ]
-        for k, goal in enumerate(goals):
-            goal = round(goal, 1)
-            top = tiers.add_grooved(
-                self, plan, self.wall, top, goal, f"tier_{k}", rise=1.7
-            )
-            if k == len(goals) - 1:
-                break
-            _add_terrace(self, plan, top, k)
-            _, across, along = self.steps[k]
-            plan = massing.inset(base, (across, along, across, along))
+        across = along = 0.0
+        for k, (start, a, b, jitter) in enumerate(self.steps):
+            goal = round(self.height * (start + jitter), 1)
+            top = tiers.add_grooved(self, plan, top, goal, f"tier_{k}", 1.7)
+            edges = (Band(0.0, 0.3, -0.12), Band(1.0, 1.3, -0.1))
+            parapet, part = Facade(1.3, edges), f"terrace_{k}"
+            tiers.add_crown(self, plan, parapet, top, 1.1, part=part)
+            across, along = across + a, along + b
+            step = (round(across, 1), round(along, 1)) * 2
+            plan = massing.inset(base, step)
             plan = massing.notched(plan, self.notch) if self.notch else plan
+        goal, part = round(self.height - crown_height, 1), f"tier_{k + 1}"
+        top = tiers.add_grooved(self, plan, top, goal, part, 1.7)
         _add_crown(self, plan, top)
 
 
@@ -72,16 +40,11 @@ def _add_ground(p: ArtDecoTower, plan: np.ndarray) -> float:
     h = p.ground_height
     portal = bays.entrance(p.portal_width, h - 1.6, 1.4, surround=0.3)
     arch = bays.arched(3.4, 0.5, 3.2, 0.5)
-    arches = bays.rhythm(1.7 * p.wall.pitch, [arch], margin=1.4)
+    arches = bays.rhythm(1.7 * p.pitch, [arch], margin=1.4)
     bands = (Band(h - 0.7, h - 0.4, -0.15), Band(h - 0.4, h, -0.3))
     layout = bays.with_door(arches, portal, p.portal_width + 2.0)
     roof = details.front_canopy(plan, 2.4, 1.4, 3.6)
     return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.5,)), [roof])
-
-
-def _add_terrace(p: ArtDecoTower, plan: np.ndarray, z: float, k: int) -> None:
-    parapet = Facade(1.3, (Band(0.0, 0.3, -0.12), Band(1.0, 1.3, -0.1)))
-    tiers.add_crown(p, plan, parapet, z, 1.1, part=f"terrace_{k}")
 
 
 def _add_crown(p: ArtDecoTower, plan: np.ndarray, z0: float) -> None:
@@ -98,95 +61,41 @@ def _add_crown(p: ArtDecoTower, plan: np.ndarray, z0: float) -> None:
     p.add("crown", *pieces)
 
 
-_TINTS = (
-    ((0.62, 0.66, 0.70), (0.24, 0.34, 0.42)),
-    ((0.42, 0.45, 0.50), (0.17, 0.23, 0.30)),
-    ((0.72, 0.71, 0.68), (0.28, 0.36, 0.38)),
-    ((0.35, 0.33, 0.31), (0.25, 0.22, 0.18)),
-)
-_CORNERS = ("plain", "chamfered", "notched", "rounded")
-_CROWNS = ("screen", "wedge", "stepped")
 _ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")
 
 
 class GlassSkyscraper(Building):
-    """The glass skyscraper: curtain walls with fins, setbacks, a crown.
-
-    `setbacks` has, for each tier above the first, where it starts (as a
-    fraction of the height) and how far each edge of the site steps back.
-    """
-
-    def draw(self, d: Dice) -> None:
-        outline = d.site.outline
-        side = massing.shortest_side(outline)
-        count = len(outline)
-        heights = d.pick(((0.62,), (0.45, 0.78)))
-        style = d.whole(0, 4)  # Ribbons, a grid, or fins (twice).
-        total: np.ndarray = np.zeros(count)
-        setbacks = []
-        for fraction in heights:
-            if count == 4:
-                step = (
-                    d.rng.uniform(0.06, 0.13, 4)
-                    * (d.rng.random(4) < 0.6)
-                    * side
-                )
-            else:
-                reach = min(0.08 * side, 0.5 * massing.inset_limit(outline))
-                step = np.full(count, d.rng.uniform(0.5, 1.0) * reach)
-            total = total + np.round(step, 1)
-            setbacks.append(
-                (fraction + d.uniform(-0.06, 0.06), tuple(total.tolist()))
-            )
-        rgb, glass_rgb = d.pick(_TINTS)
-        corner = d.pick(_CORNERS)
-        self.lobby_height = d.uniform(6.0, 9.0, 2)
-        self.wall = tiers.Grooves(
-            storey_height=d.uniform(3.7, 4.2),
-            spandrel=d.uniform(0.6, 1.2, 2),
-            ledge=d.uniform(0.3, 0.6, 2) * (style < 2),
-            glass_depth=d.uniform(0.2, 0.4, 2),
-            pitch=max(d.uniform(2.2, 3.6), d.site.open_length / 38),
-            width=d.uniform(0.12, 0.3, 2) * (style > 0),
-            reach=d.uniform(0.2, 0.55, 2),
-            corner=0.0,
-        )
-        self.corner = corner if count == 4 else "plain"
-        self.corner_size = round(d.uniform(0.08, 0.16) * side, 1)
-        self.setbacks = tuple(setbacks)
-        self.crown = d.pick(_CROWNS)
-        self.crown_height = d.uniform(5.0, 9.0, 1)
-        self.rgb = rgb
-        self.glass_rgb = glass_rgb
+    """The glass skyscraper: curtain walls with fins, setbacks, a crown."""
 
     def build(self) -> None:
         """Builds the skyscraper on any outline."""
         base = self.site.outline
         plan = _shaped(self, base)
         top = _add_lobby(self, plan)
-        levels = [*(round(f * self.height, 1) for f, _ in self.setbacks)]
-        for k, goal in enumerate(levels):
-            top = tiers.add_grooved(
-                self, plan, self.wall, top, goal, f"tier_{k}", rise=1.1
-            )
+        reach, total = massing.shortest_side(base), np.zeros(len(base))
+        if len(base) != 4:
+            reach = min(0.08 * reach, 0.5 * massing.inset_limit(base))
+        for k, (start, share, jitter) in enumerate(self.setbacks):
+            goal = round((start + jitter) * self.height, 1)
+            top = tiers.add_grooved(self, plan, top, goal, f"tier_{k}", 1.1)
             terrace = Facade(1.1, (Band(0.8, 1.1, -0.1),))
             tiers.add_crown(self, plan, terrace, top, 1.0, part=f"terrace_{k}")
-            plan = _shaped(self, massing.inset(base, self.setbacks[k][1]))
+            total = total + np.round(share * reach, 1)
+            plan = _shaped(self, massing.inset(base, total))
         rise = self.crown_height if self.crown == "screen" else 0.0
         goal = self.height - self.crown_height
-        top = tiers.add_grooved(
-            self, plan, self.wall, top, goal, "tier_top", rise=rise
-        )
+        top = tiers.add_grooved(self, plan, top, goal, "tier_top", rise)
         _add_glass_skyscraper_crown(self, plan, top)
 
 
 def _shaped(p: GlassSkyscraper, outline: np.ndarray) -> np.ndarray:
-    size = p.corner_size
-    if p.corner == "chamfered":
+    side = massing.shortest_side(p.site.outline)
+    size = round(p.corner_size * side, 1)
+    if p.corners == "chamfered":
         return massing.chamfered(outline, size)
-    if p.corner == "notched":
+    if p.corners == "notched":
         return massing.notched(outline, 0.6 * size)
-    if p.corner == "rounded":
+    if p.corners == "rounded":
         corners = dict.fromkeys(range(len(outline)), size)
         return massing.rounded(outline, corners, 3.5)
     return outline
@@ -196,7 +105,7 @@ def _add_lobby(p: GlassSkyscraper, plan: np.ndarray) -> float:
     height, length = p.lobby_height, details.WallFrame(plan, 0).length
     door = bays.entrance(min(5.0, length / 3), 3.6, 1.6)
     bar = bays.bar(0.12, 0.0, height - 0.8, 0.4)
-    mullions = bays.rhythm(2 * p.wall.pitch, [bar], margin=1.0)
+    mullions = bays.rhythm(2 * p.pitch, [bar], margin=1.0)
     bands = (
         Band(0.0, height - 0.8, 0.7),
         Band(0.0, 0.3, 0.45),

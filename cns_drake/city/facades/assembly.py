@@ -64,6 +64,18 @@ class Site:
         return points
 
     @property
+    def width(self) -> float:
+        """Length of a rectangle along its front [m]."""
+        x0, _, x1, _ = self.bounds
+        return x1 - x0
+
+    @property
+    def depth(self) -> float:
+        """Length of a rectangle from front to back [m]."""
+        _, y0, _, y1 = self.bounds
+        return y1 - y0
+
+    @property
     def open_length(self) -> float:
         """Length of all walls that get windows [m]."""
         outline = self.outline
@@ -157,59 +169,6 @@ GROUND_OVERHANG_M = 0.35
 HEAD_ROOM_M = 2.3
 
 
-@dataclass(frozen=True)
-class Dice:
-    """Draws the parameters of a building.
-
-    Attributes:
-        kind: the archetype of the building.
-        site: its ground.
-        height: height of its parapet, ridge or spire; only roof equipment and
-            chimneys may rise above [m].
-        rng: the source of all variation.
-    """
-
-    kind: Archetype
-    site: Site
-    height: float
-    rng: np.random.Generator
-
-    @property
-    def width(self) -> float:
-        """Length of a rectangular site along its front [m]."""
-        x0, _, x1, _ = self.site.bounds
-        return x1 - x0
-
-    @property
-    def depth(self) -> float:
-        """Length of a rectangular site from front to back [m]."""
-        _, y0, _, y1 = self.site.bounds
-        return y1 - y0
-
-    def uniform(
-        self, low: float, high: float, digits: int | None = None
-    ) -> float:
-        """Draws a number, rounded to decimal digits if these are given."""
-        value = float(self.rng.uniform(low, high))
-        return value if digits is None else round(value, digits)
-
-    def whole(self, low: int, high: int) -> int:
-        """Draws a whole number from `low` to below `high`."""
-        return int(self.rng.integers(low, high))
-
-    def chance(self, share: float) -> bool:
-        """Draws True with the given probability."""
-        return bool(self.rng.random() < share)
-
-    def pick(self, choices: Sequence[T]) -> T:
-        """Draws one of the choices, all equally likely."""
-        return pick(self.rng, choices)
-
-    def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns the first `low` to below `high` words of a text."""
-        return words.split()[: self.whole(low, high)]
-
-
 @dataclass
 class Assembly:
     """Collects the parts and meshes of one building: a builder fills it.
@@ -233,6 +192,29 @@ class Assembly:
     meshes: dict[str, Mesh] = field(default_factory=dict)
     _colours: dict[str, Rgb] = field(default_factory=dict)
     _pieces: dict[str, list[Mesh]] = field(default_factory=dict)
+
+    def uniform(
+        self, low: float, high: float, digits: int | None = None
+    ) -> float:
+        """Draws a number, rounded to decimal digits if these are given."""
+        value = float(self.rng.uniform(low, high))
+        return value if digits is None else round(value, digits)
+
+    def whole(self, low: int, high: int) -> int:
+        """Draws a whole number from `low` to below `high`."""
+        return int(self.rng.integers(low, high))
+
+    def chance(self, share: float) -> bool:
+        """Draws True with the given probability."""
+        return bool(self.rng.random() < share)
+
+    def pick(self, choices: Sequence[T]) -> T:
+        """Draws one of the choices, all equally likely."""
+        return pick(self.rng, choices)
+
+    def some_of(self, words: str, low: int, high: int) -> list[str]:
+        """Returns the first `low` to below `high` words of a text."""
+        return words.split()[: self.whole(low, high)]
 
     def add(
         self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
@@ -337,7 +319,15 @@ class Building(Assembly, abc.ABC):
         """Draws the parameters, then the colours."""
         super().__init__(site, rng)
         self.kind, self.height = kind, height
-        self.draw(Dice(kind, site, height, rng))
+        draws = (self.uniform, self.whole, self.chance, self.pick, self.some_of)
+        names = {
+            **FUNCTIONS,
+            **{"kind": kind, "site": site, "height": height, "rng": rng},
+            **{draw.__name__: draw for draw in draws},
+        }
+        for name, formula in kind.parameters.items():
+            names[name] = value_of(formula, names)
+            setattr(self, name, names[name])
         self.colours: dict[str, Rgb] = {}
         for part, rgbs in kind.colours.items():
             if isinstance(rgbs, str):
@@ -354,14 +344,6 @@ class Building(Assembly, abc.ABC):
 
         def __getattr__(self, name: str) -> Any:
             """The parameters are those of the archetype's description."""
-
-    def draw(self, d: Dice) -> None:
-        """Draws the parameters but the colours, as described by default."""
-        draws = (d.uniform, d.whole, d.chance, d.pick, d.some_of)
-        names = {**FUNCTIONS, "d": d, **{f.__name__: f for f in draws}}
-        for name, formula in self.kind.parameters.items():
-            names[name] = value_of(formula, names)
-            setattr(self, name, names[name])
 
     @abc.abstractmethod
     def build(self) -> None:

@@ -111,10 +111,6 @@ def awnings(
     """Awnings above a share of the shops along a wall.
 
     Args:
-        wall: the wall.
-        cells: the shops along it.
-        rng: draws which have one.
-        share: part of the shops with one.
         shape: how much narrower than its shop on either side, reach, lower
             edge and upper edge of an awning [m].
         door: half the stretch in the middle of the wall without any [m].
@@ -163,16 +159,10 @@ def piers(
 ) -> Mesh:
     """Upright fins or pilasters along all walls of an outline.
 
-    Args:
-        outline: outline of the walls.
-        pitch: about the distance between them [m].
-        width: along the wall [m].
-        reach: out of the wall [m].
-        z0, z1: bottom and top [m].
-        depth: how far they go into the wall, past recessed glass [m].
-        margin: between the ends of a wall and the middle of a pier [m].
-        entrance: width in the middle of the front that stays free [m].
-        skip: edges without piers.
+    They stand about `pitch` apart, reach out of the wall, and go into it by
+    `depth`, past recessed glass. The outermost ones have their middle `margin`
+    from the ends; a width of `entrance` in the middle of the front stays free
+    [m]. Edges to `skip` get none.
     """
     pieces = []
     for edge in range(len(np.asarray(outline))):
@@ -207,13 +197,7 @@ def pilasters(
 ) -> Mesh:
     """Pilasters between the bays that `bays.rhythm` gives these walls.
 
-    Args:
-        outline: outline of the walls.
-        pitch, margin: those of the bays [m].
-        every: one pilaster each so many bays.
-        width, reach: those of a pilaster [m].
-        z0, z1: bottom and top [m].
-        skip: edges without pilasters.
+    There is one each `every` bays, none on edges to `skip`.
     """
     pieces = []
     for edge in range(len(np.asarray(outline))):
@@ -237,13 +221,8 @@ def corner_piers(
 ) -> Mesh:
     """Angled piers around the convex corners of an outline.
 
-    Args:
-        outline: outline of the walls.
-        width: width of each flank along its wall [m].
-        reach: out of the walls [m].
-        depth: into the walls, past recessed glass [m].
-        z0, z1: bottom and top [m].
-        skip: edges whose corners get none.
+    Each flank is `width` long, reaches out of the walls, and goes into them by
+    `depth`, past recessed glass [m]. Corners of edges to `skip` get none.
     """
     outline = np.asarray(outline, dtype=float)
     outer = massing.inset(outline, -reach)
@@ -341,13 +320,10 @@ def add_porch(
     roof: str = "shed",
     posts: int = 2,
 ) -> None:
-    """Adds a roofed porch in front of a wall.
+    """Adds a roofed porch in front of a wall, as `trim` and `roof`.
 
     Args:
-        out: gets `trim` and `roof`.
-        wall: the wall behind it.
-        x0, x1: its extent along the wall [m].
-        reach: reach of its posts out of the wall; the roof ends 0.25 m further.
+        reach: of its posts; the roof ends 0.25 m further out [m].
         deck: height of its floor [m].
         eaves: underside of the beam on the posts [m].
         top: top of the roof [m].
@@ -416,13 +392,7 @@ def add_railing(
 ) -> None:
     """Places the shared panel of railing between two points of a wall.
 
-    Args:
-        out: the building.
-        part: name of the visual.
-        wall: in whose coordinates the points are (x along, y outwards).
-        start, end: ends of the railing [m].
-        z: height of the floor [m].
-        rgb: its colour.
+    The points are in the wall's coordinates, the floor at z [m].
     """
     p, q = wall.point(*start), wall.point(*end)
     length = float(np.hypot(*(q - p)))
@@ -449,14 +419,9 @@ def add_bay_window(
 ) -> None:
     """Adds a bay window, on the ground (z0 = 0) or hung on the wall.
 
-    Args:
-        out: gets `glass`, `roof` and `walls`.
-        wall: the wall behind it.
-        x, width: its middle and extent along the wall [m].
-        reach: out of the wall [m].
-        z0, z1: bottom and top of its walls [m].
-        storeys: rows of windows.
-        canted: with slanted sides; else a box.
+    It has a row of windows for each of the `storeys` between z0 and z1, and
+    slanted sides if it is `canted`, else it is a box. It becomes `glass`,
+    `roof` and `walls`.
     """
     a, b = x - width / 2, x + width / 2
     if canted:
@@ -528,11 +493,8 @@ def casings(
 ) -> list[Mesh]:
     """Returns the frames of a wall's windows, in wall coordinates.
 
-    Args:
-        reliefs: the openings of the wall.
-        glass: depths of the windows among them [m].
-        style: `frame` (a ring of boards), `sill` or `shutters`.
-        reach: reach of the boards out of the wall [m].
+    Windows are the reliefs at the depths of `glass`. Styles are `frame` (a ring
+    of boards), `sill` and `shutters`; boards reach out of the wall [m].
     """
     pieces = []
     for r in reliefs:

@@ -62,12 +62,9 @@ class Openings:
     ) -> None:
         """Repeats bays along the free parts of walls.
 
-        Args:
-            edges: the walls.
-            z: height above which other wings hide them [m].
-            pitch: about the width of a bay [m].
-            choices: bays in turn, from both ends towards the middle.
-            margin: kept from the ends of each free part [m].
+        Bays take turns from both ends towards the middle, about `pitch` wide
+        and `margin` from the ends of a part. Parts that other wings hide at z
+        are not free [m].
         """
         for edge in edges:
             for a, b in free_stretches(self._wing, edge, self._others, z):
@@ -124,13 +121,9 @@ class Openings:
         bands: Sequence[Band] = (),
         material: str = "walls",
     ) -> None:
-        """Adds the walls on their foundation, with their panes.
+        """Adds the walls on their foundation, with their panes as `glass`.
 
-        Args:
-            materials: where to, the panes as `glass`.
-            glass: depths of the openings that have panes [m].
-            bands: strips around the wing.
-            material: material of the walls.
+        `glass` gives the depths of the openings that have panes [m].
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)
@@ -169,16 +162,8 @@ class Openings:
     ) -> None:
         """Adds a row of windows to each storey of a wing.
 
-        Windows of the ground floor are the widest.
-
-        Args:
-            edges: its walls with windows.
-            floor: height of the ground floor [m].
-            storey: height of a storey [m].
-            count: count of storeys.
-            pitch, width: those of the windows [m].
-            margin: kept from corners [m].
-            head: top of the windows above the floor [m].
+        Windows of the ground floor are the widest. They are kept `margin` from
+        corners; `head` is their top above the floor [m].
         """
         for k in range(count):
             z = floor + k * storey
@@ -266,36 +251,30 @@ class Openings:
     ) -> None:
         """Adds shops side by side between two points of a wall.
 
-        Args:
-            out: gets `trim` (fascias), `awning` and `sign`; its `rng` draws the
-                differences between shops.
-            edge: number of the wall.
-            start, end: the stretch [m].
-            height: height of the ground floor [m].
-            width: wanted, of a shop [m].
-            awnings: part of the shops with an awning.
-            reach: reach of awnings out of the wall [m].
+        They are about `width` wide, in a ground floor of some `height`; a part
+        of them has `awnings` with a reach out of the wall [m]. Fascias are
+        `sign`, blades `trim`, awnings `awning`.
         """
         wall = self._wing.wall(edge)
-        head, rng = round(height - 1.15, 2), out.rng
+        head = round(height - 1.15, 2)
         for a, b in bays.stretches(end - start, width, 0.1):
             x0, x1 = round(start + a, 2), round(start + b, 2)
             if x1 - x0 < 2.4:
                 continue
             shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
-            if rng.random() < 0.5:
+            if out.chance(0.5):
                 shop = _reversed(shop)
             self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
-            z, tall = head + 0.08, round(float(rng.uniform(0.55, 0.8)), 2)
+            z, tall = head + 0.08, out.uniform(0.55, 0.8, 2)
             fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
             out.add_to("sign", fascia)
-            if rng.random() < awnings:
+            if out.chance(awnings):
                 shade = details.awning(
                     x0 + 0.3, x1 - 0.3, reach, max(2.4, head - 0.8), head + 0.05
                 )
                 out.add_to("awning", wall.place(shade))
-            if rng.random() < 0.4:
-                x = x0 + 0.25 if rng.random() < 0.5 else x1 - 0.25
+            if out.chance(0.4):
+                x = x0 + 0.25 if out.chance(0.5) else x1 - 0.25
                 # Blades hang above heads, like awnings.
                 z = max(2.4, head + 0.1)
                 blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)

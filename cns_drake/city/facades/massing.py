@@ -48,6 +48,7 @@ def _inside(p: np.ndarray, triangle: np.ndarray) -> bool:
 
 
 Point = tuple[float, float]
+Corners = list[np.ndarray]
 # x0, y0, x1, y1.
 Area = tuple[float, float, float, float]
 # Buildings reach below their own ground level, for the ground has relief.
@@ -80,14 +81,9 @@ def square(x: float, y: float, half: float) -> np.ndarray:
 def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Moves each edge of an outline inwards and intersects them again.
 
-    Args:
-        points: outline.
-        distance: one distance for all edges or one per edge [m]; negative
-            ones move outwards.
-
-    Returns:
-        The outline of the moved edges, corner by corner. The caller keeps
-        the distances small against the lengths of the edges.
+    One distance is for all edges, or there is one per edge [m]; negative ones
+    move outwards. Corners keep their order. The caller keeps the distances
+    small against the lengths of the edges.
     """
     points = np.asarray(points, dtype=float)
     distances = np.broadcast_to(np.asarray(distance, float), len(points))
@@ -118,28 +114,16 @@ def inset_limit(points: ArrayLike) -> float:
 def rounded(
     points: ArrayLike, corners: dict[int, float], step: float
 ) -> np.ndarray:
-    """Rounds convex corners of an outline.
+    """Rounds convex corners of an outline by chords of at most `step` [m].
 
-    Args:
-        points: outline.
-        corners: corner index -> radius [m].
-        step: longest chord of the arcs [m].
-
-    Returns:
-        The outline with each of these corners replaced by chords; its first
-        edge is what the arcs leave of the first edge given.
+    `corners` gives their radii by number [m]. The first edge is what the arcs
+    leave of the first edge given.
     """
-    points = np.asarray(points, dtype=float)
-    result: list[np.ndarray] = []
-    front = 0
-    for k, p in enumerate(points):
-        if k not in corners:
-            result.append(p)
-            continue
+
+    def arc(
+        k: int, p: np.ndarray, into: np.ndarray, out: np.ndarray
+    ) -> Corners:
         radius = corners[k]
-        into = p - points[k - 1]
-        out = points[(k + 1) % len(points)] - p
-        into, out = into / np.hypot(*into), out / np.hypot(*out)
         cross = into[0] * out[1] - into[1] * out[0]
         turn = math.atan2(cross, float(into @ out))
         center = (
@@ -149,13 +133,13 @@ def rounded(
         )
         start = math.atan2(-into[0], into[1])
         count = max(1, math.ceil(radius * turn / step))
-        for i in range(count + 1):
-            angle = start + turn * i / count
-            arm = np.array([math.cos(angle), math.sin(angle)])
-            result.append(center + radius * arm)
-        if k == 0:
-            front = len(result) - 1
-    return np.roll(np.array(result), -front, axis=0)
+        angles = (start + turn * i / count for i in range(count + 1))
+        return [
+            center + radius * np.array([math.cos(a), math.sin(a)])
+            for a in angles
+        ]
+
+    return _replaced(points, arc, corners)
 
 
 def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
@@ -270,11 +254,9 @@ def revolved(
 ) -> Mesh:
     """Returns the surface that a profile sweeps around an upright axis.
 
-    Args:
-        profile: (radius, z) pairs from the bottom up [m]; a last radius of
-            zero gives a tip, else the top is closed by a lid.
-        count: sides of the polygon that stands for the circle.
-        center: where the axis stands [m].
+    The profile is (radius, z) pairs from the bottom up [m]; a last radius of
+    zero gives a tip, else the top is closed by a lid. A polygon of `count`
+    sides stands for the circle.
     """
 
     def ring(radius: float) -> np.ndarray:
@@ -301,26 +283,38 @@ def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
         x0, x1: ends of the shed [m].
     """
     base = profile[0][1]
-    vertices: list[tuple[float, float, float]] = []
-    faces: list[tuple[int, ...]] = []
-
-    def add(*corners: tuple[float, float, float]) -> None:
-        faces.append(tuple(range(len(vertices), len(vertices) + len(corners))))
-        vertices.extend(corners)
-
+    faces = Faces()
     for (ya, za), (yb, zb) in itertools.pairwise(profile):
-        add((x0, ya, za), (x1, ya, za), (x1, yb, zb), (x0, yb, zb))
+        faces.add((x0, ya, za), (x1, ya, za), (x1, yb, zb), (x0, yb, zb))
         if yb - ya < 1e-6:
             continue
         right = [(x1, ya, base), (x1, yb, base), (x1, yb, zb), (x1, ya, za)]
         corners = [c for k, c in enumerate(right) if c != right[k - 1]]
-        if len(corners) > 2:
-            add(*corners)
-            add(*((x0, y, z) for _, y, z in reversed(corners)))
+        faces.add(*corners)
+        faces.add(*((x0, y, z) for _, y, z in reversed(corners)))
     if profile[-1][1] > base:
         ya, za = profile[-1]
-        add((x0, ya, za), (x1, ya, za), (x1, ya, base), (x0, ya, base))
-    return Mesh(np.array(vertices), tuple(faces))
+        faces.add((x0, ya, za), (x1, ya, za), (x1, ya, base), (x0, ya, base))
+    return faces.mesh()
+
+
+class Faces:
+    """Collects faces by their corners and drops those without area."""
+
+    def __init__(self) -> None:
+        self._vertices: list[tuple[float, float, float]] = []
+        self._faces: list[tuple[int, ...]] = []
+
+    def add(self, *corners: tuple[float, float, float]) -> None:
+        kept = [c for k, c in enumerate(corners) if c != corners[k - 1]]
+        if len(kept) > 2:
+            first = len(self._vertices)
+            self._faces.append(tuple(range(first, first + len(kept))))
+            self._vertices.extend(kept)
+
+    def mesh(self) -> Mesh:
+        vertices = np.array(self._vertices, dtype=float).reshape(-1, 3)
+        return Mesh(vertices, tuple(self._faces))
 
 
 def bar(section: Sequence[Point | np.ndarray], y0: float, y1: float) -> Mesh:
@@ -405,33 +399,38 @@ def foundation(points: ArrayLike) -> Mesh:
 
 def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
     """Cuts every convex corner of an outline, `cut` metres along each edge."""
-    return _replaced(points, lambda p, a, b: [p - a * cut, p + b * cut])
+    return _replaced(points, lambda k, p, a, b: [p - a * cut, p + b * cut])
 
 
 def notched(points: np.ndarray, depth: float) -> np.ndarray:
     """Takes a square of side `depth` out of every convex corner."""
+    d = depth
     return _replaced(
-        points,
-        lambda p, a, b: [
-            p - a * depth,
-            p - a * depth + b * depth,
-            p + b * depth,
-        ],
+        points, lambda k, p, a, b: [p - a * d, p - a * d + b * d, p + b * d]
     )
 
 
 def _replaced(
-    points: np.ndarray,
-    corner: Callable[[np.ndarray, np.ndarray, np.ndarray], list[np.ndarray]],
+    points: ArrayLike,
+    corner: Callable[[int, np.ndarray, np.ndarray, np.ndarray], Corners],
+    chosen: Collection[int] | None = None,
 ) -> np.ndarray:
+    """Replaces convex corners, or those chosen, by several each.
+
+    `corner` gets its number, its place, and the directions of the edges before
+    and after it. The first edge stays the first one.
+    """
     points = np.asarray(points, dtype=float)
-    result: list[np.ndarray] = []
+    result: Corners = []
     for k, p in enumerate(points):
         a = p - points[k - 1]
         b = points[(k + 1) % len(points)] - p
         a, b = a / np.hypot(*a), b / np.hypot(*b)
-        convex = a[0] * b[1] - a[1] * b[0] > 0.1
-        result.extend(corner(p, a, b) if convex else [p])
+        if chosen is None:
+            replace = a[0] * b[1] - a[1] * b[0] > 0.1
+        else:
+            replace = k in chosen
+        result.extend(corner(k, p, a, b) if replace else [p])
         if k == 0:
             front = len(result) - 1
     return np.roll(np.array(result), -front, axis=0)
@@ -460,34 +459,17 @@ def u_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
     """A court open to the back: wings left and right of it, front closed."""
-    return np.array(
-        [
-            (x0, y0),
-            (x1, y0),
-            (x1, y1),
-            (x1 - wing, y1),
-            (x1 - wing, y0 + back),
-            (x0 + wing, y0 + back),
-            (x0 + wing, y1),
-            (x0, y1),
-        ]
-    )
+    a, b, c = x0 + wing, x1 - wing, y0 + back
+    xs = (x0, x1, x1, b, b, a, a, x0)
+    return np.column_stack([xs, (y0, y0, y1, y1, c, c, y1, y1)])
 
 
 def l_shape(
     x0: float, y0: float, x1: float, y1: float, wing: float, back: float
 ) -> np.ndarray:
     """A front range and one wing on the left."""
-    return np.array(
-        [
-            (x0, y0),
-            (x1, y0),
-            (x1, y0 + back),
-            (x0 + wing, y0 + back),
-            (x0 + wing, y1),
-            (x0, y1),
-        ]
-    )
+    a, c = x0 + wing, y0 + back
+    return np.column_stack([(x0, x1, x1, a, a, x0), (y0, y0, c, c, y1, y1)])
 
 
 def mirrored(points: np.ndarray) -> np.ndarray:

@@ -8,7 +8,6 @@ points, `across` rising. The roof lies along x, its line in y, unless
 from collections.abc import Sequence
 import itertools
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,21 +15,12 @@ from shapely.geometry import Point, Polygon
 
 from cns_drake.city.facades import bays, massing
 from cns_drake.city.facades.assembly import Assembly, Rgb
+from cns_drake.city.facades.walls import Patch
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]
 # Gables reach this far into the roof above them, lest rays slip between [m].
 _INTO_ROOF = 0.03
-
-
-class Hole(NamedTuple):
-    """A window in a gable: in wall coordinates, `depth` inwards [m]."""
-
-    x0: float
-    x1: float
-    z0: float
-    z1: float
-    depth: float
 
 
 def gable_line(
@@ -118,19 +108,16 @@ def shell(
 
 
 def gable_wall(
-    line: Line, a: float, b: float, z: float, holes: Sequence[Hole] = ()
+    line: Line, a: float, b: float, z: float, holes: Sequence[Patch] = ()
 ) -> Mesh:
     """Returns the wall between z and a roof line, in wall coordinates.
 
-    Args:
-        line: the underside of the roof, across as the wall's x [m].
-        a, b: ends of the wall [m].
-        z: its bottom, at most the line's height within a..b [m].
-        holes: windows in it, beside one another; `gable_glass` closes them.
+    `line` is the underside of the roof, across as the wall's x, from a to b at
+    least at z. Holes lie beside one another; `gable_glass` closes them.
     """
     bounds = {a, b, *(u for u, _ in line if a < u < b)}
     bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
-    faces = _Faces()
+    faces = massing.Faces()
 
     def top(x: float) -> float:
         height = line_height(line, x)
@@ -153,32 +140,13 @@ def gable_wall(
     return faces.mesh()
 
 
-def gable_glass(holes: Sequence[Hole]) -> Mesh:
+def gable_glass(holes: Sequence[Patch]) -> Mesh:
     """Returns the panes of a gable wall's windows, in wall coordinates."""
-    faces = _Faces()
+    faces = massing.Faces()
     for h in holes:
         low, high = (h.x0, -h.depth, h.z0), (h.x1, -h.depth, h.z1)
         faces.add(low, (h.x0, -h.depth, h.z1), high, (h.x1, -h.depth, h.z0))
     return faces.mesh()
-
-
-class _Faces:
-    """Collects faces by their corners and drops those without area."""
-
-    def __init__(self) -> None:
-        self._vertices: list[tuple[float, float, float]] = []
-        self._faces: list[tuple[int, ...]] = []
-
-    def add(self, *corners: tuple[float, float, float]) -> None:
-        kept = [c for k, c in enumerate(corners) if c != corners[k - 1]]
-        if len(kept) > 2:
-            first = len(self._vertices)
-            self._faces.append(tuple(range(first, first + len(kept))))
-            self._vertices.extend(kept)
-
-    def mesh(self) -> Mesh:
-        vertices = np.array(self._vertices, dtype=float).reshape(-1, 3)
-        return Mesh(vertices, tuple(self._faces))
 
 
 def hip(
@@ -186,12 +154,8 @@ def hip(
 ) -> Mesh:
     """Returns a hipped roof over a rectangle, boxed in below its eaves.
 
-    Args:
-        outline: outline of the walls, four corners.
-        z: underside of the eaves [m].
-        top: height of the ridge [m].
-        eaves: overhang, one or one per edge [m].
-        fascia: height of the upright edge [m].
+    The underside of the eaves is at z, the ridge at `top`; `fascia` is the
+    height of their upright edge. `eaves` is one overhang or one per edge [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
     slopes = massing.skirt(outer, _ridge(outer), z + fascia, top)
@@ -241,16 +205,9 @@ def add_chimney(
     yaw: float = 0.0,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Stands a shared chimney on a pitched roof.
+    """Stands a shared `chimney` or `chimney_row` on a pitched roof.
 
-    Args:
-        out: the building.
-        part: name of the visual.
-        xyz: xyz of its foot, below the roof's surface [m].
-        rgb: its colour.
-        item: `chimney` or `chimney_row`.
-        yaw: its heading [rad].
-        scale: along its axes.
+    Its foot is at `xyz`, below the roof's surface [m].
     """
     out.place(part, out.shared(f"roof_{item}", scale), xyz, yaw, rgb=rgb)
 
@@ -265,13 +222,9 @@ def equip_roof(
 ) -> None:
     """Stands equipment on a flat roof without overlaps, as far as it fits.
 
-    Args:
-        out: the building; its `rng` draws places, headings, sizes.
-        roof: outline of the free roof [m].
-        z: height of the roof [m].
-        items: what to stand there, the most important first.
-        clear: distance kept from the edge [m].
-        prefix: start of the names of the visuals.
+    The building's `rng` draws places, headings and sizes. The first items are
+    the most important; all keep `clear` from the edge of the roof [m]. Names of
+    visuals start with `prefix`.
     """
     room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds

@@ -1,7 +1,6 @@
 """Stacks storeys into a building: ground floor, storeys, crown, roof."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -28,12 +27,9 @@ def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
 def divided(
     height: float, storey: float, most: int = 10
 ) -> tuple[int, int, float]:
-    """Divides a height into storeys, and these into equal groups.
+    """Divides a height into storeys, and these into at most so many groups.
 
-    Args:
-        height: to be filled, but for millimetres [m].
-        storey: wanted height of a storey [m].
-        most: greatest number of groups; a group becomes one visual.
+    A group becomes one visual.
 
     Returns:
         Number of groups, storeys in a group, height of a storey in whole
@@ -105,33 +101,9 @@ def _pane(outline: ArrayLike, facade: Facade, z0: float, z1: float) -> Mesh:
     return Mesh(pane.vertices, faces)
 
 
-@dataclass(frozen=True)
-class Grooves:
-    """A wall of upright piers with windows over spandrels between them.
-
-    Attributes:
-        storey_height: wanted, of a storey [m].
-        spandrel: height of the wall under the windows [m].
-        ledge: how far a lip under the windows sticks out [m].
-        glass_depth: depth of the windows behind the spandrels [m].
-        pitch, width, reach: those of the piers [m]; none where width is 0.
-        corner: width of solid corners [m]; 0 for glass around the corner.
-    """
-
-    storey_height: float
-    spandrel: float
-    ledge: float
-    glass_depth: float
-    pitch: float
-    width: float
-    reach: float
-    corner: float
-
-
 def add_grooved(
-    out: Assembly,
+    p: Building,
     outline: ArrayLike,
-    wall: Grooves,
     z0: float,
     goal: float,
     part: str,
@@ -139,35 +111,49 @@ def add_grooved(
     most: int = 4,
     plain: frozenset[int] = frozenset(),
 ) -> float:
-    """Adds storeys from z0 to about `goal`; their piers rise above them.
-
-    Returns their top [m], less than `goal` by millimetres.
+    """Adds storeys of upright piers with windows over spandrels between them.
 
     Bands that run around the building and piers as tall as the tier cost a
     fraction of single windows.
+
+    Args:
+        p: the building. Its parameters are `storey_height`, `spandrel`, of the
+            wall under the windows, `ledge`, the reach of a lip there, `recess`,
+            the depth of the windows, `pitch`, `pier` and `pier_reach`, of the
+            piers, whose width may be 0, and `solid_corner`, the width of
+            solid corners, 0 for glass around the corner [m].
+        outline: outline of the walls.
+        z0, goal: bottom, and about the top [m].
+        part: name of the visuals.
+        rise: how far the piers rise above the storeys [m].
+        most: greatest number of visuals that the storeys become.
+        plain: edges without any relief.
+
+    Returns:
+        Their top, less than `goal` by millimetres [m].
     """
-    groups, per_group, storey = divided(goal - z0, wall.storey_height, most)
-    depth = wall.glass_depth
-    bands = [Band(0.0, wall.spandrel, 0.0), Band(wall.spandrel, storey, depth)]
-    if wall.ledge > 0:
-        bands.append(Band(0.0, 0.2, -wall.ledge))
+    groups, per_group, storey = divided(goal - z0, p.storey_height, most)
+    depth = p.recess
+    bands = [Band(0.0, p.spandrel, 0.0), Band(p.spandrel, storey, depth)]
+    if p.ledge > 0:
+        bands.append(Band(0.0, 0.2, -p.ledge))
     facade = Facade(storey, tuple(bands), glass=(depth,), plain=plain)
-    top = add_storeys(out, outline, facade, z0, groups, per_group, part=part)
+    top = add_storeys(p, outline, facade, z0, groups, per_group, part=part)
     pieces, into = [], depth + 0.05
-    if wall.corner > 0:
-        size = (wall.corner, wall.reach, into)
+    if p.solid_corner > 0:
+        size = (p.solid_corner, p.pier_reach, into)
         pieces.append(
             details.corner_piers(outline, *size, z0, top + rise, plain)
         )
-    if wall.width > 0:
-        margin = max(wall.corner + wall.pitch - wall.width, into + wall.width)
+    if p.pier > 0:
+        margin = max(p.solid_corner + p.pitch - p.pier, into + p.pier)
         piers = details.piers(
-            outline, wall.pitch, wall.width, wall.reach, z0, top + rise,
+            outline, p.pitch, p.pier, p.pier_reach, z0, top + rise,
             depth=into, margin=margin, skip=plain,
         )  # fmt: skip
         pieces.append(piers)
     if pieces:
-        out.add(f"{part}_piers", *pieces)
+        p.add(f"{part}_piers", *pieces)
     return top
 
 
@@ -192,12 +178,9 @@ def shaft_walls(
 ) -> Facade:
     """Returns the walls of a stair: one bay in front, one behind.
 
-    Args:
-        height: height of the walls [m].
-        entry, slit: the bays, in the middle of the front and of the back.
-        room: width that they get [m].
-        rim: height and reach of a band at the top [m].
-        glass: depths of the bays that are glazed on their own [m].
+    Both are in the middle of their walls and get `room`. `rim` is height and
+    reach of a band at the top. Bays at depths of `glass` are glazed on their
+    own [m].
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
     layout = bays.by_edge(layouts, bays.plain)

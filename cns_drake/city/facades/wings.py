@@ -14,11 +14,11 @@ import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs
 from cns_drake.city.facades.assembly import Assembly
-from cns_drake.city.facades.roofs import Hole
+from cns_drake.city.facades.walls import Patch
 from cns_drake.city.geometry.mesh import Mesh
 
 # The windows of a gable: (from, to) -> holes.
-Attic = Callable[[float, float], list[Hole]]
+Attic = Callable[[float, float], list[Patch]]
 # Overlap of a roof's underside with the top of the walls [m].
 _SEAT = 0.02
 
@@ -177,17 +177,12 @@ def add_roof(
     attic: Attic | None = None,
     material: str = "walls",
 ) -> None:
-    """Adds a wing's roof and gables.
+    """Adds a wing's roof, as `roof`, and gables of a material.
 
-    Args:
-        out: where to, the roof as `roof`.
-        wing: the wing.
-        attic: (x0, x1) -> holes for the windows of a gable, or None.
-        material: material of the gables.
+    `attic` gives the windows of the gables.
     """
-    roof, outline = wing.roof, wing.outline
-    blind = np.array([k in wing.blind for k in range(4)])
-    reach = np.where(blind, 0.0, roof.eaves)
+    roof, outline, line = wing.roof, wing.outline, wing.line
+    is_free = [k not in wing.blind for k in range(4)]
     if roof.kind == "flat":
         floor = round(wing.top - roof.parapet, 3)
         out.add_to(
@@ -196,26 +191,18 @@ def add_roof(
             massing.roof_pan(outline, floor, wing.top, 0.25),
         )
         return
-    z = wing.wall_top - _SEAT
     if roof.kind == "hip":
+        reach, z = np.where(is_free, roof.eaves, 0.0), wing.wall_top - _SEAT
         solid = roofs.hip(outline, z, wing.top, reach, roof.thickness)
         out.add_to("roof", solid)
         return
-    _add_shell(out, wing, attic, material)
-
-
-def _add_shell(
-    out: Assembly, wing: Wing, attic: Attic | None, material: str
-) -> None:
-    roof, line = wing.roof, wing.line
-    blind = [k in wing.blind for k in range(4)]
     low_edge, high_edge = (3, 1) if roof.along_y else (0, 2)
     start_edge, end_edge = wing.gables
     start, end = wing.ridge
-    start -= roof.verge * (not blind[start_edge])
-    end += roof.verge * (not blind[end_edge])
+    start -= roof.verge * is_free[start_edge]
+    end += roof.verge * is_free[end_edge]
     # A shed roof has no eaves at its upper end: its top is the wing's.
-    ends = [not blind[low_edge], not blind[high_edge]]
+    ends = [is_free[low_edge], is_free[high_edge]]
     if roof.kind == "shed":
         ends[0 if roof.falling else 1] = False
     covering = roofs.with_eaves(line, *(roof.eaves * e for e in ends))
@@ -226,23 +213,20 @@ def _add_shell(
     for edge in wing.gables:
         wall = wing.wall(edge)
         under = _seen_from(wing, edge, line)
-        holes: list[Hole] = []
-        if attic is not None and edge not in wing.blind:
+        holes: list[Patch] = []
+        if attic is not None and is_free[edge]:
             holes = [
                 hole for hole in attic(0.0, wall.length) if _fits(hole, under)
             ]
         gable = roofs.gable_wall(under, 0.0, wall.length, wing.wall_top, holes)
         out.add_to(material, wall.place(gable))
         if holes:
-            glass = roofs.gable_glass(holes)
-            out.add_to("glass", wall.place(glass))
+            out.add_to("glass", wall.place(roofs.gable_glass(holes)))
     if roof.kind == "shed":
         # The tall side, from the walls up to the roof.
         wall = wing.wall(low_edge if roof.falling else high_edge)
-        top = wing.top - roof.thickness
-        shield = roofs.gable_wall(
-            [(0.0, top), (wall.length, top)], 0.0, wall.length, wing.wall_top
-        )
+        top = [(x, wing.top - roof.thickness) for x in (0.0, wall.length)]
+        shield = roofs.gable_wall(top, 0.0, wall.length, wing.wall_top)
         out.add_to(material, wall.place(shield))
 
 
@@ -259,7 +243,7 @@ def _seen_from(
     return [(end - u, z - thickness) for u, z in reversed(line)]
 
 
-def _fits(hole: Hole, under: list[bays.Span]) -> bool:
+def _fits(hole: Patch, under: list[bays.Span]) -> bool:
     return all(
         hole.z1 < roofs.line_height(under, x) - 0.15 for x in (hole.x0, hole.x1)
     )
@@ -270,11 +254,11 @@ def attic_window(
 ) -> Attic:
     """Returns windows side by side in the middle of a gable."""
 
-    def holes(a: float, b: float) -> list[Hole]:
+    def holes(a: float, b: float) -> list[Patch]:
         step = 1.5 * width
         first = (a + b) / 2 - step * (count - 1) / 2
         return [
-            Hole(
+            Patch(
                 round(x - width / 2, 2), round(x + width / 2, 2), z0, z1, depth
             )
             for x in (first + k * step for k in range(count))
@@ -311,14 +295,12 @@ def add_dormer(
     """Adds a dormer on the slope that rises behind a wall, if it fits.
 
     Args:
-        out: gets `glass`, `roof` and `walls`.
-        wall: the wall below the slope.
-        x, width: middle and width of the dormer along the wall [m].
+        x, width: its middle and width along the wall [m].
         base: height of the slope's upper surface above the wall [m].
         slope: its rise per run.
         ridge: its upper end, above the dormer [m].
-        setback: setback of the dormer's front from the wall [m].
-        height: height of its front above the slope [m].
+        setback: of the dormer's front from the wall [m].
+        height: of its front above the slope [m].
         roof: `gable`, `shed` or `flat`.
     """
     a, b = x - width / 2, x + width / 2
@@ -340,7 +322,7 @@ def add_dormer(
         lid = roofs.shell(fall, a - 0.15, b + 0.15, _THICKNESS)
     under = [(u, z - _THICKNESS) for u, z in line]
     low = foot - _SUNK
-    hole = Hole(
+    hole = Patch(
         round(a + 0.15, 2), round(b - 0.15, 2),
         round(foot + 0.25, 2), round(eaves - 0.15, 2), _RECESS,
     )  # fmt: skip
@@ -369,15 +351,10 @@ def add_dormers(
 ) -> None:
     """Adds dormers side by side on the front slope of a wing.
 
-    On a gambrel roof they stand on the steep part, without a pitched roof.
-
-    Args:
-        out: where to.
-        wing: with a `gable` or `gambrel` roof along the front.
-        start, end: the stretch of the front wall below them [m].
-        count: count of dormers, at most.
-        roof: their shape.
-        pitch: greatest distance between two [m].
+    They stand above the stretch from `start` to `end` of the front wall, at
+    most `count`, and `pitch` apart [m]. The wing has a `gable` or `gambrel`
+    roof along the front. On a gambrel roof they stand on the steep part,
+    without a pitched roof.
     """
     (u0, z0), (u1, z1) = wing.line[:2]
     slope, room = (z1 - z0) / (u1 - u0), z1 - z0

@@ -60,12 +60,7 @@ def _functions(rng: np.random.Generator) -> _Names:
 def _build(
     entry: Mapping[str, Any], rng: np.random.Generator, **parameters: Any
 ) -> Model:
-    """Returns an object.
-
-    Args:
-        entry: its description.
-        rng: draws what formulas ask for.
-        parameters: those that its description has, if they are given.
+    """Returns an object from its description.
 
     Raises:
         TypeError: it has no such parameter.

@@ -154,7 +154,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         Polygon(),
         (*street_structures(network), marking_structure(network)),
         lambda draft: furnish_junctions(draft, network),
-        lambda draft: park_along_streets(draft, network, plan.cars),
+        lambda draft: park_along_streets(draft, network),
     )
     return build_along(streets, plan, source)
 
@@ -168,7 +168,7 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
         InputError: if the plan names something unknown or impossible.
     """
     _check_names(plan, source)
-    draft = Draft(streets.areas, streets.kerb_height, plan.seed)
+    draft = Draft(streets.areas, streets.kerb_height, plan, source)
     for area in (streets.margins, streets.reserved):
         if not area.is_empty:
             draft.take(area)
@@ -179,7 +179,7 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     terraces = [pad for district in districts for pad in district.terraces]
     draft.base = make_ground(*place, terraces)
     for district in districts:
-        place_buildings(draft, district, source)
+        place_buildings(draft, district)
     level = aprons(draft.structures, draft.streets)
     draft.base = make_ground(*place, [*level, *terraces])
     shape = GroundShape(
@@ -200,10 +200,10 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     draft.ground = UpperSides(ground_triangles(surfaces))
     streets.furnish(draft)
     for district in districts:
-        furnish(draft, district, plan.cars, source)
-    furnish_sidewalks(draft, plan, districts, streets.junctions)
+        furnish(draft, district)
+    furnish_sidewalks(draft, districts, streets.junctions)
     streets.park(draft)
-    plant_medians(draft, plan.medians or plan.street)
+    plant_medians(draft)
     return City((*ground, *draft.structures), plan.cars)
 
 

@@ -1,13 +1,12 @@
 """Writes a city's stages, meshes and table of structures."""
 
-from collections.abc import Callable, Iterable, Sequence
-import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
-import tempfile
 from xml.sax.saxutils import quoteattr
 
 from cns_drake.base.csv_files import csv_text
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import user_errors, write_text
 from cns_drake.base.map_folder import (
     MESH_FOLDER,
     STAGES_NAME,
@@ -44,13 +43,8 @@ def stage_sdf(
     A static scene is parsed fastest as one link with many visuals, and it
     carries no collision geometry because nothing ever touches it. The
     visual's name is `<structure>/<part>`; Drake keeps it as the geometry
-    name, which is how a LiDAR return finds its structure.
-
-    Args:
-        world: the name of the world and of its model.
-        structures: what stands at this stage.
-        comment: one line for the reader of the file.
-        before: SDF text of other visuals.
+    name, which is how a LiDAR return finds its structure. `comment` is one line
+    for the reader of the file, `before` SDF text of other visuals.
     """
     lines = [
         '<?xml version="1.0"?>',
@@ -151,12 +145,8 @@ def render_city(
 ) -> dict[str, str]:
     """Returns the text of every generated file by its relative path.
 
-    Args:
-        world: folder with `stages.yaml`; gives the world its name.
-        city: made from the folder's `roads.yaml` and `city.yaml`.
-        progress: takes one line at a time.
-        stages_text: the coming content of `stages.yaml`; by default the present
-            one.
+    `stages_text` is the coming content of `stages.yaml`; by default the present
+    one.
 
     Raises:
         InputError: if the stages cannot be used or the city has too many
@@ -184,14 +174,8 @@ def render_stages(
 ) -> dict[str, str]:
     """Returns the text of the files of some stages by their relative paths.
 
-    Args:
-        world: the name of the world.
-        city: the whole city.
-        stages: the differences between the stages.
-        wanted: which stages.
-        source: the file of the stages, for messages.
-        progress: takes one line at a time.
-        origin: the source of the city, one line for readers of its files.
+    `source` is the file of the stages, for messages; `origin`, one line for
+    readers of the files, says where the city is from.
 
     Raises:
         InputError: if a structure cannot be lower or under construction as
@@ -225,7 +209,11 @@ def render_stages(
             f"stage {stage} lacks {len(stages.absent(stage))} structures, "
             f"{len(stages.heights(stage))} are lower"
         )
-    files.update(_mesh_files(used))
+    meshes = meshes_of(used)
+    shapes = [part.shape for one in used for part in one.model.parts]
+    names = {shape.mesh for shape in shapes if isinstance(shape, MeshShape)}
+    for name in sorted(names):
+        files[f"{MESH_FOLDER}/{name}.obj"] = meshes[name].to_obj()
     return files
 
 
@@ -256,22 +244,25 @@ def generate_city(
             not to be repaired; or if one is gone, and that cannot be.
     """
     world = Path(world)
+    files = _rendered(world, progress, repair_stages)
+    with user_errors(world / MESH_FOLDER):
+        (world / MESH_FOLDER).mkdir(exist_ok=True)
+    for name, content in files.items():
+        write_text(world / name, content)
+    for path in _generated(world) - {world / name for name in files}:
+        with user_errors(path):
+            path.unlink()
+    return [world / name for name in files if name != STAGES_NAME]
+
+
+def _rendered(
+    world: Path, progress: Callable[[str], None], repair_stages: bool
+) -> dict[str, str]:
+    """Returns the text of every file to write by its relative path."""
     city = make_city(world)
     text = _stages_text(world, city, repair_stages, progress)
     files = render_city(world, city, progress, text)
-    try:
-        (world / MESH_FOLDER).mkdir(exist_ok=True)
-        if text is not None:
-            _replace(world / STAGES_NAME, text)
-        for name, content in files.items():
-            _replace(world / name, content)
-        for path in _generated(world) - {world / name for name in files}:
-            path.unlink()
-    except OSError as error:
-        raise InputError(
-            f"{error.filename or world}: {error.strerror}"
-        ) from error
-    return [world / name for name in files]
+    return files if text is None else {STAGES_NAME: text, **files}
 
 
 def _stages_text(
@@ -285,13 +276,15 @@ def _stages_text(
     stages, table = world / STAGES_NAME, world / STRUCTURES_NAME
     if not table.exists() and not repair:
         return None
+    try:
+        found = find_renaming(stages, table, city.structures)
+    except InputError:
+        if repair:
+            raise
+        # A faulty table will be written anew; faulty stages are reported
+        # later.
+        return None
     if not repair:
-        try:
-            found = find_renaming(stages, table, city.structures)
-        except InputError:
-            # A faulty table will be written anew; faulty stages are reported
-            # later.
-            return None
         for old, new in found.renamed.items():
             raise InputError(
                 f"{stages}: {old} is {new} now, and {len(found.renamed) - 1} "
@@ -299,9 +292,12 @@ def _stages_text(
                 f"(if they are there already, remove {STRUCTURES_NAME})"
             )
         return None
-    found = find_renaming(stages, table, city.structures)
-    for line in found.lines():
-        progress(line)
+    for old, new in found.renamed.items():
+        progress(f"{old} is {new} now")
+    for name in found.lost:
+        progress(f"{name} has no counterpart")
+    for pattern in found.unclear:
+        progress(f"{pattern} matches other structures than before")
     if found.lost:
         raise InputError(
             f"{stages}: {len(found.lost)} structure(s) have no counterpart, "
@@ -318,11 +314,7 @@ def differing_files(
 ) -> list[Path]:
     """Returns the files that generating the city anew would change."""
     world = Path(world)
-    city = make_city(world)
-    text = _stages_text(world, city, repair_stages, progress)
-    files = render_city(world, city, progress, text)
-    if text is not None:
-        files[STAGES_NAME] = text
+    files = _rendered(world, progress, repair_stages)
     stale = _generated(world) - {world / name for name in files}
     changed = {
         world / name
@@ -333,21 +325,6 @@ def differing_files(
     return sorted(stale | changed)
 
 
-def _mesh_files(structures: Sequence[Structure]) -> dict[str, str]:
-    """Returns the OBJ text of every mesh that a part refers to."""
-    meshes = meshes_of(structures)
-    used = {
-        part.shape.mesh
-        for structure in structures
-        for part in structure.model.parts
-        if isinstance(part.shape, MeshShape)
-    }
-    return {
-        f"{MESH_FOLDER}/{name}.obj": meshes[name].to_obj()
-        for name in sorted(used)
-    }
-
-
 def _generated(world: Path) -> set[Path]:
     """Returns the files in a world folder that a generator wrote."""
     return {
@@ -355,17 +332,3 @@ def _generated(world: Path) -> set[Path]:
         *(world / MESH_FOLDER).glob("*.obj"),
         *world.glob(STRUCTURES_NAME),
     }
-
-
-def _replace(path: Path, text: str) -> None:
-    """Writes a file under a temporary name, then renames it."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".new_")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        # mkstemp makes files that only their owner can read.
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise

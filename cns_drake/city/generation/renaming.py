@@ -1,10 +1,10 @@
 """Brings the names in `stages.yaml` up to a plan that has grown."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 import re
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,8 +21,7 @@ _SAME_PLACE = 0.3
 _COLUMNS = ("name", "class", "x", "y", "tags")
 
 
-@dataclass(frozen=True)
-class Renaming:
+class Renaming(NamedTuple):
     """The new names of the structures that a file of stages names.
 
     Attributes:
@@ -36,18 +35,8 @@ class Renaming:
     lost: list[str]
     unclear: list[str]
 
-    def lines(self) -> Iterator[str]:
-        """Yields a line for each change."""
-        for old, new in self.renamed.items():
-            yield f"{old} is {new} now"
-        for name in self.lost:
-            yield f"{name} has no counterpart"
-        for pattern in self.unclear:
-            yield f"{pattern} matches other structures than before"
 
-
-@dataclass(frozen=True)
-class _Row:
+class _Row(NamedTuple):
     name: str
     semantic_class: str
     xy: tuple[float, float]
@@ -72,7 +61,10 @@ def find_renaming(
         InputError: a file cannot be read.
     """
     before = {row.name: row for row in _read(table)}
-    today = [_row_of(structure) for structure in structures]
+    today = [
+        _Row(one.name, one.semantic_class, one.xyz[:2], " ".join(one.tags))
+        for one in structures
+    ]
     successor = _successors(list(before.values()), today)
     names = {row.name for row in today}
     renamed: dict[str, str] = {}
@@ -206,16 +198,6 @@ def _read(table: Path) -> list[_Row]:
             raise InputError(f"{table}: line {line}: no finite x and y")
         rows.append(_Row(row["name"], row["class"], xy, row["tags"]))
     return rows
-
-
-def _row_of(structure: Structure) -> _Row:
-    x, y, _ = structure.xyz
-    return _Row(
-        structure.name,
-        structure.semantic_class,
-        (x, y),
-        " ".join(structure.tags),
-    )
 
 
 def _successors(

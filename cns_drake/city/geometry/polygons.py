@@ -291,14 +291,10 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
 def tiles(
     geometry: BaseGeometry, size: float
 ) -> Iterator[tuple[int, int, MultiPolygon]]:
-    """Yields the pieces of a geometry in squares of a world-anchored grid.
-
-    Args:
-        geometry: polygons in W [m].
-        size: edge length of a square [m].
+    """Yields the pieces of polygons in squares of a world-anchored grid.
 
     Yields:
-        The square's column and row, and the polygons within it.
+        The column and row of each square, and the polygons within it.
     """
     if geometry.is_empty:
         return

@@ -196,12 +196,7 @@ def make_ground(
 ) -> Ground:
     """Returns level ground where all roads and pads are level, else slopes.
 
-    Args:
-        surface: surface of the roads.
-        kerb_height: height of sidewalks above the roads [m].
-        streets: carriageways, sidewalks and medians in W [m].
-        bounds: x0, y0, x1, y1 of the city [m].
-        pads: outside the streets; of two that meet the first wins.
+    The arguments are those of `SlopingGround`.
     """
     if surface.is_level and all(pad.height == kerb_height for pad in pads):
         return LevelGround(kerb_height)

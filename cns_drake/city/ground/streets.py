@@ -168,14 +168,8 @@ def ground_structure(
 ) -> Structure:
     """Returns the upper side of an area, one part a tile.
 
-    Args:
-        name: name of the structure; also stem of its mesh names.
-        semantic_class: class of the structure.
-        area: polygons in W [m].
-        height: in W [m], or a height map.
-        rgb: colour.
-        spacing: spacing of the mesh that follows a height map [m]; 0: only the
-            polygons' own vertices.
+    A mesh that follows a height map has vertices `spacing` apart [m], or with 0
+    those of the polygons alone.
     """
     pieces = {
         f"tile_{k:02d}": surface_mesh(piece, height, spacing)

@@ -81,14 +81,7 @@ class GroundShape:
         buildings: BaseGeometry,
         rng_of: Callable[[str], np.random.Generator],
     ):
-        """Shapes the ground around buildings.
-
-        Args:
-            base: without relief.
-            districts: with their ground.
-            buildings: footprints of all buildings in W.
-            rng_of: district name -> generator.
-        """
+        """Shapes the ground around the footprints of buildings in W."""
         self.base = base
         self._swells = [
             _make_swell(district, buildings, rng_of(district.plan.name))
@@ -112,10 +105,7 @@ def ground_structures(
 ) -> list[Structure]:
     """Returns the ground of all districts.
 
-    Args:
-        districts: with their ground.
-        shape: height of everything but water.
-        water_level: height of water [m].
+    `shape` is the height of everything but water.
     """
     structures = []
     # Land within water is a bridge, and water passes below it.
@@ -235,12 +225,7 @@ _WATER_RGB = (0.25, 0.38, 0.45)
 
 
 def water_area(district: District, streets: BaseGeometry) -> BaseGeometry:
-    """Returns all of a district's water, also that below bridges, in W [m].
-
-    Args:
-        district: a district whose ground is water.
-        streets: the area of all streets in W [m].
-    """
+    """Returns all of a water district's water, also that below bridges."""
     if district.plan.area is None:
         return district.area
     below = Polygon(district.plan.area).intersection(streets)
@@ -257,13 +242,7 @@ def bridge_structures(
 
     Where a street crosses the area of a district of water, and where such a
     district has a patch of land, there is a bridge. Its upper side is that
-    of the street or patch.
-
-    Args:
-        districts: with their ground.
-        streets: the area of all streets in W [m].
-        shape: height of everything but water.
-        water_level: height of water [m].
+    of the street or patch. `shape` is the height of everything but water.
     """
     structures = []
     for district in districts:

@@ -44,16 +44,10 @@ _Point = list[float]
 def lowered(model: Model, height: float, name: str, seed: int) -> Model:
     """Returns a building that ends at a height, under a flat roof.
 
-    Args:
-        model: the whole building.
-        height: height of the roof above the building's own ground [m]; its
-            parapet and the equipment on the roof reach higher.
-        name: name of the building; its new meshes are called after it.
-        seed: seed of what stands on the roof.
-
-    Returns:
-        A building with the same footprint; the model itself where less than
-        a storey of it lies above `height`, or nothing there is enclosed.
+    The roof is at `height` above the building's own ground [m]; its parapet and
+    the equipment on it, drawn from `seed`, reach higher. New meshes are called
+    after `name`. The model itself is returned where less than a storey of it
+    lies above `height`, or nothing there is enclosed.
     """
     placed = [(part, part_mesh(part, model.meshes)) for part in model.parts]
     if _top(placed) < height + _STOREY:

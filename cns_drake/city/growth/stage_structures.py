@@ -6,7 +6,7 @@ another use."""
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 import math
-from typing import get_args
+from typing import Any, get_args
 import zlib
 
 import numpy as np
@@ -18,14 +18,12 @@ from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.geometry.polygons import Occupancy
 from cns_drake.city.geometry.structures import (
     BoxShape,
-    CylinderShape,
     MeshShape,
     Model,
     Part,
-    Shape,
-    SphereShape,
     Structure,
     part_mesh,
+    triple,
 )
 from cns_drake.city.growth.lowering import lowered
 from cns_drake.city.placement.objects import OBJECTS, pick
@@ -33,14 +31,9 @@ from cns_drake.city.plan.stages import LotUse, Stages
 
 
 def younger(model: Model, height: float) -> Model:
-    """Returns a plant of a height, alike in all its proportions.
+    """Returns a plant with a top at a height [m], alike in all its proportions.
 
-    Args:
-        model: the grown plant, on z = 0.
-        height: height of its top [m].
-
-    Returns:
-        A plant with the same footprint; the model itself if it is lower.
+    The plant stands on z = 0. If it is lower it is returned itself.
     """
     top = max(
         part_mesh(part, model.meshes).vertices[:, 2].max()
@@ -53,28 +46,24 @@ def younger(model: Model, height: float) -> Model:
 
 def scaled(model: Model, share: float) -> Model:
     """Returns a plant of another size, alike in all its proportions."""
-    parts = tuple(_scaled(part, share) for part in model.parts)
-    return replace(model, parts=parts)
 
+    def times(values: tuple[float, ...], digits: int) -> list[float]:
+        return np.round(np.multiply(values, share), digits).tolist()
 
-def _scaled(part: Part, share: float) -> Part:
-    x, y, z = np.round(np.multiply(part.xyz, share), 4).tolist()
-    return replace(part, shape=_scaled_shape(part.shape, share), xyz=(x, y, z))
+    def smaller(part: Part) -> Part:
+        shape: Any = part.shape
+        if isinstance(shape, MeshShape):
+            shape = replace(shape, scale=triple(times(shape.scale, 5)))
+        elif isinstance(shape, BoxShape):
+            shape = BoxShape(triple(times(shape.size, 5)))
+        else:
+            shape = replace(
+                shape,
+                **{k: round(v * share, 4) for k, v in vars(shape).items()},
+            )
+        return replace(part, shape=shape, xyz=triple(times(part.xyz, 4)))
 
-
-def _scaled_shape(shape: Shape, share: float) -> Shape:
-    def times(values: tuple[float, float, float]) -> tuple[float, float, float]:
-        x, y, z = np.round(np.multiply(values, share), 5).tolist()
-        return x, y, z
-
-    if isinstance(shape, MeshShape):
-        return MeshShape(shape.mesh, times(shape.scale))
-    if isinstance(shape, BoxShape):
-        return BoxShape(times(shape.size))
-    if isinstance(shape, CylinderShape):
-        radius, length = shape.radius * share, shape.length * share
-        return CylinderShape(round(radius, 4), round(length, 4))
-    return SphereShape(round(shape.radius * share, 4))
+    return replace(model, parts=tuple(map(smaller, model.parts)))
 
 
 _FRAME = "unfinished_tower"
@@ -90,14 +79,8 @@ _MOST_SIDES = 12
 def building_site(model: Model, height: float, name: str, seed: int) -> Model:
     """Returns the frame of a building that is being built, with its crane.
 
-    Args:
-        model: the finished building.
-        height: height of the frame [m].
-        name: name of the building.
-        seed: seed of the frame and the crane.
-
-    Returns:
-        A model within the building's footprint, except for the jib.
+    The frame is `height` high [m]. But for the jib the model stays within the
+    building's footprint.
 
     Raises:
         ValueError: there is no room for a frame.
@@ -219,14 +202,7 @@ def lot_objects(
 ) -> Iterator[Structure]:
     """Yields the structures on the lot of a building that is not built yet.
 
-    Args:
-        structure: the building.
-        use: one of `USES`.
-        cars: object -> weight of the parked cars.
-        rng: the only source of variation.
-
-    Yields:
-        Structures called after the building.
+    They are called after the building. `cars` are the weights of parked cars.
     """
     footprint = structure.model.footprint
     if use == "empty" or footprint.area < _SMALLEST:
@@ -294,21 +270,14 @@ class GrowingCity:
         stages: Stages,
         cars: Mapping[str, float],
     ):
-        """Fills the lots.
+        """Fills the lots of a whole city, at its last stage.
 
-        Args:
-            structures: structures of the whole city, the last stage.
-            stages: the structures that the others lack or have lower.
-            cars: object -> weight of cars that are parked on lots.
+        `cars` are the weights of those that are parked on lots.
         """
         self._stages = stages
         self._permanent = list(structures)
-        uses = {
-            name: use for use, names in stages.lots.items() for name in names
-        }
-        absent: set[str] = set()
-        for stage in stages.stages:
-            absent |= stages.absent(stage)
+        uses = {name: u for u, names in stages.lots.items() for name in names}
+        absent = set[str]().union(*map(stages.absent, stages.stages))
         self._lots = {
             s.name: list(
                 lot_objects(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 import math
 
 import numpy as np
+from numpy.random import Generator
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -57,7 +58,7 @@ class _House:
     blind_edges: set[int] = field(default_factory=set)
 
 
-def place_buildings(draft: Draft, district: District, source: str) -> None:
+def place_buildings(draft: Draft, district: District) -> None:
     """Places a district's single buildings, then its rows.
 
     Raises:
@@ -68,54 +69,36 @@ def place_buildings(draft: Draft, district: District, source: str) -> None:
     draft.open_range()
     for index, plan in enumerate(district.plan.buildings):
         rng = draft.rng(name, "building", index)
-        fault_at = f"{source}: districts.{name}.buildings.{index}"
+        fault_at = f"{draft.source}: districts.{name}.buildings.{index}"
         house = _single_house(draft, district, plan, fault_at)
-        try:
-            _build(draft, district, plan.kind, house, rng)
-        except ValueError as error:
-            raise InputError(f"{fault_at}: {error}") from error
+        _build(draft, name, plan.kind, house, rng, fault_at)
     for index, row in enumerate(district.plan.rows):
         draft.open_range()
-        houses = _row_houses(
-            draft, district, row, draft.rng(name, "row", index)
-        )
-        for k, house in enumerate(houses):
+        fault_at = f"{draft.source}: districts.{name}.rows.{index}"
+        rng = draft.rng(name, "row", index)
+        for k, house in enumerate(_row_houses(draft, district, row, rng)):
             rng = draft.rng(name, "row", index, k)
-            try:
-                _build(draft, district, row.kind, house, rng)
-            except ValueError as error:
-                raise InputError(
-                    f"{source}: districts.{name}.rows.{index}: {error}"
-                ) from error
+            _build(draft, name, row.kind, house, rng, fault_at)
 
 
 def _build(
     draft: Draft,
-    district: District,
+    district: str,
     kind: str | None,
     house: _House,
-    rng: np.random.Generator,
+    rng: Generator,
+    fault_at: str,
 ) -> None:
     name = draft.next_name(kind or house.archetype)
-    model = sample(
-        house.archetype,
-        house.footprint,
-        house.height,
-        rng,
-        name,
-        house.blind_edges,
-    )
+    what = house.archetype, house.footprint, house.height
+    try:
+        model = sample(*what, rng, name, house.blind_edges)
+    except ValueError as error:
+        raise InputError(f"{fault_at}: {error}") from error
     x, y = (round(float(value), 3) for value in house.xy)
-    draft.add_building(
-        Structure(
-            name,
-            "building",
-            model,
-            (x, y, _floor(draft, house)),
-            round(house.yaw, 5),
-            (district.plan.name, house.archetype),
-        )
-    )
+    xyz, tags = (x, y, _floor(draft, house)), (district, house.archetype)
+    yaw = round(house.yaw, 5)
+    draft.add_building(Structure(name, "building", model, xyz, yaw, tags))
 
 
 def _floor(draft: Draft, house: _House) -> float:
@@ -157,7 +140,7 @@ def _single_house(
 
 
 def _row_houses(
-    draft: Draft, district: District, row: RowPlan, rng: np.random.Generator
+    draft: Draft, district: District, row: RowPlan, rng: Generator
 ) -> list[_House]:
     """Walks along the streets and takes a lot wherever one fits.
 
@@ -198,7 +181,7 @@ def _fitting_house(
     line: LineString,
     start: float,
     previous: _House | None,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> _House | None:
     """Draws a house for the lot at `start`; None if it does not fit."""
     names = list(row.archetypes)

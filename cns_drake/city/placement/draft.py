@@ -16,6 +16,7 @@ from cns_drake.city.geometry.structures import MeshShape, Model, Structure
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.roads.street_areas import StreetAreas
 
@@ -42,6 +43,8 @@ class Draft:
 
     Attributes:
         areas: areas of the streets.
+        plan: the plan of the city.
+        source: the name of the plan's file, for messages.
         streets: all ground of the streets, sidewalks included, in W.
         frontage: line along which buildings stand; the streets by default.
         base: height of sidewalks and of the ground between them in W,
@@ -51,8 +54,14 @@ class Draft:
             buildings stand and the ground has been shaped around them.
     """
 
-    def __init__(self, areas: StreetAreas, kerb_height: float, seed: int):
-        self.areas = areas
+    def __init__(
+        self,
+        areas: StreetAreas,
+        kerb_height: float,
+        plan: CityPlan,
+        source: str,
+    ):
+        self.areas, self.plan, self.source = areas, plan, source
         self.streets: BaseGeometry = snap(
             unary_union(
                 [areas.carriageway(), areas.sidewalks(), areas.medians()]
@@ -62,7 +71,6 @@ class Draft:
         self.base: Ground = LevelGround(kerb_height)
         self.structures: list[Structure] = []
         self.ground: UpperSides | None = None
-        self._seed = seed
         self._counts: Counter[str] = Counter()
         self._walls = Occupancy()
         self._occupancy = Occupancy()
@@ -76,7 +84,7 @@ class Draft:
         draws of all others alone.
         """
         key = "/".join(map(str, words)).encode()
-        return np.random.default_rng([self._seed, zlib.crc32(key)])
+        return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
 
     def open_range(self) -> None:
         """Starts a new range of numbers in names, for the next task.
@@ -162,14 +170,16 @@ class Draft:
             tuple(tags),
         )
         footprint = structure.footprint_W
-        if within is not None and not within.contains(footprint):
-            return None
-        if not self.is_free(footprint, clearance):
-            return None
         crown = Point(x, y).buffer(crown_part * _reach(model))
-        if not crown.is_empty and not self._walls.is_free(crown):
+        if (
+            (within is not None and not within.contains(footprint))
+            or not self.is_free(footprint, clearance)
+            or (not crown.is_empty and not self._walls.is_free(crown))
+        ):
             return None
-        fall = self._fall(footprint)
+        # How far the ground falls below it [m].
+        corners = shapely.get_coordinates(footprint)
+        fall = float(np.ptp(np.round(self.base(*corners.T), 3)))
         if fall > _STEEPEST:
             return None
         foot = self._foot(structure, fall)
@@ -194,11 +204,6 @@ class Draft:
         # quay is below no foot.
         z = z[np.isfinite(z)]
         return round(float(z[z > z[0] - _STEEPEST].min()), 3)
-
-    def _fall(self, footprint: BaseGeometry) -> float:
-        """Returns how far the ground falls below a footprint [m]."""
-        corners = shapely.get_coordinates(footprint)
-        return float(np.ptp(np.round(self.base(*corners.T), 3)))
 
 
 def _reach(model: Model) -> float:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 import itertools
 import math
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -54,14 +55,8 @@ class Lot:
         return placed(self.footprint, (self.x, self.y), self.yaw)
 
 
-@dataclass(frozen=True)
-class Station:
-    """A place on a line: position, and the heading of the line there.
-
-    Attributes:
-        x, y: position in W [m].
-        yaw: heading of the line [rad].
-    """
+class Station(NamedTuple):
+    """A place on a line in W [m], and the heading of the line there [rad]."""
 
     x: float
     y: float
@@ -71,16 +66,10 @@ class Station:
 def lines_along(
     streets: BaseGeometry, within: BaseGeometry, distance: float
 ) -> list[LineString]:
-    """Returns the lines parallel to the edge of the streets.
+    """Returns the lines within an area, at a distance from the streets [m].
 
-    Args:
-        streets: the area of the streets in W [m].
-        within: the lines are cut to this area.
-        distance: from the edge of the streets [m].
-
-    Returns:
-        Smooth pieces between corners, in fixed order; the street is on the
-        right of each piece.
+    They are smooth pieces between corners, in fixed order; the street is on the
+    right of each piece.
     """
     edge = streets.buffer(distance, quad_segs=_QUAD_SEGMENTS).boundary
     cut = shapely.set_precision(edge.intersection(within), 0.001)

@@ -5,6 +5,7 @@ import itertools
 import math
 
 import numpy as np
+from numpy.random import Generator
 import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
@@ -12,7 +13,7 @@ from shapely.ops import unary_union
 from cns_drake.base.errors import InputError
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
-from cns_drake.city.placement.frontage import Station, station_at
+from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.city.plan.city_plan import (
     LinePlan,
@@ -33,62 +34,53 @@ _LONGEST_RUN = 24.0
 _HIGHEST_STEP = 0.3
 
 
-def furnish(
-    draft: Draft, district: District, cars: Mapping[str, float], source: str
-) -> None:
+def furnish(draft: Draft, district: District) -> None:
     """Places a district's objects, lines, parked cars and scattered plants.
-
-    Args:
-        draft: the city so far.
-        district: with its ground.
-        cars: object -> weight of the parked cars.
-        source: the plan's file name, for messages.
 
     Raises:
         InputError: if a single object has no room.
     """
-    name = district.plan.name
+    plan = district.plan
     draft.open_range()
-    for index, plan in enumerate(district.plan.objects):
-        rng = draft.rng(name, "object", index)
-        field = f"{source}: districts.{name}.objects.{index}"
-        _place_object(draft, district, plan, rng, field)
-    for index, line in enumerate(district.plan.lines):
+    for index, one in enumerate(plan.objects):
+        rng = draft.rng(plan.name, "object", index)
+        _place_object(draft, plan.name, index, one, rng)
+    for index, line in enumerate(plan.lines):
         draft.open_range()
-        _place_line(draft, district, line, draft.rng(name, "line", index))
-    for index, parking in enumerate(district.plan.parking):
+        _place_line(draft, district, line, draft.rng(plan.name, "line", index))
+    for index, parking in enumerate(plan.parking):
         draft.open_range()
-        rng = draft.rng(name, "parking", index)
-        _place_cars(draft, district, parking, cars, rng)
-    for index, scatter in enumerate(district.plan.scatter):
+        rng = draft.rng(plan.name, "parking", index)
+        _place_cars(draft, plan.name, parking, rng)
+    for index, scatter in enumerate(plan.scatter):
         draft.open_range()
-        _scatter(draft, district, scatter, draft.rng(name, "scatter", index))
+        _scatter(
+            draft, district, scatter, draft.rng(plan.name, "scatter", index)
+        )
 
 
 def _place_object(
-    draft: Draft,
-    district: District,
-    plan: ObjectPlan,
-    rng: np.random.Generator,
-    field: str,
+    draft: Draft, district: str, index: int, plan: ObjectPlan, rng: Generator
 ) -> None:
+    field = f"{draft.source}: districts.{district}.objects.{index}"
     try:
         model = OBJECTS[plan.object].build(rng, **plan.parameters)
     except (TypeError, ValueError) as error:
         raise InputError(f"{field}.parameters: {error}") from error
-    yaw, tags = math.radians(plan.yaw_deg), (district.plan.name,)
-    placed = draft.place(plan.object, model, plan.at, yaw, tags, kind=plan.kind)
-    if placed is None:
+    yaw = math.radians(plan.yaw_deg)
+    if not draft.place(
+        plan.object, model, plan.at, yaw, (district,), kind=plan.kind
+    ):
         raise InputError(f"{field}.at: the place is taken by another structure")
 
 
 def _place_line(
-    draft: Draft, district: District, plan: LinePlan, rng: np.random.Generator
+    draft: Draft, district: District, plan: LinePlan, rng: Generator
 ) -> None:
     points = np.array(plan.points)
     if plan.spacing is None:
         for start, end in itertools.pairwise(points):
-            _place_run(draft, district, plan, start, end, rng)
+            _place_run(draft, district.plan.name, plan, start, end, rng)
         return
     line = LineString(points)
     s = 0.0
@@ -96,17 +88,17 @@ def _place_line(
         at = station_at(line, s)
         name = pick(plan.objects, rng)
         yaw = at.yaw + math.radians(plan.yaw_deg)
-        _try_object(draft, district, name, plan.kind, at, yaw, rng)
+        _try_object(draft, district, name, plan.kind, at[:2], yaw, rng)
         s += float(rng.uniform(*plan.spacing))
 
 
 def _place_run(
     draft: Draft,
-    district: District,
+    district: str,
     plan: LinePlan,
     start: np.ndarray,
     end: np.ndarray,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> None:
     """Places fences or hedges end to end between two points."""
     length = float(np.hypot(*(end - start)))
@@ -123,16 +115,13 @@ def _place_run(
         model = OBJECTS[name].build(
             rng, length=length / count - 0.06, **plan.parameters
         )
-        tags = (district.plan.name,)
-        draft.place(name, model, tuple(middle), yaw, tags, kind=plan.kind)
+        draft.place(
+            name, model, tuple(middle), yaw, (district,), kind=plan.kind
+        )
 
 
 def _place_cars(
-    draft: Draft,
-    district: District,
-    plan: ParkingPlan,
-    cars: Mapping[str, float],
-    rng: np.random.Generator,
+    draft: Draft, district: str, plan: ParkingPlan, rng: Generator
 ) -> None:
     start, end = np.array(plan.start), np.array(plan.end)
     length = float(np.hypot(*(end - start)))
@@ -147,7 +136,7 @@ def _place_cars(
         # Most drivers park nose in.
         nose = inwards if rng.uniform() < 0.7 else -inwards
         yaw = math.atan2(nose[1], nose[0]) + float(rng.uniform(-0.04, 0.04))
-        place_car(draft, cars, tuple(at), yaw, rng, (district.plan.name,))
+        place_car(draft, draft.plan.cars, tuple(at), yaw, rng, (district,))
 
 
 def place_car(
@@ -155,37 +144,20 @@ def place_car(
     cars: Mapping[str, float],
     xy: tuple[float, float],
     yaw: float,
-    rng: np.random.Generator,
+    rng: Generator,
     tags: tuple[str, ...],
 ) -> None:
-    """Places a parked car if there is room for it.
-
-    Args:
-        draft: the city so far.
-        cars: object -> weight.
-        xy: position in W [m].
-        yaw: heading in W [rad].
-        rng: draws the car.
-        tags: tags of the structure.
-    """
+    """Places a parked car, one of `cars` by their weights, if it has room."""
     name = pick(cars, rng)
     draft.place(name, OBJECTS[name].build(rng), xy, yaw, tags)
 
 
 def _scatter(
-    draft: Draft,
-    district: District,
-    plan: ScatterPlan,
-    rng: np.random.Generator,
+    draft: Draft, district: District, plan: ScatterPlan, rng: Generator
 ) -> None:
     """Spreads objects at least `spacing` apart, by throwing darts."""
-    area = unary_union(
-        [
-            shape
-            for ground, shape in district.grounds.items()
-            if ground in plan.ground
-        ]
-    )
+    grounds = district.grounds.items()
+    area = unary_union([area for kind, area in grounds if kind in plan.ground])
     if plan.within is not None:
         area = area.intersection(Polygon(plan.within))
     area = area.buffer(-plan.clearance)
@@ -198,7 +170,7 @@ def _scatter(
     for dart in rng.uniform((x0, y0), (x1, y1), (darts, 2)):
         if not shapely.contains_xy(area, *dart):
             continue
-        if chosen and _nearest(chosen, dart) < plan.spacing:
+        if chosen and np.hypot(*(chosen - dart).T).min() < plan.spacing:
             continue
         chosen.append(dart)
         # A number is drawn for every dart, so that the fill does not move
@@ -206,12 +178,8 @@ def _scatter(
         keep, yaw = rng.uniform() < plan.fill, rng.uniform(-math.pi, math.pi)
         name = pick(plan.objects, rng)
         if keep:
-            at = Station(float(dart[0]), float(dart[1]), 0.0)
-            _try_object(draft, district, name, plan.kind, at, yaw, rng)
-
-
-def _nearest(points: list[np.ndarray], point: np.ndarray) -> float:
-    return float(np.hypot(*(np.array(points) - point).T).min())
+            xy = float(dart[0]), float(dart[1])
+            _try_object(draft, district, name, plan.kind, xy, yaw, rng)
 
 
 def _try_object(
@@ -219,14 +187,14 @@ def _try_object(
     district: District,
     name: str,
     kind: str | None,
-    at: Station,
+    xy: tuple[float, float],
     yaw: float,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> None:
     draft.place(
         name,
         OBJECTS[name].build(rng),
-        (at.x, at.y),
+        xy,
         yaw,
         (district.plan.name,),
         kind=kind,

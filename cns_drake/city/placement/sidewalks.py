@@ -1,9 +1,10 @@
 """Objects along the streets: lights, signs, lamps, trees, parked cars."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 
 import numpy as np
+from numpy.random import Generator
 import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -13,7 +14,7 @@ from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, lines_along, station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.city.placement.open_ground import place_car
-from cns_drake.city.plan.city_plan import CityPlan, StreetPlan
+from cns_drake.city.plan.city_plan import StreetPlan
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import Arm, Direction, Junction, Road
 
@@ -42,7 +43,7 @@ def _furnish_arm(
     road: Road,
     junction: Junction,
     arm: Arm,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> None:
     carriageway = draft.areas.carriageway()
     starts = arm.end == "start"
@@ -52,14 +53,10 @@ def _furnish_arm(
         return
 
     def place(name: str, distance: float, side: int, turn: float) -> None:
-        """Places an object beside the arm.
+        """Places an object beside the arm, `distance` from the junction [m].
 
-        Args:
-            name: name of the object.
-            distance: from the junction's edge along the arm [m].
-            side: 1: to the left seen from the junction (incoming traffic has
-                it on the right), -1: to the right.
-            turn: heading of the object against the arm's outward direction.
+        On side 1 it is to the left seen from the junction, where incoming
+        traffic has it on the right. It turns from the arm's outward direction.
         """
         outwards = 1 if starts else -1
         edge = road.first_station if starts else road.last_station
@@ -104,18 +101,11 @@ _TO_KERB = 0.08
 
 
 def furnish_sidewalks(
-    draft: Draft,
-    plan: CityPlan,
-    districts: Sequence[District],
-    junctions: BaseGeometry,
+    draft: Draft, districts: Sequence[District], junctions: BaseGeometry
 ) -> None:
     """Places street lamps, then trees, then furniture on all sidewalks.
 
-    Args:
-        draft: the city so far.
-        plan: plan of its streets.
-        districts: along the sidewalks.
-        junctions: the area of all junctions in W [m].
+    `junctions` is the area of all of them in W [m].
     """
     for task, distance in _FROM_KERB_OF.items():
         keep_off = junctions.buffer(_JUNCTION_CLEARANCE[task])
@@ -125,19 +115,11 @@ def furnish_sidewalks(
         for index, line in enumerate(lines):
             draft.open_range()
             rng = draft.rng("sidewalk", task, index)
-            _walk(draft, plan, districts, task, line, keep_off, rng)
+            _walk(draft, districts, task, line, keep_off, rng)
 
 
-def park_along_streets(
-    draft: Draft, network: RoadNetwork, cars: Mapping[str, float]
-) -> None:
-    """Parks cars in the bays at the sides of the roads.
-
-    Args:
-        draft: the city so far.
-        network: the roads.
-        cars: object -> weight.
-    """
+def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
+    """Parks cars in the bays at the sides of the roads."""
     for (name, side), bay in network.parking_bays().items():
         draft.open_range()
         road = network.roads[name]
@@ -151,12 +133,14 @@ def park_along_streets(
                 # On the left of `forward` traffic runs the other way.
                 yaw = heading + (math.pi if side == "left" else 0.0)
                 yaw += float(rng.uniform(-0.03, 0.03))
-                place_car(draft, cars, (x, y), yaw, rng, ("bay", name))
+                tags = ("bay", name)
+                place_car(draft, draft.plan.cars, (x, y), yaw, rng, tags)
             s += float(rng.uniform(*_BAY_LENGTH))
 
 
-def plant_medians(draft: Draft, plan: StreetPlan) -> None:
+def plant_medians(draft: Draft) -> None:
     """Plants the strips between the directions, and lights them."""
+    plan = draft.plan.medians or draft.plan.street
     for index, median in enumerate(draft.areas.medians().geoms):
         draft.open_range()
         rng = draft.rng("median", index)
@@ -183,12 +167,11 @@ def _middle_line(median: Polygon) -> LineString:
 
 def _walk(
     draft: Draft,
-    plan: CityPlan,
     districts: Sequence[District],
     task: str,
     line: LineString,
     keep_off: BaseGeometry,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> None:
     """Walks along one sidewalk and places the objects of one task."""
     s = float(rng.uniform(1.0, 8.0))
@@ -196,7 +179,7 @@ def _walk(
         at = station_at(line, s)
         here = shapely.Point(at.x, at.y)
         district = min(districts, key=lambda d: d.area.distance(here))
-        street = district.plan.street or plan.street
+        street = district.plan.street or draft.plan.street
         step, name = _draw(street, task, rng)
         if name is not None and not keep_off.intersects(here):
             tags = ("sidewalk", district.plan.name)
@@ -205,7 +188,7 @@ def _walk(
 
 
 def _draw(
-    street: StreetPlan, task: str, rng: np.random.Generator
+    street: StreetPlan, task: str, rng: Generator
 ) -> tuple[float, str | None]:
     """Returns the distance to the next place, and the object at this one."""
     if task == "lamp":
@@ -226,21 +209,15 @@ def _place(
     draft: Draft,
     name: str,
     at: Station,
-    rng: np.random.Generator,
+    rng: Generator,
     tags: tuple[str, ...],
     *,
     facing_street: bool = False,
 ) -> None:
-    """Places an object on a line, or behind it with its front (+x) to it.
+    """Places an object on a line and along it.
 
-    Args:
-        draft: the city so far.
-        name: name of the object.
-        at: place on the line; the street is on the line's right.
-        rng: draws the object.
-        tags: tags of the structure.
-        facing_street: turn the object to the right and set it back, so that
-            its front touches the line; else it stands on the line, along it.
+    One that is `facing_street`, on the right of the line, turns to it and
+    stands back, so that its front (+x) touches the line.
     """
     model = OBJECTS[name].build(rng)
     xy, yaw = (at.x, at.y), at.yaw

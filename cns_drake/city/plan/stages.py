@@ -134,15 +134,10 @@ class Stages(_Model):
 def load_stages(
     path: Path, structures: Collection[str], text: str | None = None
 ) -> Stages:
-    """Reads `stages.yaml` and checks it against the city.
+    """Reads `stages.yaml` and checks it against the names of all structures.
 
-    Args:
-        path: the file.
-        structures: the names of all structures of the city.
-        text: the coming content of the file; by default the present one.
-
-    Returns:
-        The stages, patterns replaced by the names that they stand for.
+    `text` is the coming content of the file; by default the present one.
+    Patterns are replaced by the names that they stand for.
 
     Raises:
         InputError: if the file cannot be read, has a wrong key or type, its

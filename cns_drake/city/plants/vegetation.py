@@ -65,14 +65,10 @@ def tree(
     height: float | None = None,
     variant: int | None = None,
 ) -> Model:
-    """Returns one tree.
+    """Returns one tree; what is not given is drawn.
 
-    Args:
-        rng: draws each value that is not given.
-        species: a key of `SPECIES`.
-        height: height of the top, within the species' range for the promised
-            clearance below the crown [m].
-        variant: number of the mesh variant.
+    The `height` of its top is within the species' range, for the promised
+    clearance below the crown [m]; `variant` is the number of the mesh variant.
     """
     kind = SPECIES[species]
     drawn_height = rng.uniform(*kind.height_range)

@@ -124,6 +124,5 @@ def test_a_disk_that_fills_up_leaves_no_half_file(
     monkeypatch.setattr(os, "replace", full)
     with pytest.raises(InputError, match="No space left on device"):
         generate_city(folder)
-    left = [p for p in folder.rglob("*") if p.name.startswith(".new_")]
-    assert left == []
+    assert list(folder.rglob("*.part")) == []
     assert len(list(folder.rglob("*.obj"))) <= 4

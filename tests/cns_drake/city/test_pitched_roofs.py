@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cns_drake.city.facades import massing, roofs
-from cns_drake.city.facades.roofs import Hole
+from cns_drake.city.facades.walls import Patch
 
 LINES = {
     "gable": roofs.gable_line(2.0, 10.0, 5.0, 8.0, ridge=0.3),
@@ -79,7 +79,7 @@ def test_a_gable_wall_fills_the_space_below_its_line():
 
 def test_windows_of_a_gable_are_recesses_with_a_pane():
     line = LINES["gable"]
-    holes = [Hole(4.0, 5.0, 4.5, 5.5, 0.3), Hole(5.5, 6.0, 4.2, 5.0, 0.1)]
+    holes = [Patch(4.0, 5.0, 4.5, 5.5, 0.3), Patch(5.5, 6.0, 4.2, 5.0, 0.1)]
     plain = roofs.gable_wall(line, 2.0, 10.0, 4.0)
     wall = roofs.gable_wall(line, 2.0, 10.0, 4.0, holes)
     panes = roofs.gable_glass(holes)
