@@ -13,7 +13,7 @@ from shapely.geometry import LineString, Point
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import HEADROOM, part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
-from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing import whole_city
 from cns_drake.imports.dressing.grounds import (
     missing_sidewalks,
