@@ -50,14 +50,6 @@ def write_world(
     dressing: Dressing | None = None,
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
-
-    Args:
-        draft: the map's folder, with the map's name.
-        source: the file that the city was read from.
-        city: all structures.
-        bottom: the ground below them, at all stages.
-        dressing: the added details, if the city was dressed.
-
     Returns:
         Stage -> its numbers of structures and triangles.
     """
@@ -104,9 +96,7 @@ def triangles_in(obj: str) -> int:
 def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
     """Returns the numbers of structures with a surface, and of triangles.
 
-    Args:
-        sdf: the text of a stage.
-        triangles: path of a mesh in the map's folder -> its triangles.
+    A mesh has its number of triangles by its path in the map's folder.
     """
     structures = set(re.findall('visual name="([^"/]+)', sdf))
     meshes = re.findall("<uri>([^<]+)</uri>", sdf)
@@ -141,15 +131,7 @@ def write_facts(
     comment: str = "# Where this map comes from. A place of the map plus the"
     " origin is one of the\n# source [m].\n",
 ) -> None:
-    """Writes what is remembered of an import.
-
-    Args:
-        draft: the map's folder.
-        source: the imported file.
-        facts: name -> value.
-        faults: parts of the file that were left out or repaired.
-        comment: the beginning of the file.
-    """
+    """Writes what is remembered of an import."""
     if "axes" in facts:
         comment += (
             "# Places of the source are brought to metres east, north and up"
@@ -239,16 +221,10 @@ def draw_overview(
     space: FreeSpace | None,
     drives: Sequence[WaypointDrive],
 ) -> None:
-    """Draws structures, the room for a car, and the drives [m], with a legend.
+    """Draws structures, the room for a car, and the drives, with a legend.
 
     The second drive is a thinner line on the first one, so that both are seen
     where they share a street.
-
-    Args:
-        path: the picture to write.
-        structures: all those of the city.
-        space: the room for a car, if it is to be drawn.
-        drives: the drives that were found.
     """
     corners = np.concatenate(
         [one.triangles.reshape(-1, 3) for one in structures]

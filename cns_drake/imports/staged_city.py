@@ -116,10 +116,6 @@ def with_gone(
     Where both have the same place, a building of today that has a year was
     there already, and what it replaced was not; one without a year came
     later.
-
-    Args:
-        gone: demolished buildings.
-        others: present structures that may have stood then.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
@@ -229,10 +225,7 @@ def stage_city(
 ) -> StagedCity:
     """Returns the structures at the wanted stages.
 
-    Args:
-        source: the name of the file in errors.
-        city: the whole city; its faults count structures of no stage.
-        options: the years, and the stage of buildings without any.
+    The faults of the city count structures of no stage. Errors name the source.
 
     Raises:
         InputError: if no structure, or too many, are at any stage.

@@ -308,12 +308,7 @@ def _dressed(
 ) -> tuple[Model, Counter[str]]:
     """Returns the model of a building, and counts of details added at random.
 
-    Args:
-        some: the building.
-        plans: plans of its dressed walls, with their distances to the drives
-            [m].
-        paths: paths of the drives.
-        seed: seed of the random draws.
+    Plans of its dressed walls come with distances to the drives [m].
     """
     structure, style = some.one.structure, some.style
     footprint = structure.model.footprint

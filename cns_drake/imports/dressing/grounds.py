@@ -120,10 +120,7 @@ def missing_sidewalks(
 ) -> Iterator[Imported]:
     """Yields sidewalks of streets near drives whose tags do not mention any.
 
-    Args:
-        structures: those of all stages, on level ground.
-        streets: streets of the file.
-        drives: through the city.
+    The ground must be level.
     """
     paths = MultiLineString([drive.path for drive in drives])
     near = [
@@ -196,10 +193,7 @@ def guessed_streets(
 ) -> Iterator[Imported]:
     """Yields a carriageway and sidewalks on the ground below drives.
 
-    Args:
-        structures: those of all stages, without roads.
-        drives: through the city, in the middle of its streets.
-        ground: below it.
+    For a city without roads, whose drives are in the middle of its streets.
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
@@ -298,12 +292,7 @@ _SQUARE = 50.0
 def paved_gaps(
     structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
-    """Yields sidewalks in the gaps near drives.
-
-    Args:
-        structures: those of all stages, on level ground.
-        drives: through the city.
-    """
+    """Yields sidewalks in the gaps near drives, on level ground."""
     near = near_drives(
         [one for one in structures if one.kind != "Tree"], drives
     )
@@ -392,9 +381,7 @@ def lane_marks(
 ) -> Iterator[Imported]:
     """Yields the middle lines of the larger streets near drives.
 
-    Args:
-        streets: streets of the file, on level ground.
-        drives: through the city, at least one.
+    There is at least one drive, and the ground is level.
     """
     paths = MultiLineString([drive.path for drive in drives])
     junctions = _junctions(streets)

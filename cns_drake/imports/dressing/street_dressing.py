@@ -414,14 +414,8 @@ def dress_streets(
 ) -> StreetThings:
     """Returns the small things along the streets of a city.
 
-    Args:
-        structures: those of all stages.
-        things: things of the file.
-        streets: streets of the file.
-        drives: kept free of things; without any nothing is placed.
-        ground: below the city.
-        bottom: the structures of the guessed ground.
-        seed: seed of the random draws.
+    Those of the file come first. Drives are kept free of things; without any
+    nothing is placed.
     """
     found = StreetThings()
     if not drives:

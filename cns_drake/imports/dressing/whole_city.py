@@ -83,13 +83,7 @@ def dress_city(
 ) -> Dressing:
     """Dresses buildings and streets.
 
-    Args:
-        staged: the structures of each stage.
-        city: the content of the file; things that get a place are removed from
-            its faults.
-        drives: through it.
-        ground: below it.
-        seed: seed of the random draws.
+    Things that get a place are removed from the faults of the city.
 
     Raises:
         InputError: if there are more structures than a map may have.

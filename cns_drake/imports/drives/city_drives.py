@@ -122,9 +122,7 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
 def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
     """Returns a line along lanes: x, y and lateral offset (N, 3) [m].
 
-    Args:
-        lanes: each leads into the next.
-        spacing: about the distance of the points [m].
+    Each lane leads into the next; points are about a spacing apart [m].
     """
     parts = []
     for lane in lanes:
@@ -240,13 +238,7 @@ class StreetGraph(WayGraph):
     def __init__(
         self, streets: Sequence[Street], space: FreeSpace, drive_on: DriveOn
     ):
-        """Makes the graph.
-
-        Args:
-            streets: they meet at common nodes.
-            space: where a car has room.
-            drive_on: the side.
-        """
+        """Makes the graph of streets that meet at common nodes."""
         # A street with a wrong place on another continent would never end.
         self.lanes = [
             one for one in make_lanes(streets) if one.length <= LONGEST

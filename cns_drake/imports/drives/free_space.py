@@ -91,12 +91,7 @@ class FreeSpace:
 def find_free_space(
     structures: Sequence[Imported], ground: Ground
 ) -> FreeSpace:
-    """Returns the room for a car, on roads if the file has any.
-
-    Args:
-        structures: all those of the city, at all stages.
-        ground: below them.
-    """
+    """Returns the room for a car at all stages, on roads if there are any."""
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1
     grid = _Grid(low, high, (int(size[1]), int(size[0])))

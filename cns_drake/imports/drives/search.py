@@ -276,12 +276,8 @@ def _farthest(
 ) -> list[int]:
     """Returns the longest way from a piece that meets no place twice.
 
-    Args:
-        graph: all pieces.
-        links: between usable pieces; transposed links give the way to it,
-            in reverse order.
-        start: the piece.
-        longest: greatest length of the returned way [m].
+    It follows links between usable pieces, up to a length [m]. Transposed links
+    give the way to the piece, in reverse order.
     """
     cost, before = dijkstra(links, indices=start, return_predecessors=True)
     cost = np.where(np.isfinite(cost), cost + graph.lengths / 2.0, -1.0)
@@ -348,17 +344,10 @@ def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
 def _arm(
     graph: WayGraph, used: Sequence[int], joint: int, backwards: bool = False
 ) -> list[int]:
-    """Returns the longest way from a piece, or to it.
+    """Returns the longest way from a piece in use by drives, its joint.
 
-    Args:
-        graph: all pieces.
-        used: pieces of the drives.
-        joint: the piece among them where the way begins.
-        backwards: whether it ends there instead.
-
-    Returns:
-        The way from the joint on, backwards if it ends there; empty if it is
-        too short.
+    Backwards it ends there, and is in reverse order. It is empty if it is too
+    short.
     """
     links = graph.links(graph.beside(np.array(used), joint))
     if backwards:

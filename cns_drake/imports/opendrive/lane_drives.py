@@ -125,8 +125,7 @@ class BandGraph(WayGraph):
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
     """Returns two drives that share a part, or one, or none.
 
-    Args:
-        bands: lanes of the whole network, on bridges too.
+    The lanes are those of the whole network, on bridges too.
     """
     return find_drives(BandGraph(bands))
 
@@ -179,9 +178,7 @@ def _forwards(line: np.ndarray) -> np.ndarray:
 def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:
     """Returns the text of a file of lanes; None if no vehicle can drive on.
 
-    Args:
-        bands: lanes of the whole network.
-        kerb: how high sidewalks stand above the road [m].
+    A kerb is the height of sidewalks above the road [m].
     """
     graph = BandGraph(bands)
     lanes = [

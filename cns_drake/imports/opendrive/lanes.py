@@ -81,9 +81,7 @@ def lane_class(kind: str) -> str | None:
 def is_raised(kind: str, height: float) -> bool:
     """Returns whether a lane is a kerb above the road.
 
-    Args:
-        kind: its type.
-        height: how high its inner edge stands above the road in the file [m].
+    Its inner edge stands at a height above the road in the file [m].
     """
     return kind in _RAISED or height >= _LEAST_KERB
 

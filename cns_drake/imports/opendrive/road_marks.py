@@ -224,9 +224,7 @@ def _painted(
 def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
     """Returns the lines of a mark, as the file has them or usual ones.
 
-    Args:
-        mark: as the file has it.
-        side: positive if outwards is to the left.
+    The side is positive if outwards is to the left.
     """
     styles = [word for word in mark.kind.split() if word in _STYLES]
     if mark.lines and (styles or mark.kind == "custom"):

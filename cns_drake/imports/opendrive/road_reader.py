@@ -60,11 +60,8 @@ def read_marks(
 ) -> list[RoadMark]:
     """Returns the marks of a lane, in their order along the road.
 
-    Args:
-        lane: the element.
-        start: where its section begins along the road [m].
-        road: name of the road.
-        faults: counts marks whose lines are not usable.
+    Its section begins at a start [m]. Marks whose lines are not usable are
+    counted.
 
     Raises:
         ValueError: naming line and fault, if a text is not a number.
@@ -99,9 +96,7 @@ class _NoPatternError(Exception):
 def _mark_lines(mark: Element, usual: float) -> Iterator[MarkLine]:
     """Yields the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
 
-    Args:
-        mark: the element.
-        usual: width of a line that has no plausible one [m].
+    A line without a plausible width has the usual one [m].
 
     Raises:
         _NoPatternError: if a line has lengths that cannot be.
@@ -124,12 +119,7 @@ def _mark_lines(mark: Element, usual: float) -> Iterator[MarkLine]:
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts the links of a file to things that are not in it.
-
-    Args:
-        top: the outermost element.
-        faults: the counts.
-    """
+    """Counts the links of a file to things that are not in it."""
     roads = {one.attrib.get("id", ""): one for one in top.all("road")}
     junctions = {one.attrib.get("id", "") for one in top.all("junction")}
     for name, road in roads.items():

@@ -172,10 +172,7 @@ def thing_structures(
 ) -> Iterator[Structure]:
     """Yields structures of the signals and objects beside a road.
 
-    Args:
-        road: the road.
-        lanes: the area of all lanes, where no sign stands [m].
-        faults: counts things left out.
+    No sign stands in the area of all lanes. Things left out are counted.
     """
     for thing in road.things:
         if not 0.0 <= thing.s <= road.length + 1.0:

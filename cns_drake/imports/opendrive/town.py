@@ -111,11 +111,7 @@ def build_town(
 ) -> Town:
     """Reads a road network and builds a town along it.
 
-    Args:
-        source: OpenDRIVE.
-        seed: the seed of the generator's draws.
-        progress: takes one line at a time.
-        dressed: whether the file's road marks are painted.
+    The road marks of the file are painted in a dressed town only.
 
     Raises:
         InputError: if the file cannot be used.
@@ -228,10 +224,7 @@ def _count_spans(
 ) -> None:
     """Counts the bridges and tunnels of a file that are not built.
 
-    Args:
-        roads: the file's roads.
-        raised: names of the roads that pass over others on decks.
-        faults: takes the counts.
+    Raised roads pass over others on decks.
     """
     for road in roads.roads:
         for span in road.spans:
@@ -311,13 +304,7 @@ def write_town(
     town: Town,
     progress: Callable[[str], None],
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
-    """Writes all files of a town.
-
-    Args:
-        draft: the map's folder, with the map's name; it exists.
-        source: the file of the roads.
-        town: to write.
-        progress: takes one line at a time.
+    """Writes all files of a town to its folder, which has the map's name.
 
     Returns:
         What was imported; stage -> its numbers of structures and triangles.

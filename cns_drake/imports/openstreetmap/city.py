@@ -91,14 +91,7 @@ def make_things(
     kinds: Mapping[str, str],
     local: Local,
 ) -> Iterator[Thing]:
-    """Yields things at their nodes, and the trees of rows.
-
-    Args:
-        nodes: id, tags and place of each [deg].
-        ways: the file's ways.
-        kinds: id -> kind of a thing.
-        local: brings places to metres.
-    """
+    """Yields things at their nodes, and the trees of rows."""
     for name, tags, place in nodes:
         kind = object_of(tags)
         if kind is not None:
@@ -132,12 +125,9 @@ def import_openstreetmap(
 ) -> ForeignCity:
     """Reads a file; its origin is the middle of its buildings.
 
-    Args:
-        path: the file.
-        year_attribute: see `construction_year`.
-        dressed: whether the sea, and grounds by what they are made of, are
-            made, bridges have parapets or are left out, and demolished
-            buildings without a date are made.
+    Only for a dressed city, the sea, and grounds by what they are made of, are
+    made, bridges have parapets or are left out, and demolished buildings
+    without a date are made.
 
     Raises:
         InputError: if it cannot be read, has no building, or is larger than
@@ -244,12 +234,7 @@ def _count_unused(
 ) -> None:
     """Counts things in the file without a place in the city, by kind.
 
-    Buildings that are left out are counted elsewhere.
-
-    Args:
-        features: all of the file.
-        found: the city.
-        also: ids of other things with a place, or counted elsewhere.
+    Buildings that are left out, and the ids in `also`, are counted elsewhere.
     """
     used = {
         name

@@ -68,14 +68,7 @@ def ground_areas(
     faults: ImportFaults,
     dressed: bool,
 ) -> Iterator[Imported]:
-    """Yields the areas that are ground.
-
-    Args:
-        areas: the file's areas.
-        local: brings places to metres.
-        faults: counts what is repaired.
-        dressed: whether they get the look of their material.
-    """
+    """Yields the areas that are ground; dressed, by their material."""
     for name, tags, polygons in areas:
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
@@ -150,11 +143,7 @@ def sea(
 ) -> Iterator[Imported]:
     """Yields the sea on the right of coasts, if there is any.
 
-    Args:
-        coasts: the file's coastlines.
-        local: brings places to metres.
-        limits: (2, 2) least x and y, and greatest, of the city [m].
-        faults: counts what is repaired.
+    Limits (2, 2) are the least x and y, and greatest, of the city [m].
     """
     if not coasts:
         return

@@ -129,13 +129,10 @@ class StreetTraffic:
         surface: BaseGeometry,
         side: float,
     ):
-        """Makes the lanes.
+        """Makes the lanes of streets that meet at common nodes.
 
-        Args:
-            streets: they meet at common nodes.
-            crossed: nodes at which people cross.
-            surface: the area of all streets; ways that leave it are left out.
-            side: 1 if traffic keeps right, -1 if left.
+        People cross at some nodes. Ways that leave the surface of all streets
+        are left out. The side is 1 if traffic keeps right, -1 if left.
         """
         self.stretches = list(_stretches(streets, crossed))
         self._side, self._crossed = side, crossed
@@ -364,14 +361,8 @@ def lanes_of_streets(
 ) -> str | None:
     """Returns the text of a file of lanes; None if no vehicle can drive on.
 
-    Args:
-        streets: the file's streets.
-        places: signals, crossings and paths.
-        structures: the city's structures.
-        added: parked cars and other things that were put beside the streets;
-            those that stand in a lane are named in the file.
-        drives: traffic keeps to the streets near them.
-        drive_on: the side of the streets on which traffic keeps.
+    Traffic keeps to the streets near drives. Parked cars and other things that
+    were added beside the streets are named in the file if they stand in a lane.
     """
     if not drives:
         return None
