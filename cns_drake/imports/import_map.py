@@ -15,7 +15,7 @@ from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
 from cns_drake.imports.cityjson import import_cityjson
-from cns_drake.imports.dressing.whole_city import dress_city
+from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
 from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
 from cns_drake.imports.drives.search import (

@@ -17,7 +17,7 @@ import yaml
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import stage_sdf, structure_table
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.imports.dressing.whole_city import Dressing
+from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import WATER, ForeignCity, Imported

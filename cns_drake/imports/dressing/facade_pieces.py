@@ -132,7 +132,7 @@ class FacadePlan:
         return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without openings whose probes (N + 1,) are hidden."""
+        """Returns the plan without openings at hidden (N + 1,) probes."""
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
             self,

@@ -14,19 +14,18 @@ from shapely.geometry import LineString, Point
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
-from cns_drake.imports.faces import extruded, parts_of, sound_parts
+from cns_drake.imports.faces import extruded
 from cns_drake.imports.foreign_city import (
     ForeignCity,
     Imported,
     Thing,
-    make_imported,
 )
+from cns_drake.imports.openstreetmap import streets
 from cns_drake.imports.openstreetmap.buildings import (
     TWICE,
     make_buildings,
     standing_buildings,
 )
-from cns_drake.imports.openstreetmap.grounds import coasts_of, ground_areas, sea
 from cns_drake.imports.openstreetmap.reading import (
     Local,
     OsmArea,
@@ -37,15 +36,6 @@ from cns_drake.imports.openstreetmap.reading import (
     is_building,
     read_openstreetmap,
     was_building,
-)
-from cns_drake.imports.openstreetmap.streets import (
-    Bridges,
-    bridges_of,
-    crossing_stripes,
-    drivable_streets,
-    parapets,
-    street_places,
-    street_surfaces,
 )
 from cns_drake.imports.openstreetmap.tags import TABLES, length, tag_value
 from cns_drake.imports.options import ImportFaults
@@ -154,16 +144,22 @@ def import_openstreetmap(
             f"{path}: {size.max() / 1000:.0f} km across; cut out a piece of at"
             f" most {_LARGEST / 1000:.0f} km"
         )
-    bridges = bridges_of(features.ways, local) if dressed else Bridges()
-    coasts = coasts_of(features.ways) if dressed else []
+    bridges = (
+        streets.bridges_of(features.ways, local)
+        if dressed
+        else streets.Bridges()
+    )
+    coasts = streets.coasts_of(features.ways) if dressed else []
     limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
     found = [
         *make_buildings(buildings, local, year_attribute, faults, once=dressed),
-        *street_surfaces(features.ways, local, faults, bridges),
-        *crossing_stripes(features.crossings, features.ways, local, faults),
-        *ground_areas(features.areas, local, faults, dressed),
-        *sea(coasts, local, limits, faults),
-        *parapets(features.ways, bridges, local),
+        *streets.street_surfaces(features.ways, local, faults, bridges),
+        *streets.crossing_stripes(
+            features.crossings, features.ways, local, faults
+        ),
+        *streets.ground_areas(features.areas, local, faults, dressed),
+        *streets.sea(coasts, local, limits, faults),
+        *streets.parapets(features.ways, bridges, local),
         *_barriers(features.ways, local, faults),
         *_trees(features.trees, local, faults),
     ]
@@ -174,8 +170,8 @@ def import_openstreetmap(
         (latitude, longitude),
         "WGS 84",
         faults,
-        drivable_streets(features.ways, local, bridges),
-        street_places(features, local),
+        streets.drivable_streets(features.ways, local, bridges),
+        streets.street_places(features, local),
         any(
             tags.get("driving_side") == "left"
             for _, tags, _, _ in features.ways
@@ -252,9 +248,7 @@ def _count_unused(
 
 
 def _barriers(
-    ways: Iterable[OsmWay],
-    local: Local,
-    faults: ImportFaults,
+    ways: Iterable[OsmWay], local: Local, faults: ImportFaults
 ) -> Iterator[Imported]:
     for name, tags, line, _ in ways:
         kind = tags.get("barrier")
@@ -267,19 +261,9 @@ def _barriers(
         where = (name, faults)
         high = tag_value(tags, "height", length, _TALLEST, where) or usual
         strip = LineString(local(line)).buffer(width / 2.0, cap_style="flat")
-        solids = [
-            np.concatenate(extruded(polygon, 0.0, high, name, faults))
-            for part in parts_of(strip)
-            for polygon in sound_parts(part, name, faults)
-        ]
-        if solids:
-            yield make_imported(
-                f"{kind}_{name}",
-                semantic_class,
-                "Barrier",
-                {"body": np.concatenate(solids)},
-                {},
-            )
+        yield from streets.raised(
+            f"{kind}_{name}", semantic_class, "Barrier", [strip], high, where
+        )
 
 
 def _trees(
@@ -297,12 +281,8 @@ def _trees(
             height=tag_value(tags, "height", length, _TALLEST, (name, faults))
             or None,
         )
-        structure = Structure(
-            f"tree_{name}",
-            "vegetation",
-            model,
-            (round(x, 3), round(y, 3), 0.0),
-        )
+        place_W = (round(x, 3), round(y, 3), 0.0)
+        structure = Structure(f"tree_{name}", "vegetation", model, place_W)
         trunk = Point(x, y).buffer(0.3, 2)
         walls, _ = extruded(trunk, 0.0, 2.0, name, ImportFaults())
         yield Imported(structure, "Tree", None, walls)
