@@ -95,9 +95,9 @@ def _import_city(
         return _import_roads(source, output, options, progress, finish)
     city = _read(source, options)
     staged = stage_city(source, city, options)
-    growth = None
+    changes = None
     if options.grow is not None:
-        staged, growth = grow(staged, options.grow, options.seed)
+        staged, changes = grow(staged, options.grow, options.seed)
     progress(f"{len(staged.kept)} structures; looking for streets")
     ground = ground_of(staged.kept, options.dressed)
     space = find_free_space(staged.kept, ground)
@@ -131,7 +131,7 @@ def _import_city(
         bottom = dressing.bottom if dressing else bottom_of(bare, ground)
         sizes = write_world(draft, source, staged, bottom, dressing)
         facts = city_facts(
-            city, options, list(staged.standing), growth, dressing
+            city, options, list(staged.standing), changes, dressing
         )
         write_facts(draft, source, facts, city.faults)
         report = _report(staged, drives, city.faults)

@@ -27,7 +27,7 @@ from cns_drake.imports.options import (
     ImportOptions,
     ImportReport,
 )
-from cns_drake.imports.staged_city import Growth, StagedCity
+from cns_drake.imports.staged_city import StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
 _OF_BOX = 12  # triangles
@@ -108,19 +108,26 @@ def city_facts(
     city: ForeignCity,
     options: ImportOptions,
     stages: Sequence[str],
-    growth: Growth | None,
+    changes: Mapping[str, object] | None,
     dressing: Dressing | None = None,
 ) -> dict:
-    """Returns the place of a city's map, and counts of drawn parts."""
-    return {
+    """Returns the place of a city's map, and counts of drawn parts.
+
+    If the first stage was drawn, its changes are among them.
+    """
+    facts = {
         "reference_system": city.reference_system or "unknown",
         **({"axes": list(city.axes)} if city.axes else {}),
         "origin": list(city.origin),
         "lod": options.lod if options.lod is not None else "highest",
         "years": dict(zip(stages, options.years, strict=False)),
-        **_drawn(options, growth),
-        **({"dressing": dict(dressing.facts)} if dressing else {}),
     }
+    if changes is not None:
+        draws = {"grow": options.grow, "seed": options.seed}
+        facts["first_stage_at_random"] = {**draws, **changes}
+    if dressing is not None:
+        facts["dressing"] = dict(dressing.facts)
+    return facts
 
 
 def write_facts(
@@ -154,21 +161,6 @@ def write_report(draft: Path, report: ImportReport) -> None:
         for kind, number, example in report.faults
     ]
     (draft / REPORT_NAME).write_text("\n".join([*lines, ""]), "utf-8")
-
-
-def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
-    """Returns the counts of drawn parts, if there are any."""
-    if growth is None:
-        return {}
-    return {
-        "first_stage_at_random": {
-            "grow": options.grow,
-            "seed": options.seed,
-            "missing": list(growth.missing),
-            "part_of_height": growth.lower,
-            **({"gone_since": list(growth.gone)} if growth.gone else {}),
-        }
-    }
 
 
 def with_column(table: str, name: str, values: Sequence[str]) -> str:

@@ -197,7 +197,7 @@ def simplified_drive(
         tolerances: greatest distances of its waypoints from these places,
             tried in turn [m].
     """
-    found: WaypointDrive | Obstacle = Obstacle(xy[len(xy) // 2])
+    found: WaypointDrive | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
         if len(xy) < 4 * straightened:
             break
@@ -269,7 +269,7 @@ class StreetGraph(WayGraph):
         reach = int(_TURN / _SPACING)
         near = np.convolve(bends, np.ones(2 * reach + 1), mode="same") > 0
         right = np.column_stack([along[:, 1], -along[:, 0]]) * self._side
-        found: WaypointDrive | Obstacle = Obstacle(middle[len(middle) // 2])
+        found: WaypointDrive | Obstacle = middle[len(middle) // 2]
         for tolerance, share in product(_TOLERANCES, _AT_TURNS):
             aside = rows[:, 2] * np.where(near, share, 1.0)
             aside = uniform_filter1d(aside, _SMOOTH_ASIDE, mode="nearest")

@@ -107,7 +107,7 @@ class BandGraph(WayGraph):
             : int(LONGEST / _SPACING) + 1
         ]
         limits = [limit for k in way for _, limit in self._bands[k].road.limits]
-        found: WaypointDrive | Obstacle = Obstacle(points[0, :2])
+        found: WaypointDrive | Obstacle = points[0, :2]
         for window in _SMOOTHING:
             found = steerable_drive(_smoothed(points, window))
             if isinstance(found, WaypointDrive):
