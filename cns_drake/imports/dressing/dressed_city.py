@@ -22,25 +22,8 @@ from cns_drake.city.geometry.upper_sides import (
     looks_up,
     turned_up,
 )
-from cns_drake.imports.dressing.facade_pieces import (
-    FacadePlan,
-    add_facade,
-    add_roof_pieces,
-    is_flat_roof,
-    plan_facade,
-    with_doors,
-    with_shops,
-)
-from cns_drake.imports.dressing.grounds import (
-    guessed_streets,
-    is_dense,
-    lane_marks,
-    missing_sidewalks,
-    near_drives,
-    paved,
-    paved_gaps,
-    with_kerb,
-)
+from cns_drake.imports.dressing import facade_pieces, grounds
+from cns_drake.imports.dressing.facade_pieces import FacadePlan
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.wall_panels import (
@@ -113,7 +96,7 @@ def _laid_bare(
     width, depth = np.ptp(corners[:, :2], axis=0)
     top = walls if len(walls) else one.triangles
     height = max(1.0, float(top[:, :, 2].max()) - base)
-    is_flat = bool(len(roof)) and is_flat_roof(roof)
+    is_flat = bool(len(roof)) and facade_pieces.is_flat_roof(roof)
     rng = random_generator(seed, "dressing", one.draw_name)
     area = 0.8 * float(width * depth)
     style = make_style(one.tags, one.year, area, height, is_flat, rng)
@@ -344,10 +327,10 @@ def _dressed(
     counts: Counter[str] = Counter()
     for plan, distance in plans:
         rng = random_generator(seed, _wall_name(plan.panel), some.one.draw_name)
-        counts += add_facade(out, plan, distance, rng)
+        counts += facade_pieces.add_facade(out, plan, distance, rng)
     has_own_roof = some.one.lod >= _OWN_ROOF or not len(some.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
-        add_roof_pieces(out, some.roof, style, some.is_flat)
+        facade_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
     counts["roof equipment and chimneys"] = len(out.parts)
     return out.finish(footprint), counts
 
@@ -379,7 +362,7 @@ def _plans(
     )
     heights = ground.height(before[:, :2])
     plans = [
-        plan_facade(
+        facade_pieces.plan_facade(
             panel,
             bare[panel.building].style,
             bare[panel.building].base,
@@ -409,9 +392,9 @@ def _plans(
         for k in members:
             plan = plans[k]
             if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
-                plan = with_shops(plan, paving)
+                plan = facade_pieces.with_shops(plan, paving)
             if k == front:
-                plan = with_doors(plan, paving)
+                plan = facade_pieces.with_doors(plan, paving)
             found.setdefault(number, []).append((plan, float(to_drive[k])))
     return found
 
@@ -516,11 +499,11 @@ def _laid(
     """Returns streets and sidewalks that the file lacks."""
     if not drives:
         return []
-    laid = list(missing_sidewalks(staged.kept, city.streets, drives))
+    laid = list(grounds.missing_sidewalks(staged.kept, city.streets, drives))
     if is_paved and city.streets:
-        laid += paved_gaps([*staged.kept, *laid], drives)
+        laid += grounds.paved_gaps([*staged.kept, *laid], drives)
     elif is_paved and not any(map(_is_street, staged.kept)):
-        laid += guessed_streets(staged.kept, drives, ground)
+        laid += grounds.guessed_streets(staged.kept, drives, ground)
     return laid
 
 
@@ -539,7 +522,7 @@ def dress_city(
         InputError: if there are more structures than a map may have.
     """
     always = set.intersection(*map(set, staged.standing.values()))
-    is_paved = is_dense(staged.kept)
+    is_paved = grounds.is_dense(staged.kept)
     laid = _laid(staged, city, drives, ground, is_paved)
     paving = [
         one.triangles
@@ -549,8 +532,11 @@ def dress_city(
     buildings = dress_buildings(
         staged.kept, drives, city.streets, ground, seed, always, joined(paving)
     )
-    marks = list(lane_marks(city.streets, drives)) if drives else []
-    added = [with_kerb(one) if one.kind == "Sidewalk" else one for one in laid]
+    marks = list(grounds.lane_marks(city.streets, drives)) if drives else []
+    added = [
+        grounds.with_kerb(one) if one.kind == "Sidewalk" else one
+        for one in laid
+    ]
     added += marks
     bottom = bottom_of(staged.kept, ground)
     things = dress_streets(
@@ -567,13 +553,16 @@ def dress_city(
     at_random += Counter(one.kind for one in added)
     if is_paved and not any(map(_has_ground_kind, staged.kept)):
         changed |= {
-            one: replace(one, structure=paved(one.structure))
+            one: replace(one, structure=grounds.paved(one.structure))
             for one in staged.kept
             if one.kind == _TERRAIN
         }
     if drives:
         walks = [one for one in staged.kept if one.kind == "Sidewalk"]
-        changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
+        changed |= {
+            one: grounds.with_kerb(one)
+            for one in grounds.near_drives(walks, drives)
+        }
     added += things.structures
     for thing in city.things:
         if thing.source in things.sources:
@@ -608,5 +597,5 @@ def dress_city(
             " --within"
         )
     if is_paved:
-        bottom = list(map(paved, bottom))
+        bottom = list(map(grounds.paved, bottom))
     return Dressing(dressed, origins, facts, bottom)

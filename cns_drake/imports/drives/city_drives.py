@@ -10,15 +10,9 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 from shapely.geometry import LineString
 
+from cns_drake.imports.drives import search
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
-from cns_drake.imports.drives.search import (
-    LONGEST,
-    Obstacle,
-    WayGraph,
-    WaypointDrive,
-    evenly_spaced,
-    steerable_drive,
-)
+from cns_drake.imports.drives.search import Obstacle, WaypointDrive
 from cns_drake.imports.foreign_city import SHARPEST_TURN_DEG, Street
 from cns_drake.imports.options import DriveOn
 
@@ -126,14 +120,14 @@ def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
     """
     parts = []
     for lane in lanes:
-        line = evenly_spaced(lane.line, spacing)
+        line = search.evenly_spaced(lane.line, spacing)
         parts.append(np.column_stack([line, np.full(len(line), lane.aside)]))
     rows = np.concatenate(parts)
     steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
     return rows[np.append(True, steps > 1e-6)]
 
 
-class CellGraph(WayGraph):
+class CellGraph(search.WayGraph):
     """Cells with room, each linked to the eight beside it."""
 
     def __init__(self, space: FreeSpace):
@@ -206,7 +200,7 @@ def simplified_drive(
             [np.convolve(column, kernel, mode="valid") for column in xy.T]
         )
         line = LineString(smooth).simplify(tolerance)
-        found = steerable_drive(
+        found = search.steerable_drive(
             _densified(np.array(line.coords)), space.obstacle
         )
         if isinstance(found, WaypointDrive):
@@ -228,7 +222,7 @@ def _densified(corners: np.ndarray) -> np.ndarray:
     return np.concatenate(points)
 
 
-class StreetGraph(WayGraph):
+class StreetGraph(search.WayGraph):
     """Lanes of streets from junction to junction.
 
     One-way streets are driven in their direction, all others in the outermost
@@ -241,7 +235,7 @@ class StreetGraph(WayGraph):
         """Makes the graph of streets that meet at common nodes."""
         # A street with a wrong place on another continent would never end.
         self.lanes = [
-            one for one in make_lanes(streets) if one.length <= LONGEST
+            one for one in make_lanes(streets) if one.length <= search.LONGEST
         ]
         self._ways = np.array([lane.way for lane in self.lanes], dtype=int)
         self._space = space

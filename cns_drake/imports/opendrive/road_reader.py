@@ -14,20 +14,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
-from cns_drake.imports.opendrive.road_model import (
-    Arc,
-    Cubic,
-    Cubics,
-    ImportedRoad,
-    Lane,
-    LaneSection,
-    MarkLine,
-    Piece,
-    RoadMap,
-    RoadMark,
-    Shape,
-    Spiral,
-)
+from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.things import read_things
 from cns_drake.imports.options import ImportFaults
 
@@ -57,7 +44,7 @@ _LONGEST_NAME = 60
 
 def read_marks(
     lane: Element, start: float, road: str, faults: ImportFaults
-) -> list[RoadMark]:
+) -> list[road_model.RoadMark]:
     """Returns the marks of a lane, in their order along the road.
 
     Its section begins at a start [m]. Marks whose lines are not usable are
@@ -72,13 +59,13 @@ def read_marks(
         width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
         if one.value("weight", "standard") == "bold" and not stated:
             width *= 2.0
-        lines: tuple[MarkLine, ...] = ()
+        lines: tuple[road_model.MarkLine, ...] = ()
         try:
             lines = tuple(_mark_lines(one, width))
         except _NoPatternError:
             faults.add("road mark with impossible dashes, made usual", road)
         marks.append(
-            RoadMark(
+            road_model.RoadMark(
                 start + one.number("sOffset", 0.0),
                 one.value("type", "none"),
                 one.value("color", "standard"),
@@ -93,7 +80,7 @@ class _NoPatternError(Exception):
     """The dashes of a line cannot be painted."""
 
 
-def _mark_lines(mark: Element, usual: float) -> Iterator[MarkLine]:
+def _mark_lines(mark: Element, usual: float) -> Iterator[road_model.MarkLine]:
     """Yields the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
 
     A line without a plausible width has the usual one [m].
@@ -109,7 +96,7 @@ def _mark_lines(mark: Element, usual: float) -> Iterator[MarkLine]:
         if gap > 0.0 and dash + gap < _CLOSEST_DASHES:
             raise _NoPatternError
         stated = one.number("width", 0.0)
-        yield MarkLine(
+        yield road_model.MarkLine(
             aside=one.number("tOffset", 0.0),
             start=one.number("sOffset", 0.0),
             dash=dash,
@@ -193,7 +180,7 @@ def _linked_lanes(section: Element) -> Iterator[Element]:
         yield from section.all(side, "lane")
 
 
-def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
+def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     """Reads all roads of a file.
 
     Raises:
@@ -201,7 +188,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
             read or describes an impossible road.
     """
     top = read_elements(path, "OpenDRIVE")
-    roads: list[ImportedRoad] = []
+    roads: list[road_model.ImportedRoad] = []
     names: set[str] = set()
     together = 0.0
     for kind in ("road", "junction"):
@@ -239,7 +226,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
     if np.abs(ends).max() > _FAR:
         origin = np.round((low + high) / 2.0)
     reference = top.first("header", "geoReference")
-    return RoadMap(
+    return road_model.RoadMap(
         tuple(_moved(road, origin) for road in roads),
         " ".join((reference.text or "").split())
         if reference is not None
@@ -280,7 +267,9 @@ def _stem(own: str) -> str:
     return re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
 
 
-def _moved(road: ImportedRoad, origin: np.ndarray) -> ImportedRoad:
+def _moved(
+    road: road_model.ImportedRoad, origin: np.ndarray
+) -> road_model.ImportedRoad:
     pieces = tuple(
         replace(piece, x=piece.x - origin[0], y=piece.y - origin[1])
         for piece in road.pieces
@@ -290,7 +279,7 @@ def _moved(road: ImportedRoad, origin: np.ndarray) -> ImportedRoad:
 
 def _road(
     element: Element, name: str, faults: ImportFaults
-) -> ImportedRoad | None:
+) -> road_model.ImportedRoad | None:
     pieces = _pieces(element.all("planView", "geometry"), name, faults)
     if not pieces:
         faults.add("road without a course, left out", name)
@@ -313,9 +302,9 @@ def _road(
     along = np.linspace(0.0, length, math.ceil(length) + 1)
     if banking and np.abs(banking.at(along, along)).max() > _MOST_BANKED:
         faults.add("superelevation beyond 50 deg, taken as level", name)
-        banking = Cubics()
+        banking = road_model.Cubics()
     offsets = element.all("lanes", "laneOffset")
-    return ImportedRoad(
+    return road_model.ImportedRoad(
         name=name,
         junction=None if junction == "-1" else junction,
         length=length,
@@ -337,8 +326,8 @@ def _road(
 
 def _pieces(
     elements: Iterable[Element], name: str, faults: ImportFaults
-) -> list[Piece]:
-    found: list[Piece] = []
+) -> list[road_model.Piece]:
+    found: list[road_model.Piece] = []
     for one in elements:
         length = one.number("length")
         if length < 0.0:
@@ -359,37 +348,39 @@ def _pieces(
             prefix = "" if text.startswith("line") else at
             raise ValueError(prefix + text) from error
         s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
-        found.append(Piece(s, x, y, heading, length, shape))
+        found.append(road_model.Piece(s, x, y, heading, length, shape))
     found.sort(key=lambda piece: piece.s)
     return found
 
 
-def _shape(geometry: Element, length: float) -> Shape:
+def _shape(geometry: Element, length: float) -> road_model.Shape:
     """Returns the curve of a geometry.
 
     Raises:
         ValueError: if it has no curve, or one that is too sharp.
     """
-    shape: Shape | None = None
+    shape: road_model.Shape | None = None
     for one in geometry.all("*"):
         if one.tag == "line":
-            shape = Arc(0.0)
+            shape = road_model.Arc(0.0)
         elif one.tag == "arc":
-            shape = Arc(one.number("curvature"))
+            shape = road_model.Arc(one.number("curvature"))
         elif one.tag == "spiral":
             ends = one.number("curvStart"), one.number("curvEnd")
             if max(map(abs, ends)) > _SHARPEST:
                 raise ValueError(f"a spiral of curvature {max(ends):g} 1/m")
-            shape = Spiral(*ends, length)
+            shape = road_model.Spiral(*ends, length)
         elif one.tag == "poly3":
             v = [one.number(k) for k in "abcd"]
             # Where the curve has the file's length, u is not beyond it.
-            shape = Cubic((0, 1, 0, 0), v, length, length, stretched=False)
+            shape = road_model.Cubic(
+                (0, 1, 0, 0), v, length, length, stretched=False
+            )
         elif one.tag == "paramPoly3":
             u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
             by_arc = one.value("pRange", "normalized") == "arcLength"
             last = length if by_arc else 1.0
-            shape = Cubic(u, v, last, length, by_parameter=by_arc)
+            shape = road_model.Cubic(u, v, last, length, by_parameter=by_arc)
     if shape is None:
         raise ValueError("neither a line nor a known curve")
     if shape.sharpest > _SHARPEST:
@@ -399,8 +390,8 @@ def _shape(geometry: Element, length: float) -> Shape:
 
 def _cubics(
     elements: Iterable[Element], start: str, offset: float = 0.0
-) -> Cubics:
-    return Cubics(
+) -> road_model.Cubics:
+    return road_model.Cubics(
         [
             (
                 one.number(start, 0.0) + offset,
@@ -413,7 +404,7 @@ def _cubics(
 
 def _sections(
     road: Element, length: float, name: str, faults: ImportFaults
-) -> list[LaneSection]:
+) -> list[road_model.LaneSection]:
     elements = list(road.all("lanes", "laneSection"))
     elements.sort(key=lambda one: one.number("s"))
     starts = [one.number("s") for one in elements]
@@ -423,7 +414,7 @@ def _sections(
         start, end = max(start, 0.0), min(end, length)
         if end - start < _SHORTEST:
             continue
-        lanes: dict[int, Lane] = {}
+        lanes: dict[int, road_model.Lane] = {}
         for side in ("left", "right"):
             for element in one.all(side, "lane"):
                 lane = _lane(element, start, name, faults)
@@ -440,20 +431,20 @@ def _sections(
             for element in one.all("center", "lane")
             for mark in read_marks(element, start, name, faults)
         ]
-        found.append(LaneSection(start, end, lanes, tuple(middle)))
+        found.append(road_model.LaneSection(start, end, lanes, tuple(middle)))
     return found
 
 
 def _lane(
     element: Element, start: float, name: str, faults: ImportFaults
-) -> Lane:
+) -> road_model.Lane:
     number = element.number("id")
     if number != int(number):
         raise ValueError(
             f"line {element.line}: lane: id: {number} is not a valid id"
         )
     heights = element.first("height")
-    lane = Lane(
+    lane = road_model.Lane(
         number=int(number),
         kind=element.value("type", "none"),
         width=_cubics(element.all("width"), "sOffset", start),

@@ -20,23 +20,13 @@ from cns_drake.imports.foreign_city import (
     Imported,
     Thing,
 )
-from cns_drake.imports.openstreetmap import streets
+from cns_drake.imports.openstreetmap import reading, streets
 from cns_drake.imports.openstreetmap.buildings import (
     TWICE,
     make_buildings,
     standing_buildings,
 )
-from cns_drake.imports.openstreetmap.reading import (
-    Local,
-    OsmArea,
-    OsmFeatures,
-    OsmWay,
-    Tags,
-    has_tag,
-    is_building,
-    read_openstreetmap,
-    was_building,
-)
+from cns_drake.imports.openstreetmap.reading import has_tag
 from cns_drake.imports.openstreetmap.tags import TABLES, length, tag_value
 from cns_drake.imports.options import ImportFaults
 
@@ -51,7 +41,7 @@ _SEA = 60.0
 _LARGEST = 20_000.0  # [m]
 
 
-def object_of(tags: Tags) -> str | None:
+def object_of(tags: reading.Tags) -> str | None:
     """Returns the object of a node; None without one."""
     found = [
         name
@@ -76,10 +66,10 @@ def object_of(tags: Tags) -> str | None:
 
 
 def make_things(
-    nodes: Iterable[tuple[str, Tags, tuple[float, float]]],
-    ways: Iterable[OsmWay],
+    nodes: Iterable[tuple[str, reading.Tags, tuple[float, float]]],
+    ways: Iterable[reading.OsmWay],
     kinds: Mapping[str, str],
-    local: Local,
+    local: reading.Local,
 ) -> Iterator[Thing]:
     """Yields things at their nodes, and the trees of rows."""
     for name, tags, place in nodes:
@@ -102,7 +92,7 @@ def make_things(
                 yield Thing(name, kinds[name], kind, (x, y), None)
 
 
-def _direction(tags: Tags) -> float | None:
+def _direction(tags: reading.Tags) -> float | None:
     """Returns the heading of a thing, if its tags have one [rad]."""
     text = tags.get("direction", "")
     if not re.fullmatch(r"\d{1,3}(\.\d+)?", text):
@@ -123,12 +113,13 @@ def import_openstreetmap(
         InputError: if it cannot be read, has no building, or is larger than
             20 km.
     """
-    features = read_openstreetmap(path)
+    features = reading.read_openstreetmap(path)
     faults = features.faults
     buildings = [
         one
         for one in features.areas
-        if is_building(one.tags) or (dressed and was_building(one.tags))
+        if reading.is_building(one.tags)
+        or (dressed and reading.was_building(one.tags))
     ]
     buildings = list(standing_buildings(buildings, faults, dressed))
     if dressed:
@@ -137,7 +128,7 @@ def import_openstreetmap(
         raise InputError(f"{path}: {_no_buildings(faults)}")
     low, high = _bounds(buildings)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
-    local = Local(longitude, latitude)
+    local = reading.Local(longitude, latitude)
     size = local.metres(high - low)
     if size.max() > _LARGEST:
         raise InputError(
@@ -183,8 +174,8 @@ def import_openstreetmap(
 
 
 def _without_outers(
-    buildings: Iterable[OsmArea], features: OsmFeatures
-) -> Iterator[OsmArea]:
+    buildings: Iterable[reading.OsmArea], features: reading.OsmFeatures
+) -> Iterator[reading.OsmArea]:
     """Yields buildings without the outlines of multipolygons.
 
     A way that is tagged like the multipolygon whose outline it is would fill
@@ -212,7 +203,9 @@ def _no_buildings(faults: ImportFaults) -> str:
     return f"the file has no usable building; {'; '.join(unfit)}"
 
 
-def _bounds(buildings: Iterable[OsmArea]) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(
+    buildings: Iterable[reading.OsmArea],
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and the greatest longitude and latitude (2,) [deg].
 
     Across the 180th meridian longitudes go on beyond 180.
@@ -226,7 +219,9 @@ def _bounds(buildings: Iterable[OsmArea]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _count_unused(
-    features: OsmFeatures, found: Iterable[Imported], also: AbstractSet[str]
+    features: reading.OsmFeatures,
+    found: Iterable[Imported],
+    also: AbstractSet[str],
 ) -> None:
     """Counts things in the file without a place in the city, by kind.
 
@@ -237,7 +232,9 @@ def _count_unused(
         for one in found
         for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
     }
-    used |= {one.name for one in features.areas if is_building(one.tags)}
+    used |= {
+        one.name for one in features.areas if reading.is_building(one.tags)
+    }
     used |= also
     for name, kind in features.kinds.items():
         is_relation_of_parts = kind == "relation of type building"
@@ -248,7 +245,7 @@ def _count_unused(
 
 
 def _barriers(
-    ways: Iterable[OsmWay], local: Local, faults: ImportFaults
+    ways: Iterable[reading.OsmWay], local: reading.Local, faults: ImportFaults
 ) -> Iterator[Imported]:
     for name, tags, line, _ in ways:
         kind = tags.get("barrier")
@@ -267,8 +264,8 @@ def _barriers(
 
 
 def _trees(
-    trees: Iterable[tuple[str, Tags, tuple[float, float]]],
-    local: Local,
+    trees: Iterable[tuple[str, reading.Tags, tuple[float, float]]],
+    local: reading.Local,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
     for name, tags, place in trees:

@@ -29,14 +29,8 @@ from cns_drake.imports.foreign_city import (
     StreetPlaces,
     make_imported,
 )
-from cns_drake.imports.openstreetmap.reading import (
-    Local,
-    OsmArea,
-    OsmFeatures,
-    OsmWay,
-    Tags,
-    has_tag,
-)
+from cns_drake.imports.openstreetmap import reading
+from cns_drake.imports.openstreetmap.reading import Local, OsmWay, has_tag
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     area_kind,
@@ -224,7 +218,7 @@ def street_surfaces(
         )
 
 
-def _is_elsewhere(name: str, tags: Tags, bridges: Bridges) -> bool:
+def _is_elsewhere(name: str, tags: reading.Tags, bridges: Bridges) -> bool:
     """Returns whether a way is not a line on the ground."""
     is_line = not (has_tag(tags, "tunnel") or has_tag(tags, "area"))
     return not is_line or name in bridges.over_streets
@@ -249,7 +243,7 @@ def drivable_streets(
     return streets
 
 
-def street_places(features: OsmFeatures, local: Local) -> StreetPlaces:
+def street_places(features: reading.OsmFeatures, local: Local) -> StreetPlaces:
     """Returns where people cross and signals stand, and ways for people."""
     signals = [
         place
@@ -277,7 +271,7 @@ def street_places(features: OsmFeatures, local: Local) -> StreetPlaces:
 
 
 def crossing_stripes(
-    crossings: Iterable[tuple[int, Tags]],
+    crossings: Iterable[tuple[int, reading.Tags]],
     ways: Iterable[OsmWay],
     local: Local,
     faults: ImportFaults,
@@ -362,7 +356,7 @@ _BEYOND, _BESIDE = 3000.0, 0.1
 
 
 def ground_areas(
-    areas: Iterable[OsmArea],
+    areas: Iterable[reading.OsmArea],
     local: Local,
     faults: ImportFaults,
     dressed: bool,
@@ -384,7 +378,7 @@ def ground_areas(
         )
 
 
-def _plain_look(tags: Tags) -> _Look | None:
+def _plain_look(tags: reading.Tags) -> _Look | None:
     found = area_kind(tags)
     if found is None:
         return None
@@ -393,7 +387,7 @@ def _plain_look(tags: Tags) -> _Look | None:
     return _Look(kind, semantic_class, colours.get(kind), _LEVEL)
 
 
-def _look(tags: Tags) -> _Look | None:
+def _look(tags: reading.Tags) -> _Look | None:
     if tags.get("tunnel", "no") != "no" or tags.get("layer", "").startswith(
         "-"
     ):
@@ -414,7 +408,7 @@ def _look(tags: Tags) -> _Look | None:
     return _plain_look(tags)
 
 
-def _pitch(tags: Tags) -> _Look:
+def _pitch(tags: reading.Tags) -> _Look:
     surface = tags.get("surface")
     sports = tags.get("sport", "").split(";")
     is_grass = surface in _OF_GRASS or (

@@ -28,15 +28,9 @@ from cns_drake.imports.openstreetmap.tags import (
 )
 from cns_drake.imports.options import DriveOn
 from cns_drake.roads.centreline import blend
+from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_file import lane_text
-from cns_drake.traffic.lane_graph import (
-    SPACING,
-    Crossing,
-    LaneGraph,
-    Walkway,
-    make_crossing,
-    resampled,
-)
+from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
 
 # From the kerb to the middle of a walked strip, half its width, and its least
@@ -85,7 +79,7 @@ class StreetWalkways:
         ]
         self._tree = shapely.STRtree(self._strips)
         self._nodes: dict[tuple[int, float], int] = {}
-        self.crossings: dict[int, Crossing] = {}
+        self.crossings: dict[int, lane_graph.Crossing] = {}
         over = []
         arms: Counter[int] = Counter()
         for street in streets:
@@ -110,7 +104,10 @@ class StreetWalkways:
 
     def _crossing(
         self, street: Street, k: int
-    ) -> tuple[Crossing, tuple[tuple[int, float], tuple[int, float]]] | None:
+    ) -> (
+        tuple[lane_graph.Crossing, tuple[tuple[int, float], tuple[int, float]]]
+        | None
+    ):
         """Returns a crossing and its places on strips; None without strips."""
         line = street.line
         along = line[min(k + 1, len(line) - 1)] - line[max(k - 1, 0)]
@@ -128,7 +125,7 @@ class StreetWalkways:
         self._node(last)
         kerbs = np.array([line[k] + side * half * left for side in (1.0, -1.0)])
         course = np.column_stack([kerbs, np.zeros(2)])
-        return make_crossing(course, _CROSSING_WIDTH), (first, last)
+        return lane_graph.make_crossing(course, _CROSSING_WIDTH), (first, last)
 
     def _on_strip(self, place: np.ndarray) -> tuple[int, float] | None:
         point = shapely.Point(place)
@@ -167,7 +164,7 @@ class StreetWalkways:
                 self._node(ends[b])
                 yield ends[a], ends[b]
 
-    def _walkways(self) -> Iterator[Walkway]:
+    def _walkways(self) -> Iterator[lane_graph.Walkway]:
         """Yields the strips, cut where others begin."""
         cuts: defaultdict[int, set[float]] = defaultdict(set)
         for k, s in self._nodes:
@@ -185,7 +182,7 @@ class StreetWalkways:
 
     def _way(
         self, a: tuple[int, float], b: tuple[int, float], crossing: int = -1
-    ) -> Walkway:
+    ) -> lane_graph.Walkway:
         places = [self._strips[k].interpolate(s) for k, s in (a, b)]
         return self._walkway(shapely.get_coordinates(places), a, b, crossing)
 
@@ -195,10 +192,10 @@ class StreetWalkways:
         a: tuple[int, float],
         b: tuple[int, float],
         crossing: int = -1,
-    ) -> Walkway:
+    ) -> lane_graph.Walkway:
         height = np.full(len(line), self._height)
-        return Walkway(
-            resampled(np.column_stack([line, height])),
+        return lane_graph.Walkway(
+            lane_graph.resampled(np.column_stack([line, height])),
             _HALF_STRIP if crossing < 0 else _CROSSING_HALF_WIDTH,
             self._node(a),
             self._node(b),
@@ -641,7 +638,9 @@ def _strip(points: np.ndarray) -> BaseGeometry:
     )
 
 
-def _in_the_way(graph: LaneGraph, added: Sequence[Imported]) -> list[str]:
+def _in_the_way(
+    graph: lane_graph.LaneGraph, added: Sequence[Imported]
+) -> list[str]:
     """Returns the names of things that stand where vehicles drive."""
     if not added:
         return []
@@ -672,8 +671,8 @@ def _signals(
 
 
 def _with_signals(
-    graph: LaneGraph, signals: Sequence[BaseGeometry]
-) -> LaneGraph:
+    graph: lane_graph.LaneGraph, signals: Sequence[BaseGeometry]
+) -> lane_graph.LaneGraph:
     """Returns lanes with signals of two phases at some junctions.
 
     One phase is along the way on which a junction is entered first, the other
