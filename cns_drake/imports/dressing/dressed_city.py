@@ -1,6 +1,6 @@
 """A dressed city: its buildings, its streets, and the origin of each part."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -243,8 +243,8 @@ class DressedBuildings:
     """
 
     buildings: Mapping[Imported, Imported]
-    at_random: Mapping[str, int]
-    by_file: Mapping[str, int]
+    at_random: Counter[str]
+    by_file: Counter[str]
 
 
 def dress_buildings(
@@ -292,11 +292,7 @@ def dress_buildings(
         by_file.update(some.style.by_tag)
         structure = replace(some.one.structure, model=model)
         dressed[some.one] = replace(some.one, structure=structure)
-    return DressedBuildings(
-        dressed,
-        dict(sorted(at_random.items())),
-        dict(sorted(by_file.items())),
-    )
+    return DressedBuildings(dressed, at_random, by_file)
 
 
 def _dressed(
@@ -321,12 +317,20 @@ def _dressed(
         sign=style.sign,
         trim=style.trim,
     )
-    walls = _undressed_walls(some, [plan for plan, _ in plans])
+    planned = {
+        one.tobytes() for plan, _ in plans for one in plan.panel.triangles
+    }
+    bare = [one for one in some.walls if one.tobytes() not in planned]
+    walls = np.array(bare).reshape(-1, 3, 3)
     out.add_to("body", to_mesh(walls), to_mesh(some.rest))
     out.add_to("roof", to_mesh(some.roof))
     counts: Counter[str] = Counter()
     for plan, distance in plans:
-        rng = random_generator(seed, _wall_name(plan.panel), some.one.draw_name)
+        # A name that does not depend on the map's origin.
+        panel = plan.panel
+        heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
+        wall = f"wall {panel.length:.1f} {heading:.0f}"
+        rng = random_generator(seed, wall, some.one.draw_name)
         counts += facade_pieces.add_facade(out, plan, distance, rng)
     has_own_roof = some.one.lod >= _OWN_ROOF or not len(some.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
@@ -386,9 +390,14 @@ def _plans(
         ]
     )
     to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
+    groups: defaultdict[int, list[int]] = defaultdict(list)
+    for k, plan in enumerate(plans):
+        groups[plan.panel.building].append(k)
     found: dict[int, list[tuple[FacadePlan, float]]] = {}
-    for number, members in _grouped(plans).items():
-        front = _front(members, plans, to_way)
+    for number, members in groups.items():
+        possible = [k for k in members if plans[k].on_street]
+        # The wall with the building's door.
+        front = min(possible, key=lambda k: (to_way[k], k), default=None)
         for k in members:
             plan = plans[k]
             if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
@@ -428,37 +437,6 @@ def _seen(
     return [panels[k] for k in order], distances[order]
 
 
-def _grouped(plans: Sequence[FacadePlan]) -> dict[int, list[int]]:
-    """Returns the building's number -> numbers of its walls."""
-    groups: dict[int, list[int]] = {}
-    for k, plan in enumerate(plans):
-        groups.setdefault(plan.panel.building, []).append(k)
-    return groups
-
-
-def _front(
-    members: Sequence[int], plans: Sequence[FacadePlan], to_way: np.ndarray
-) -> int | None:
-    """Returns the number of the wall that gets a building's door."""
-    possible = [k for k in members if plans[k].on_street]
-    return min(possible, key=lambda k: (to_way[k], k)) if possible else None
-
-
-def _undressed_walls(some: Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
-    """Returns the walls (M, 3, 3) of a building without those planned."""
-    if not plans:
-        return some.walls
-    taken = {one.tobytes() for plan in plans for one in plan.panel.triangles}
-    kept = [one for one in some.walls if one.tobytes() not in taken]
-    return np.array(kept).reshape(-1, 3, 3)
-
-
-def _wall_name(panel: Panel) -> str:
-    """Returns a name of a wall that does not depend on the map's origin."""
-    heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
-    return f"wall {panel.length:.1f} {heading:.0f}"
-
-
 _TERRAIN = "TINRelief"
 
 
@@ -480,15 +458,6 @@ class Dressing:
     bottom: Sequence[Structure]
 
 
-def _has_ground_kind(one: Imported) -> bool:
-    """Returns whether the file has a ground's kind, not only its height."""
-    return one.is_ground and one.kind != _TERRAIN
-
-
-def _is_street(one: Imported) -> bool:
-    return one.structure.semantic_class in ("road", "sidewalk")
-
-
 def _laid(
     staged: StagedCity,
     city: ForeignCity,
@@ -502,7 +471,10 @@ def _laid(
     laid = list(grounds.missing_sidewalks(staged.kept, city.streets, drives))
     if is_paved and city.streets:
         laid += grounds.paved_gaps([*staged.kept, *laid], drives)
-    elif is_paved and not any(map(_is_street, staged.kept)):
+    elif is_paved and not any(
+        one.structure.semantic_class in ("road", "sidewalk")
+        for one in staged.kept
+    ):
         laid += grounds.guessed_streets(staged.kept, drives, ground)
     return laid
 
@@ -549,9 +521,10 @@ def dress_city(
         seed,
     )
     changed = dict(buildings.buildings)
-    at_random = Counter(buildings.at_random)
-    at_random += Counter(one.kind for one in added)
-    if is_paved and not any(map(_has_ground_kind, staged.kept)):
+    at_random = buildings.at_random + Counter(one.kind for one in added)
+    # Whether the file has a ground's kind, not only its height.
+    has_kind = any(o.is_ground and o.kind != _TERRAIN for o in staged.kept)
+    if is_paved and not has_kind:
         changed |= {
             one: replace(one, structure=grounds.paved(one.structure))
             for one in staged.kept
@@ -578,10 +551,8 @@ def dress_city(
     facts = {
         "seed": seed,
         "buildings": len(buildings.buildings),
-        "by_file": dict(
-            sorted((Counter(buildings.by_file) + things.by_file).items())
-        ),
-        "at_random": dict(sorted((+at_random + things.at_random).items())),
+        "by_file": dict(sorted((buildings.by_file + things.by_file).items())),
+        "at_random": dict(sorted((at_random + things.at_random).items())),
         "without_room": things.no_room,
     }
     moved = {

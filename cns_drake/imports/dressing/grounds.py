@@ -155,7 +155,7 @@ def missing_sidewalks(
             *(area for area in made if area.intersects(strip)),
         ]
         covered = shapely.union_all(others, grid_size=_GRID)
-        area = areas_of(shapely.difference(strip, covered, grid_size=_GRID))
+        area = _cut(strip, covered)
         made.append(area)
         surface = [
             flat_surface(part, KERB_HEIGHT, street.name, ImportFaults())
@@ -172,9 +172,14 @@ def missing_sidewalks(
             )
 
 
-def areas_of(geometry: BaseGeometry) -> MultiPolygon:
+def _areas(geometry: BaseGeometry) -> MultiPolygon:
     """Returns the polygons of a geometry, without its lines and points."""
     return MultiPolygon(list(parts_of(geometry)))
+
+
+def _cut(area: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
+    """Returns the polygons of one area outside of another."""
+    return _areas(shapely.difference(area, other, grid_size=_GRID))
 
 
 # Half of the width of a street of unknown width, and width of its sidewalks
@@ -201,21 +206,9 @@ def guessed_streets(
         [one for one in near if one.structure.semantic_class == "building"],
         paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL),
     )
-    street = areas_of(
-        shapely.difference(
-            paths.buffer(HALF_STREET, 4),
-            walls.buffer(_FROM_WALL, 1),
-            grid_size=_GRID,
-        )
-    )
-    beside = areas_of(
-        shapely.difference(
-            paths.buffer(HALF_STREET + _SIDEWALK, 4),
-            street,
-            grid_size=_GRID,
-        )
-    )
-    beside = areas_of(shapely.difference(beside, walls, grid_size=_GRID))
+    street = _cut(paths.buffer(HALF_STREET, 4), walls.buffer(_FROM_WALL, 1))
+    beside = _cut(paths.buffer(HALF_STREET + _SIDEWALK, 4), street)
+    beside = _cut(beside, walls)
     half = _NARROWEST / 2.0
     wide = beside.buffer(-half, 2).buffer(half, 2)
     sidewalks = wide.intersection(beside)
@@ -328,9 +321,9 @@ def paved_gaps(
             other[other_tree.query(part, "intersects")],
             grid_size=_GRID,
         )
-        free = areas_of(shapely.difference(part, taken, grid_size=_GRID))
+        free = _cut(part, taken)
         inside = free.buffer(-_NARROWEST_GAP / 2.0, 2)
-        wide = areas_of(inside.buffer(_NARROWEST_GAP / 2.0, 2))
+        wide = _areas(inside.buffer(_NARROWEST_GAP / 2.0, 2))
         open_ = shapely.intersection(wide, free, grid_size=_GRID)
         square = (
             int(part.centroid.x // _SQUARE),

@@ -218,7 +218,8 @@ def _painted(
             for a, b in _stretches(line, mark.start, last):
                 quads = _stripe(border, s, left, aside, (a, b), line.width)
                 if len(quads):
-                    yield mark.colour_of(_COLOURS), quads
+                    known = mark.colour in _COLOURS
+                    yield mark.colour if known else "standard", quads
 
 
 def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:

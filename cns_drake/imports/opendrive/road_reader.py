@@ -59,10 +59,8 @@ def read_marks(
         width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
         if one.value("weight", "standard") == "bold" and not stated:
             width *= 2.0
-        lines: tuple[road_model.MarkLine, ...] = ()
-        try:
-            lines = tuple(_mark_lines(one, width))
-        except _NoPatternError:
+        lines = _mark_lines(one, width)
+        if lines is None:
             faults.add("road mark with impossible dashes, made usual", road)
         marks.append(
             road_model.RoadMark(
@@ -70,39 +68,33 @@ def read_marks(
                 one.value("type", "none"),
                 one.value("color", "standard"),
                 width,
-                lines,
+                tuple(lines or ()),
             )
         )
     return sorted(marks, key=lambda mark: mark.start)
 
 
-class _NoPatternError(Exception):
-    """The dashes of a line cannot be painted."""
+def _mark_lines(
+    mark: Element, usual: float
+) -> list[road_model.MarkLine] | None:
+    """Returns the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
 
-
-def _mark_lines(mark: Element, usual: float) -> Iterator[road_model.MarkLine]:
-    """Yields the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
-
-    A line without a plausible width has the usual one [m].
-
-    Raises:
-        _NoPatternError: if a line has lengths that cannot be.
+    A line without a plausible width has the usual one [m]. There are none if
+    one has lengths that cannot be.
     """
+    found = []
     for one in mark.all("type", "line"):
         dash, gap = one.number("length", 0.0), one.number("space", 0.0)
         # Programs write both as 0 for a line without gaps.
         if min(dash, gap) < 0.0 or (gap > 0.0 and dash == 0.0):
-            raise _NoPatternError
+            return None
         if gap > 0.0 and dash + gap < _CLOSEST_DASHES:
-            raise _NoPatternError
+            return None
         stated = one.number("width", 0.0)
-        yield road_model.MarkLine(
-            aside=one.number("tOffset", 0.0),
-            start=one.number("sOffset", 0.0),
-            dash=dash,
-            gap=gap,
-            width=stated if 0.0 < stated <= _WIDEST_MARK else usual,
-        )
+        aside, start = one.number("tOffset", 0.0), one.number("sOffset", 0.0)
+        width = stated if 0.0 < stated <= _WIDEST_MARK else usual
+        found.append(road_model.MarkLine(aside, start, dash, gap, width))
+    return found
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
@@ -146,38 +138,35 @@ def _dangling_lanes(
     road: Element, roads: Mapping[str, Element]
 ) -> Iterator[Element]:
     """Yields the links of a road's lanes to lanes that are not there."""
-    sections = _linked_sections(road)
-    for k, section in enumerate(sections):
+
+    def sections(one: Element) -> list[Element]:
+        found = list(one.all("lanes", "laneSection"))
+        return sorted(found, key=lambda section: section.number("s", 0.0))
+
+    def lanes(section: Element) -> Iterator[Element]:
+        for side in ("left", "center", "right"):
+            yield from section.all(side, "lane")
+
+    own = sections(road)
+    for k, section in enumerate(own):
         for end, at in zip(_ENDS, (k - 1, k + 1), strict=True):
-            if 0 <= at < len(sections):
-                beside = [sections[at]]
+            if 0 <= at < len(own):
+                beside = [own[at]]
             else:
                 kind, linked = _linked(road, end)
                 if kind != "road" or linked is None or linked not in roads:
                     continue
                 # The link names the end of the other road, which some files
                 # omit.
-                others = _linked_sections(roads[linked])
+                others = sections(roads[linked])
                 beside = others[:1] + others[-1:]
             there = {
-                lane.attrib.get("id")
-                for other in beside
-                for lane in _linked_lanes(other)
+                lane.attrib.get("id") for one in beside for lane in lanes(one)
             }
-            for lane in _linked_lanes(section):
+            for lane in lanes(section):
                 for link in lane.all("link", end):
                     if link.attrib.get("id") not in there:
                         yield link
-
-
-def _linked_sections(road: Element) -> list[Element]:
-    found = list(road.all("lanes", "laneSection"))
-    return sorted(found, key=lambda one: one.number("s", 0.0))
-
-
-def _linked_lanes(section: Element) -> Iterator[Element]:
-    for side in ("left", "center", "right"):
-        yield from section.all(side, "lane")
 
 
 def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:

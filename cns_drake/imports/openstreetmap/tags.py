@@ -267,15 +267,14 @@ def path_width(tags: Mapping[str, str]) -> float | None:
 
 def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
     """Returns whether a street has a sidewalk on its left and right."""
-    both = tags.get("sidewalk:both") == "yes"
-    side = tags.get("sidewalk", "")
-    left = (
-        both or side in ("both", "left") or tags.get("sidewalk:left") == "yes"
-    )
-    right = (
-        both or side in ("both", "right") or tags.get("sidewalk:right") == "yes"
-    )
-    return left, right
+
+    def has(side: str) -> bool:
+        return tags.get("sidewalk") in ("both", side) or "yes" in (
+            tags.get("sidewalk:both"),
+            tags.get(f"sidewalk:{side}"),
+        )
+
+    return has("left"), has("right")
 
 
 def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
