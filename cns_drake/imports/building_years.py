@@ -78,11 +78,8 @@ def construction_year(
 ) -> int | None:
     """Returns the year in which an object was built, if the file has it.
 
-    Args:
-        attributes: the object's attributes.
-        attribute: the attribute that holds the year; the usual ones if None.
-        name: the object's name.
-        faults: counts values that are not years, and years to come.
+    The attribute holds the year; if None, the usual ones do. Values that are
+    not years, and years to come, are counted for the name.
     """
     faults = faults or ImportFaults()
     if attribute is not None:

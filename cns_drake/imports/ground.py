@@ -113,11 +113,7 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
 
 
 def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
-    """Returns the lowest corner of each solid, (N, 3).
-
-    Args:
-        solids: (M, 3, 3) triangles of each [m].
-    """
+    """Returns the lowest corner (N, 3) of each solid of triangles (M, 3, 3)."""
     found = []
     for triangles in solids:
         corners = triangles.reshape(-1, 3)
@@ -130,10 +126,8 @@ def ground_of(
 ) -> Ground:
     """Returns the ground of a city: its terrain, or one below its feet.
 
-    Args:
-        structures: the city's structures.
-        below_bridges: whether bridges and tunnels do not count as feet, unless
-            there is nothing else.
+    With `below_bridges`, bridges and tunnels have no feet, unless there is
+    nothing else.
     """
     corners = np.concatenate(
         [one.triangles.reshape(-1, 3) for one in structures]

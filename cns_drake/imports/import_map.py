@@ -14,8 +14,9 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
-from cns_drake.imports.cityjson.structures import import_cityjson
-from cns_drake.imports.dressing.whole_city import dress_city
+from cns_drake.imports import map_files
+from cns_drake.imports.cityjson import import_cityjson
+from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
 from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
 from cns_drake.imports.drives.search import (
@@ -26,14 +27,6 @@ from cns_drake.imports.drives.search import (
 )
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.ground import Ground, bottom_of, ground_of
-from cns_drake.imports.map_files import (
-    city_facts,
-    draw_overview,
-    write_drives,
-    write_facts,
-    write_report,
-    write_world,
-)
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
 from cns_drake.imports.options import (
@@ -95,9 +88,9 @@ def _import_city(
         return _import_roads(source, output, options, progress, finish)
     city = _read(source, options)
     staged = stage_city(source, city, options)
-    growth = None
+    changes = None
     if options.grow is not None:
-        staged, growth = grow(staged, options.grow, options.seed)
+        staged, changes = grow(staged, options.grow, options.seed)
     progress(f"{len(staged.kept)} structures; looking for streets")
     ground = ground_of(staged.kept, options.dressed)
     space = find_free_space(staged.kept, ground)
@@ -110,7 +103,7 @@ def _import_city(
     added: list[Imported] = []
     with draft_folder(output) as draft:
         (draft / MESH_FOLDER).mkdir()
-        draw_overview(draft / "from_above.png", bare, space, drives)
+        map_files.draw_overview(draft / "from_above.png", bare, space, drives)
         if options.dressed:
             progress("dressing buildings and streets")
             dressing = dress_city(staged, city, drives, ground, options.seed)
@@ -129,14 +122,14 @@ def _import_city(
         if lanes is not None:
             (draft / LANES_NAME).write_text(lanes, "utf-8")
         bottom = dressing.bottom if dressing else bottom_of(bare, ground)
-        sizes = write_world(draft, source, staged, bottom, dressing)
-        facts = city_facts(
-            city, options, list(staged.standing), growth, dressing
+        sizes = map_files.write_world(draft, source, staged, bottom, dressing)
+        facts = map_files.city_facts(
+            city, options, list(staged.standing), changes, dressing
         )
-        write_facts(draft, source, facts, city.faults)
+        map_files.write_facts(draft, source, facts, city.faults)
         report = _report(staged, drives, city.faults)
-        write_report(draft, report)
-        write_drives(
+        map_files.write_report(draft, report)
+        map_files.write_drives(
             draft,
             _titles(staged, options),
             [drive.waypoints for drive in drives],
@@ -191,7 +184,7 @@ def _import_roads(
     with draft_folder(output) as draft:
         (draft / MESH_FOLDER).mkdir()
         report, sizes = write_town(draft, source, town, progress)
-        write_report(draft, report)
+        map_files.write_report(draft, report)
         finish(draft, sizes)
     return report
 

@@ -17,7 +17,7 @@ import yaml
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import stage_sdf, structure_table
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.imports.dressing.whole_city import Dressing
+from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import WATER, ForeignCity, Imported
@@ -27,7 +27,7 @@ from cns_drake.imports.options import (
     ImportOptions,
     ImportReport,
 )
-from cns_drake.imports.staged_city import Growth, StagedCity
+from cns_drake.imports.staged_city import StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
 _OF_BOX = 12  # triangles
@@ -50,14 +50,6 @@ def write_world(
     dressing: Dressing | None = None,
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
-
-    Args:
-        draft: the map's folder, with the map's name.
-        source: the file that the city was read from.
-        city: all structures.
-        bottom: the ground below them, at all stages.
-        dressing: the added details, if the city was dressed.
-
     Returns:
         Stage -> its numbers of structures and triangles.
     """
@@ -104,9 +96,7 @@ def triangles_in(obj: str) -> int:
 def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
     """Returns the numbers of structures with a surface, and of triangles.
 
-    Args:
-        sdf: the text of a stage.
-        triangles: path of a mesh in the map's folder -> its triangles.
+    A mesh has its number of triangles by its path in the map's folder.
     """
     structures = set(re.findall('visual name="([^"/]+)', sdf))
     meshes = re.findall("<uri>([^<]+)</uri>", sdf)
@@ -118,19 +108,26 @@ def city_facts(
     city: ForeignCity,
     options: ImportOptions,
     stages: Sequence[str],
-    growth: Growth | None,
+    changes: Mapping[str, object] | None,
     dressing: Dressing | None = None,
 ) -> dict:
-    """Returns the place of a city's map, and counts of drawn parts."""
-    return {
+    """Returns the place of a city's map, and counts of drawn parts.
+
+    If the first stage was drawn, its changes are among them.
+    """
+    facts = {
         "reference_system": city.reference_system or "unknown",
         **({"axes": list(city.axes)} if city.axes else {}),
         "origin": list(city.origin),
         "lod": options.lod if options.lod is not None else "highest",
         "years": dict(zip(stages, options.years, strict=False)),
-        **_drawn(options, growth),
-        **({"dressing": dict(dressing.facts)} if dressing else {}),
     }
+    if changes is not None:
+        draws = {"grow": options.grow, "seed": options.seed}
+        facts["first_stage_at_random"] = {**draws, **changes}
+    if dressing is not None:
+        facts["dressing"] = dict(dressing.facts)
+    return facts
 
 
 def write_facts(
@@ -141,15 +138,7 @@ def write_facts(
     comment: str = "# Where this map comes from. A place of the map plus the"
     " origin is one of the\n# source [m].\n",
 ) -> None:
-    """Writes what is remembered of an import.
-
-    Args:
-        draft: the map's folder.
-        source: the imported file.
-        facts: name -> value.
-        faults: parts of the file that were left out or repaired.
-        comment: the beginning of the file.
-    """
+    """Writes what is remembered of an import."""
     if "axes" in facts:
         comment += (
             "# Places of the source are brought to metres east, north and up"
@@ -172,21 +161,6 @@ def write_report(draft: Path, report: ImportReport) -> None:
         for kind, number, example in report.faults
     ]
     (draft / REPORT_NAME).write_text("\n".join([*lines, ""]), "utf-8")
-
-
-def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
-    """Returns the counts of drawn parts, if there are any."""
-    if growth is None:
-        return {}
-    return {
-        "first_stage_at_random": {
-            "grow": options.grow,
-            "seed": options.seed,
-            "missing": list(growth.missing),
-            "part_of_height": growth.lower,
-            **({"gone_since": list(growth.gone)} if growth.gone else {}),
-        }
-    }
 
 
 def with_column(table: str, name: str, values: Sequence[str]) -> str:
@@ -239,16 +213,10 @@ def draw_overview(
     space: FreeSpace | None,
     drives: Sequence[WaypointDrive],
 ) -> None:
-    """Draws structures, the room for a car, and the drives [m], with a legend.
+    """Draws structures, the room for a car, and the drives, with a legend.
 
     The second drive is a thinner line on the first one, so that both are seen
     where they share a street.
-
-    Args:
-        path: the picture to write.
-        structures: all those of the city.
-        space: the room for a car, if it is to be drawn.
-        drives: the drives that were found.
     """
     corners = np.concatenate(
         [one.triangles.reshape(-1, 3) for one in structures]

@@ -24,12 +24,9 @@ class ImportFaults:
         self._examples: dict[str, str] = {}
 
     def add(self, kind: str, example: str, number: int = 1) -> None:
-        """Counts faults.
+        """Counts faults of a kind: the fault and its remedy, in words.
 
-        Args:
-            kind: the fault and its remedy, in words.
-            example: name of the object that has it.
-            number: the number of faults.
+        The example is the name of an object that has it.
         """
         kind = _printable(kind)
         self._counts[kind] += number

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -41,39 +42,6 @@ _LOWER = 1.0 / 3.0
 # height.
 _LEAST_HEIGHT = 7.0
 _HEIGHTS = (0.4, 0.7)
-
-
-def keep_near(
-    structures: Sequence[Imported],
-    drives: Sequence[WaypointDrive],
-    distance: float,
-    faults: ImportFaults,
-) -> list[Imported | None]:
-    """Returns the structures, and the part of the terrain, near drives.
-
-    Other structures become None.
-
-    Args:
-        structures: the city's structures.
-        drives: at least one.
-        distance: greatest distance of a structure's nearest corner, or of its
-            bounding box [m].
-        faults: counts the structures left out.
-    """
-    ways = MultiLineString([drive.path for drive in drives])
-    shapely.prepare(ways)
-    kept: list[Imported | None] = []
-    for one in structures:
-        corners = one.triangles.reshape(-1, 3)
-        if not _near(corners[None], ways, distance)[0]:
-            name = one.structure.name
-            faults.add("structure far from the drives, left out", name)
-            kept.append(None)
-        elif one.kind == "TINRelief":
-            kept.append(_cropped(one, ways, distance))
-        else:
-            kept.append(one)
-    return kept
 
 
 def _near(
@@ -116,10 +84,6 @@ def with_gone(
     Where both have the same place, a building of today that has a year was
     there already, and what it replaced was not; one without a year came
     later.
-
-    Args:
-        gone: demolished buildings.
-        others: present structures that may have stood then.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
@@ -172,9 +136,11 @@ class StagedCity:
     ) -> StagedCity:
         """Returns the city without structures far from drives.
 
+        Of a terrain, the near part stays.
+
         Args:
             drives: the city's drives.
-            distance: see `keep_near` [m].
+            distance: greatest distance of a structure's bounding box [m].
             faults: counts structures left out.
 
         Raises:
@@ -184,44 +150,42 @@ class StagedCity:
             raise InputError(
                 "--within: no drive was found; give one with --along"
             )
-        cut = dict(
-            zip(
-                self.kept,
-                keep_near(self.kept, drives, distance, faults),
-                strict=True,
-            )
-        )
-        kept = [one for one in cut.values() if one is not None]
-        if not kept:
+        ways = MultiLineString([drive.path for drive in drives])
+        shapely.prepare(ways)
+        cut: dict[Imported, Imported | None] = {}
+        for one in self.kept:
+            corners = one.triangles.reshape(-1, 3)
+            if not _near(corners[None], ways, distance)[0]:
+                name = one.structure.name
+                faults.add("structure far from the drives, left out", name)
+                cut[one] = None
+            elif one.kind == "TINRelief":
+                cut[one] = _cropped(one, ways, distance)
+        near = self.replaced(cut)
+        if not near.kept:
             raise InputError(
                 f"--within: nothing stands within {distance:g} m of the drives"
             )
-        standing = {
-            stage: [new for one in some if (new := cut[one]) is not None]
-            for stage, some in self.standing.items()
-        }
-        return replace(self, standing=standing, kept=kept)
+        return near
 
-    def replaced(self, changed: Mapping[Imported, Imported]) -> StagedCity:
-        """Returns the city with some structures in place of others."""
-        return replace(
-            self,
-            standing={
-                stage: [changed.get(one, one) for one in some]
-                for stage, some in self.standing.items()
-            },
-            kept=[changed.get(one, one) for one in self.kept],
-        )
+    def replaced(
+        self, changed: Mapping[Imported, Imported | None]
+    ) -> StagedCity:
+        """Returns the city with others, or none, in place of structures."""
+
+        def new(some: Iterable[Imported]) -> list[Imported]:
+            others = (changed.get(one, one) for one in some)
+            return [one for one in others if one is not None]
+
+        standing = {stage: new(some) for stage, some in self.standing.items()}
+        return replace(self, standing=standing, kept=new(self.kept))
 
     def joined(self, added: Sequence[Imported]) -> StagedCity:
         """Returns the city with more structures, at all stages."""
-        return replace(
-            self,
-            standing={
-                stage: [*some, *added] for stage, some in self.standing.items()
-            },
-            kept=[*self.kept, *added],
-        )
+        standing = {
+            stage: [*some, *added] for stage, some in self.standing.items()
+        }
+        return replace(self, standing=standing, kept=[*self.kept, *added])
 
 
 def stage_city(
@@ -229,10 +193,7 @@ def stage_city(
 ) -> StagedCity:
     """Returns the structures at the wanted stages.
 
-    Args:
-        source: the name of the file in errors.
-        city: the whole city; its faults count structures of no stage.
-        options: the years, and the stage of buildings without any.
+    The faults of the city count structures of no stage. Errors name the source.
 
     Raises:
         InputError: if no structure, or too many, are at any stage.
@@ -348,32 +309,24 @@ def _has_years(one: Imported) -> bool:
     return not one.is_ground and (is_dated or is_building)
 
 
-@dataclass(frozen=True)
-class Growth:
-    """The drawn changes.
-
-    Attributes:
-        missing: buildings that the first stage lacks.
-        lower: building -> its height there as a part of the whole.
-        gone: buildings of the file that stood there and stand no more.
-    """
-
-    missing: tuple[str, ...]
-    lower: dict[str, float]
-    gone: tuple[str, ...] = ()
-
-
-def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
+def grow(
+    city: StagedCity, part: float, seed: int
+) -> tuple[StagedCity, dict[str, Any]]:
     """Returns a city with a stage before its only one.
 
     The draws depend on the names of buildings, so that the rest of a file does
-    not change them.
+    not change them. What is gone by the only stage stands at the first, and
+    what has its place today does not.
 
     Args:
-        city: a single stage; what is gone by then stands at the first, and what
-            has its place today does not.
+        city: a single stage.
         part: share of its buildings that are missing or lower at first.
         seed: the seed of the draws.
+
+    Returns:
+        The city and the changes: names of buildings that are `missing` at
+        first, the `part_of_height` of lower ones there, and, if any stood
+        there, those of the file that are `gone_since`.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]
@@ -413,11 +366,13 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
         kept=[*city.kept, *extra, *stood],
         gone=(),
     )
-    return grown, Growth(
-        tuple(sorted(missing)),
-        dict(sorted(lower.items())),
-        tuple(one.structure.name for one in stood),
-    )
+    changes: dict[str, Any] = {
+        "missing": sorted(missing),
+        "part_of_height": dict(sorted(lower.items())),
+    }
+    if stood:
+        changes["gone_since"] = [one.structure.name for one in stood]
+    return grown, changes
 
 
 def _drawn(

@@ -1,8 +1,9 @@
-"""All buildings of an imported city, dressed."""
+"""A dressed city: its buildings, its streets, and the origin of each part."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -12,22 +13,18 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.facades.assembly import Assembly, Site
-from cns_drake.city.geometry.structures import MeshShape, Model
+from cns_drake.city.generation.generate import MAX_STRUCTURES
+from cns_drake.city.geometry.structures import MeshShape, Model, Structure
 from cns_drake.city.geometry.upper_sides import (
     UpperSides,
     looks_up,
     turned_up,
 )
-from cns_drake.imports.dressing.facade_pieces import (
-    FacadePlan,
-    add_facade,
-    add_roof_pieces,
-    is_flat_roof,
-    plan_facade,
-    with_doors,
-    with_shops,
-)
+from cns_drake.imports.dressing import facade_pieces, grounds
+from cns_drake.imports.dressing.facade_pieces import FacadePlan
+from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.wall_panels import (
     Panel,
@@ -37,12 +34,14 @@ from cns_drake.imports.dressing.wall_panels import (
 )
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import (
+    ForeignCity,
     Imported,
     Street,
     random_generator,
     to_mesh,
 )
-from cns_drake.imports.ground import Ground
+from cns_drake.imports.ground import Ground, bottom_of
+from cns_drake.imports.staged_city import StagedCity
 
 # A building whose feet are farther from the ground was sunk into it [m].
 _LET_IN = 2.0
@@ -97,7 +96,7 @@ def _laid_bare(
     width, depth = np.ptp(corners[:, :2], axis=0)
     top = walls if len(walls) else one.triangles
     height = max(1.0, float(top[:, :, 2].max()) - base)
-    is_flat = bool(len(roof)) and is_flat_roof(roof)
+    is_flat = bool(len(roof)) and facade_pieces.is_flat_roof(roof)
     rng = random_generator(seed, "dressing", one.draw_name)
     area = 0.8 * float(width * depth)
     style = make_style(one.tags, one.year, area, height, is_flat, rng)
@@ -244,8 +243,8 @@ class DressedBuildings:
     """
 
     buildings: Mapping[Imported, Imported]
-    at_random: Mapping[str, int]
-    by_file: Mapping[str, int]
+    at_random: Counter[str]
+    by_file: Counter[str]
 
 
 def dress_buildings(
@@ -281,8 +280,8 @@ def dress_buildings(
         lasting = set(buildings if always is None else always)
         hiding = [b.triangles for b in buildings if b in lasting]
         views = DriveViews(drives, ground, joined(hiding))
-        paved = UpperSides(turned_up(paving))
-        walls = _plans(bare, drives, streets, ground, views, paved)
+        upper = UpperSides(turned_up(paving))
+        walls = _plans(bare, drives, streets, ground, views, upper)
     paths = MultiLineString([drive.path for drive in drives])
     at_random: Counter[str] = Counter()
     by_file: Counter[str] = Counter()
@@ -293,11 +292,7 @@ def dress_buildings(
         by_file.update(some.style.by_tag)
         structure = replace(some.one.structure, model=model)
         dressed[some.one] = replace(some.one, structure=structure)
-    return DressedBuildings(
-        dressed,
-        dict(sorted(at_random.items())),
-        dict(sorted(by_file.items())),
-    )
+    return DressedBuildings(dressed, at_random, by_file)
 
 
 def _dressed(
@@ -308,12 +303,7 @@ def _dressed(
 ) -> tuple[Model, Counter[str]]:
     """Returns the model of a building, and counts of details added at random.
 
-    Args:
-        some: the building.
-        plans: plans of its dressed walls, with their distances to the drives
-            [m].
-        paths: paths of the drives.
-        seed: seed of the random draws.
+    Plans of its dressed walls come with distances to the drives [m].
     """
     structure, style = some.one.structure, some.style
     footprint = structure.model.footprint
@@ -327,16 +317,24 @@ def _dressed(
         sign=style.sign,
         trim=style.trim,
     )
-    walls = _undressed_walls(some, [plan for plan, _ in plans])
+    planned = {
+        one.tobytes() for plan, _ in plans for one in plan.panel.triangles
+    }
+    bare = [one for one in some.walls if one.tobytes() not in planned]
+    walls = np.array(bare).reshape(-1, 3, 3)
     out.add_to("body", to_mesh(walls), to_mesh(some.rest))
     out.add_to("roof", to_mesh(some.roof))
     counts: Counter[str] = Counter()
     for plan, distance in plans:
-        rng = random_generator(seed, _wall_name(plan.panel), some.one.draw_name)
-        counts += add_facade(out, plan, distance, rng)
+        # A name that does not depend on the map's origin.
+        panel = plan.panel
+        heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
+        wall = f"wall {panel.length:.1f} {heading:.0f}"
+        rng = random_generator(seed, wall, some.one.draw_name)
+        counts += facade_pieces.add_facade(out, plan, distance, rng)
     has_own_roof = some.one.lod >= _OWN_ROOF or not len(some.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
-        add_roof_pieces(out, some.roof, style, some.is_flat)
+        facade_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
     counts["roof equipment and chimneys"] = len(out.parts)
     return out.finish(footprint), counts
 
@@ -368,7 +366,7 @@ def _plans(
     )
     heights = ground.height(before[:, :2])
     plans = [
-        plan_facade(
+        facade_pieces.plan_facade(
             panel,
             bare[panel.building].style,
             bare[panel.building].base,
@@ -392,15 +390,20 @@ def _plans(
         ]
     )
     to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
+    groups: defaultdict[int, list[int]] = defaultdict(list)
+    for k, plan in enumerate(plans):
+        groups[plan.panel.building].append(k)
     found: dict[int, list[tuple[FacadePlan, float]]] = {}
-    for number, members in _grouped(plans).items():
-        front = _front(members, plans, to_way)
+    for number, members in groups.items():
+        possible = [k for k in members if plans[k].on_street]
+        # The wall with the building's door.
+        front = min(possible, key=lambda k: (to_way[k], k), default=None)
         for k in members:
             plan = plans[k]
             if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
-                plan = with_shops(plan, paving)
+                plan = facade_pieces.with_shops(plan, paving)
             if k == front:
-                plan = with_doors(plan, paving)
+                plan = facade_pieces.with_doors(plan, paving)
             found.setdefault(number, []).append((plan, float(to_drive[k])))
     return found
 
@@ -434,32 +437,136 @@ def _seen(
     return [panels[k] for k in order], distances[order]
 
 
-def _grouped(plans: Sequence[FacadePlan]) -> dict[int, list[int]]:
-    """Returns the building's number -> numbers of its walls."""
-    groups: dict[int, list[int]] = {}
-    for k, plan in enumerate(plans):
-        groups.setdefault(plan.panel.building, []).append(k)
-    return groups
+_TERRAIN = "TINRelief"
 
 
-def _front(
-    members: Sequence[int], plans: Sequence[FacadePlan], to_way: np.ndarray
-) -> int | None:
-    """Returns the number of the wall that gets a building's door."""
-    possible = [k for k in members if plans[k].on_street]
-    return min(possible, key=lambda k: (to_way[k], k)) if possible else None
+@dataclass(frozen=True)
+class Dressing:
+    """A dressed city.
+
+    Attributes:
+        city: dressed.
+        origins: name of a structure -> `dressed` or `lot`; all others are as
+            the file has them.
+        facts: counts of parts from the file and at random, to be written.
+        bottom: the guessed ground, with its class and colour.
+    """
+
+    city: StagedCity
+    origins: Mapping[str, str]
+    facts: Mapping[str, Any]
+    bottom: Sequence[Structure]
 
 
-def _undressed_walls(some: Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
-    """Returns the walls (M, 3, 3) of a building without those planned."""
-    if not plans:
-        return some.walls
-    taken = {one.tobytes() for plan in plans for one in plan.panel.triangles}
-    kept = [one for one in some.walls if one.tobytes() not in taken]
-    return np.array(kept).reshape(-1, 3, 3)
+def _laid(
+    staged: StagedCity,
+    city: ForeignCity,
+    drives: Sequence[WaypointDrive],
+    ground: Ground,
+    is_paved: bool,
+) -> list[Imported]:
+    """Returns streets and sidewalks that the file lacks."""
+    if not drives:
+        return []
+    laid = list(grounds.missing_sidewalks(staged.kept, city.streets, drives))
+    if is_paved and city.streets:
+        laid += grounds.paved_gaps([*staged.kept, *laid], drives)
+    elif is_paved and not any(
+        one.structure.semantic_class in ("road", "sidewalk")
+        for one in staged.kept
+    ):
+        laid += grounds.guessed_streets(staged.kept, drives, ground)
+    return laid
 
 
-def _wall_name(panel: Panel) -> str:
-    """Returns a name of a wall that does not depend on the map's origin."""
-    heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
-    return f"wall {panel.length:.1f} {heading:.0f}"
+def dress_city(
+    staged: StagedCity,
+    city: ForeignCity,
+    drives: Sequence[WaypointDrive],
+    ground: Ground,
+    seed: int,
+) -> Dressing:
+    """Dresses buildings and streets.
+
+    Things that get a place are removed from the faults of the city.
+
+    Raises:
+        InputError: if there are more structures than a map may have.
+    """
+    always = set.intersection(*map(set, staged.standing.values()))
+    is_paved = grounds.is_dense(staged.kept)
+    laid = _laid(staged, city, drives, ground, is_paved)
+    paving = [
+        one.triangles
+        for one in [*staged.kept, *laid]
+        if one.is_ground or one.kind == "Sidewalk"
+    ]
+    buildings = dress_buildings(
+        staged.kept, drives, city.streets, ground, seed, always, joined(paving)
+    )
+    marks = list(grounds.lane_marks(city.streets, drives)) if drives else []
+    added = [
+        grounds.with_kerb(one) if one.kind == "Sidewalk" else one
+        for one in laid
+    ]
+    added += marks
+    bottom = bottom_of(staged.kept, ground)
+    things = dress_streets(
+        [*staged.kept, *added],
+        city.things,
+        city.streets,
+        drives,
+        ground,
+        bottom,
+        seed,
+    )
+    changed = dict(buildings.buildings)
+    at_random = buildings.at_random + Counter(one.kind for one in added)
+    # Whether the file has a ground's kind, not only its height.
+    has_kind = any(o.is_ground and o.kind != _TERRAIN for o in staged.kept)
+    if is_paved and not has_kind:
+        changed |= {
+            one: replace(one, structure=grounds.paved(one.structure))
+            for one in staged.kept
+            if one.kind == _TERRAIN
+        }
+    if drives:
+        walks = [one for one in staged.kept if one.kind == "Sidewalk"]
+        changed |= {
+            one: grounds.with_kerb(one)
+            for one in grounds.near_drives(walks, drives)
+        }
+    added += things.structures
+    for thing in city.things:
+        if thing.source in things.sources:
+            things.sources.remove(thing.source)
+            city.faults.take_back(f"{thing.element}, left out")
+    origins = {one.structure.name: "dressed" for one in changed.values()}
+    from_file = things.from_file
+    origins |= {
+        one.structure.name: "lot"
+        for one in added
+        if one.structure.name not in from_file
+    }
+    facts = {
+        "seed": seed,
+        "buildings": len(buildings.buildings),
+        "by_file": dict(sorted((buildings.by_file + things.by_file).items())),
+        "at_random": dict(sorted((at_random + things.at_random).items())),
+        "without_room": things.no_room,
+    }
+    moved = {
+        one: things.moved[one.structure.name]
+        for one in staged.kept
+        if one.structure.name in things.moved
+    }
+    dressed = staged.replaced({**changed, **moved}).joined(added)
+    if len(dressed.kept) >= MAX_STRUCTURES:
+        raise InputError(
+            f"--plain: without it the city has {len(dressed.kept)} structures,"
+            f" more than instance ids can count ({MAX_STRUCTURES}); or give"
+            " --within"
+        )
+    if is_paved:
+        bottom = list(map(grounds.paved, bottom))
+    return Dressing(dressed, origins, facts, bottom)

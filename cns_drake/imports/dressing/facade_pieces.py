@@ -132,11 +132,7 @@ class FacadePlan:
         return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without hidden openings.
-
-        Args:
-            is_hidden: (N + 1,) whether something stands at the probes.
-        """
+        """Returns the plan without openings at hidden (N + 1,) probes."""
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
             self,
@@ -150,11 +146,8 @@ def plan_facade(
 ) -> FacadePlan:
     """Returns a wall full of windows.
 
-    Args:
-        panel: the wall.
-        style: style of its building.
-        base: height of the lowest floor of the building [m].
-        ground: height of the ground before the panel [m].
+    Base and ground are the heights of the lowest floor of the building, and of
+    the ground before the panel [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
     cells = bays.stretches(panel.length, style.pitch, _MARGIN)
@@ -179,12 +172,7 @@ def plan_facade(
 
 
 def with_shops(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
-    """Returns a wall whose windows on the ground floor are shop windows.
-
-    Args:
-        plan: the wall.
-        paving: the ground before it.
-    """
+    """Returns a wall whose windows on the ground floor are shop windows."""
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)
     street, openings = set(plan.on_street), []
@@ -199,12 +187,7 @@ def with_shops(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
 
 
 def with_doors(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
-    """Returns a wall with doors in place of windows on its ground floor.
-
-    Args:
-        plan: the wall.
-        paving: the ground before it.
-    """
+    """Returns a wall with doors in place of windows on its ground floor."""
     street = plan.on_street
     if not street or any(o.kind == "shop" for o in street):
         return plan
@@ -269,11 +252,7 @@ def add_facade(
 ) -> Counter[str]:
     """Adds all parts of a wall; returns how many details of each kind.
 
-    Args:
-        out: the building.
-        plan: plan of the wall.
-        to_drive: distance from the wall to the nearest drive [m].
-        rng: random draws of the building.
+    The nearest drive is `to_drive` away [m].
     """
     counts: Counter[str] = Counter()
     panel, style = plan.panel, plan.style
@@ -402,13 +381,8 @@ def _add_wall(
 ) -> None:
     """Adds a wall with its openings.
 
-    Args:
-        out: the building.
-        panel: the wall.
-        reliefs: its reliefs, with the materials of their fronts.
-        area: the rectangle that is cut out of it for them, see `_in_outline`.
-        has_recesses: whether they are cut into the wall; if not, panes and
-            doors lie on it, which takes far fewer triangles.
+    The area, see `_in_outline`, is cut out of it. Without recesses, panes and
+    doors lie on the wall, which takes far fewer triangles.
     """
     x0, z0, x1, z1 = area
     fronts = [
@@ -540,14 +514,7 @@ def is_flat_roof(roof: np.ndarray) -> bool:
 def add_roof_pieces(
     out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
 ) -> None:
-    """Adds the equipment of a roof.
-
-    Args:
-        out: the building.
-        roof: (M, 3, 3) its upper sides [m].
-        style: style of the building.
-        is_flat: whether its roof is flat.
-    """
+    """Adds the equipment of a roof with upper sides (M, 3, 3) [m]."""
     if is_flat:
         _equip(out, roof, style)
     elif style.use in _CHIMNEYS:

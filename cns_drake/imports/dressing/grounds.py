@@ -120,10 +120,7 @@ def missing_sidewalks(
 ) -> Iterator[Imported]:
     """Yields sidewalks of streets near drives whose tags do not mention any.
 
-    Args:
-        structures: those of all stages, on level ground.
-        streets: streets of the file.
-        drives: through the city.
+    The ground must be level.
     """
     paths = MultiLineString([drive.path for drive in drives])
     near = [
@@ -158,7 +155,7 @@ def missing_sidewalks(
             *(area for area in made if area.intersects(strip)),
         ]
         covered = shapely.union_all(others, grid_size=_GRID)
-        area = areas_of(shapely.difference(strip, covered, grid_size=_GRID))
+        area = _cut(strip, covered)
         made.append(area)
         surface = [
             flat_surface(part, KERB_HEIGHT, street.name, ImportFaults())
@@ -175,9 +172,14 @@ def missing_sidewalks(
             )
 
 
-def areas_of(geometry: BaseGeometry) -> MultiPolygon:
+def _areas(geometry: BaseGeometry) -> MultiPolygon:
     """Returns the polygons of a geometry, without its lines and points."""
     return MultiPolygon(list(parts_of(geometry)))
+
+
+def _cut(area: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
+    """Returns the polygons of one area outside of another."""
+    return _areas(shapely.difference(area, other, grid_size=_GRID))
 
 
 # Half of the width of a street of unknown width, and width of its sidewalks
@@ -196,10 +198,7 @@ def guessed_streets(
 ) -> Iterator[Imported]:
     """Yields a carriageway and sidewalks on the ground below drives.
 
-    Args:
-        structures: those of all stages, without roads.
-        drives: through the city, in the middle of its streets.
-        ground: below it.
+    For a city without roads, whose drives are in the middle of its streets.
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
@@ -207,21 +206,9 @@ def guessed_streets(
         [one for one in near if one.structure.semantic_class == "building"],
         paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL),
     )
-    street = areas_of(
-        shapely.difference(
-            paths.buffer(HALF_STREET, 4),
-            walls.buffer(_FROM_WALL, 1),
-            grid_size=_GRID,
-        )
-    )
-    beside = areas_of(
-        shapely.difference(
-            paths.buffer(HALF_STREET + _SIDEWALK, 4),
-            street,
-            grid_size=_GRID,
-        )
-    )
-    beside = areas_of(shapely.difference(beside, walls, grid_size=_GRID))
+    street = _cut(paths.buffer(HALF_STREET, 4), walls.buffer(_FROM_WALL, 1))
+    beside = _cut(paths.buffer(HALF_STREET + _SIDEWALK, 4), street)
+    beside = _cut(beside, walls)
     half = _NARROWEST / 2.0
     wide = beside.buffer(-half, 2).buffer(half, 2)
     sidewalks = wide.intersection(beside)
@@ -298,12 +285,7 @@ _SQUARE = 50.0
 def paved_gaps(
     structures: Sequence[Imported], drives: Sequence[WaypointDrive]
 ) -> Iterator[Imported]:
-    """Yields sidewalks in the gaps near drives.
-
-    Args:
-        structures: those of all stages, on level ground.
-        drives: through the city.
-    """
+    """Yields sidewalks in the gaps near drives, on level ground."""
     near = near_drives(
         [one for one in structures if one.kind != "Tree"], drives
     )
@@ -339,9 +321,9 @@ def paved_gaps(
             other[other_tree.query(part, "intersects")],
             grid_size=_GRID,
         )
-        free = areas_of(shapely.difference(part, taken, grid_size=_GRID))
+        free = _cut(part, taken)
         inside = free.buffer(-_NARROWEST_GAP / 2.0, 2)
-        wide = areas_of(inside.buffer(_NARROWEST_GAP / 2.0, 2))
+        wide = _areas(inside.buffer(_NARROWEST_GAP / 2.0, 2))
         open_ = shapely.intersection(wide, free, grid_size=_GRID)
         square = (
             int(part.centroid.x // _SQUARE),
@@ -392,9 +374,7 @@ def lane_marks(
 ) -> Iterator[Imported]:
     """Yields the middle lines of the larger streets near drives.
 
-    Args:
-        streets: streets of the file, on level ground.
-        drives: through the city, at least one.
+    There is at least one drive, and the ground is level.
     """
     paths = MultiLineString([drive.path for drive in drives])
     junctions = _junctions(streets)

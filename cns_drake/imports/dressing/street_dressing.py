@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -317,23 +318,30 @@ def may_park_on(side: str, street: Street) -> bool:
     return not values & set(_NO_PARKING)
 
 
+class Row(NamedTuple):
+    """A street: its name, middle, half width, and where cars may park.
+
+    They may park on the right, and on the left.
+    """
+
+    name: str
+    line: LineString
+    half: float
+    may_park: tuple[bool, bool]
+
+
 def park_along(
-    placing: StreetRoom,
-    name: str,
-    line: LineString,
-    half: float,
-    may_park: tuple[bool, bool],
-    lines: BaseGeometry,
-    rng: np.random.Generator,
+    placing: StreetRoom, row: Row, lines: BaseGeometry, rng: np.random.Generator
 ) -> None:
     """Parks cars along the right and the left of a street."""
+    line = row.line
     others = lines.difference(line.buffer(0.5)) if not lines.is_empty else lines
-    for side, is_allowed in zip((1.0, -1.0), may_park, strict=True):
+    for side, is_allowed in zip((1.0, -1.0), row.may_park, strict=True):
         if not is_allowed:
             continue
         s = float(rng.uniform(4.0, 9.0))
         while s < line.length - 4.0:
-            xy, yaw = place_along(line, s, side, half - _FROM_KERB)
+            xy, yaw = place_along(line, s, side, row.half - _FROM_KERB)
             yaw += 0.0 if side > 0 else np.pi
             is_taken = rng.random() < _CARS
             yaw += float(rng.uniform(-0.02, 0.02))
@@ -342,7 +350,7 @@ def park_along(
                 others.is_empty or others.distance(Point(xy)) > _FROM_CROSSING
             )
             if is_taken and is_clear:
-                kind = f"car_{name}_{int(s)}_{'lr'[side > 0]}"
+                kind = f"car_{row.name}_{int(s)}_{'lr'[side > 0]}"
                 if placing.place(kind, form, xy, yaw, rng):
                     placing.found.at_random["Parked vehicles"] += 1
             s += float(rng.uniform(*_CAR_EVERY))
@@ -414,14 +422,8 @@ def dress_streets(
 ) -> StreetThings:
     """Returns the small things along the streets of a city.
 
-    Args:
-        structures: those of all stages.
-        things: things of the file.
-        streets: streets of the file.
-        drives: kept free of things; without any nothing is placed.
-        ground: below the city.
-        bottom: the structures of the guessed ground.
-        seed: seed of the random draws.
+    Those of the file come first. Drives are kept free of things; without any
+    nothing is placed.
     """
     found = StreetThings()
     if not drives:
@@ -439,32 +441,28 @@ def dress_streets(
     for one in structures:
         if one.kind == "Parking":
             fill_car_park(placing, one, seed)
-    rows = list(_rows(near, drives))
-    for name, line, half, may_park in rows:
-        if placing.is_near(np.array(line.coords), ROWS_WITHIN):
-            rng = random_generator(seed, "row", name)
-            park_along(placing, name, line, half, may_park, lines, rng)
-            _light(placing, name, line, half, rng)
+    for row in _rows(near, drives):
+        if placing.is_near(np.array(row.line.coords), ROWS_WITHIN):
+            rng = random_generator(seed, "row", row.name)
+            park_along(placing, row, lines, rng)
+            _light(placing, row, rng)
             if not things:
-                _furnish(placing, name, line, half, rng)
+                _furnish(placing, row, rng)
     return found
 
 
 def _rows(
     streets: Sequence[Street], drives: Sequence[WaypointDrive]
-) -> Iterator[tuple[str, LineString, float, tuple[bool, bool]]]:
-    """Yields name, middle, half width, and whether cars park, of streets.
-
-    Cars may park on the right, and on the left.
-    """
+) -> Iterator[Row]:
+    """Yields the streets, or else drives in the middle of streets."""
     for street in streets:
         may_park = (may_park_on("right", street), may_park_on("left", street))
         half = street.width / 2.0
-        yield street.name, LineString(street.line), half, may_park
+        yield Row(street.name, LineString(street.line), half, may_park)
     if not streets:
         for number, drive in enumerate(drives):
             line = LineString(drive.path)
-            yield f"drive_{number}", line, HALF_STREET, (True, True)
+            yield Row(f"drive_{number}", line, HALF_STREET, (True, True))
 
 
 def _off_carriageway(
@@ -518,18 +516,12 @@ def _place_thing(
         placing.found.no_room += 1
 
 
-def _light(
-    placing: StreetRoom,
-    name: str,
-    line: LineString,
-    half: float,
-    rng: np.random.Generator,
-) -> None:
+def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
     """Sets lamps along a street where the file has none."""
     s, side = float(rng.uniform(3.0, 12.0)), 1.0
-    while s < line.length:
-        for offset in (half + FROM_EDGE, half - 0.4, 2.3):
-            xy, yaw = place_along(line, s, side, offset)
+    while s < row.line.length:
+        for offset in (row.half + FROM_EDGE, row.half - 0.4, 2.3):
+            xy, yaw = place_along(row.line, s, side, offset)
             if any(
                 np.hypot(x - xy[0], y - xy[1]) < min(_LAMP_NEAR, _LAMP_EVERY)
                 for x, y in placing.lamps
@@ -537,27 +529,21 @@ def _light(
                 break
             # The lamp's arm reaches over the street.
             yaw += side * np.pi / 2.0
-            lamp = f"lamp_post_{name}_{int(s)}"
+            lamp = f"lamp_post_{row.name}_{int(s)}"
             if placing.place(lamp, "lamp_post", xy, yaw, rng):
                 placing.found.at_random["Lamp post"] += 1
                 break
         s, side = s + _LAMP_EVERY, -side
 
 
-def _furnish(
-    placing: StreetRoom,
-    name: str,
-    line: LineString,
-    half: float,
-    rng: np.random.Generator,
-) -> None:
+def _furnish(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
     """Sets small things along a street if the file has none at all."""
     s = float(rng.uniform(3.0, 12.0))
-    while s < line.length:
+    while s < row.line.length:
         side = 1.0 if rng.random() < 0.5 else -1.0
         kind = pick(_SMALL, rng)
-        xy, yaw = place_along(line, s, side, half + FROM_EDGE)
+        xy, yaw = place_along(row.line, s, side, row.half + FROM_EDGE)
         yaw += side * np.pi / 2.0
-        if placing.place(f"{kind}_{name}_{int(s)}", kind, xy, yaw, rng):
+        if placing.place(f"{kind}_{row.name}_{int(s)}", kind, xy, yaw, rng):
             placing.found.at_random[title_of(kind)] += 1
         s += float(rng.uniform(0.6, 1.4)) * _SMALL_EVERY

@@ -92,10 +92,8 @@ def building_use(
 ) -> tuple[Use, bool]:
     """Returns the use of a building, and whether it comes from its tags.
 
-    Args:
-        tags: tags of the building, or attributes.
-        area: area of its footprint, about [m^2].
-        height: height of its walls [m].
+    An untagged one has its use by the area of its footprint, about, and the
+    height of its walls [m^2, m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     if "shop" in tags:
@@ -140,14 +138,8 @@ def make_style(
 ) -> Style:
     """Draws the style of a building; its tags take precedence.
 
-    Args:
-        tags: tags of the building, or attributes; they win.
-        year: in which it was built, if known.
-        area: area of its footprint, about [m^2].
-        height: height of its walls [m].
-        is_flat: whether its roof is.
-        rng: random draws of the building; the number of draws does not depend
-            on the tags.
+    The area of its footprint, about, and the height of its walls matter [m^2,
+    m]. The number of draws does not depend on the tags.
     """
     use, is_tagged = building_use(tags, area, height)
     by_tag = {"use"} if is_tagged else set()

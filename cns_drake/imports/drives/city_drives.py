@@ -10,15 +10,9 @@ from scipy.ndimage import uniform_filter1d
 from scipy.spatial import cKDTree
 from shapely.geometry import LineString
 
+from cns_drake.imports.drives import search
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
-from cns_drake.imports.drives.search import (
-    LONGEST,
-    Obstacle,
-    WayGraph,
-    WaypointDrive,
-    evenly_spaced,
-    steerable_drive,
-)
+from cns_drake.imports.drives.search import Obstacle, WaypointDrive
 from cns_drake.imports.foreign_city import SHARPEST_TURN_DEG, Street
 from cns_drake.imports.options import DriveOn
 
@@ -122,20 +116,18 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
 def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
     """Returns a line along lanes: x, y and lateral offset (N, 3) [m].
 
-    Args:
-        lanes: each leads into the next.
-        spacing: about the distance of the points [m].
+    Each lane leads into the next; points are about a spacing apart [m].
     """
     parts = []
     for lane in lanes:
-        line = evenly_spaced(lane.line, spacing)
+        line = search.evenly_spaced(lane.line, spacing)
         parts.append(np.column_stack([line, np.full(len(line), lane.aside)]))
     rows = np.concatenate(parts)
     steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
     return rows[np.append(True, steps > 1e-6)]
 
 
-class CellGraph(WayGraph):
+class CellGraph(search.WayGraph):
     """Cells with room, each linked to the eight beside it."""
 
     def __init__(self, space: FreeSpace):
@@ -199,7 +191,7 @@ def simplified_drive(
         tolerances: greatest distances of its waypoints from these places,
             tried in turn [m].
     """
-    found: WaypointDrive | Obstacle = Obstacle(xy[len(xy) // 2])
+    found: WaypointDrive | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
         if len(xy) < 4 * straightened:
             break
@@ -208,7 +200,7 @@ def simplified_drive(
             [np.convolve(column, kernel, mode="valid") for column in xy.T]
         )
         line = LineString(smooth).simplify(tolerance)
-        found = steerable_drive(
+        found = search.steerable_drive(
             _densified(np.array(line.coords)), space.obstacle
         )
         if isinstance(found, WaypointDrive):
@@ -230,7 +222,7 @@ def _densified(corners: np.ndarray) -> np.ndarray:
     return np.concatenate(points)
 
 
-class StreetGraph(WayGraph):
+class StreetGraph(search.WayGraph):
     """Lanes of streets from junction to junction.
 
     One-way streets are driven in their direction, all others in the outermost
@@ -240,16 +232,10 @@ class StreetGraph(WayGraph):
     def __init__(
         self, streets: Sequence[Street], space: FreeSpace, drive_on: DriveOn
     ):
-        """Makes the graph.
-
-        Args:
-            streets: they meet at common nodes.
-            space: where a car has room.
-            drive_on: the side.
-        """
+        """Makes the graph of streets that meet at common nodes."""
         # A street with a wrong place on another continent would never end.
         self.lanes = [
-            one for one in make_lanes(streets) if one.length <= LONGEST
+            one for one in make_lanes(streets) if one.length <= search.LONGEST
         ]
         self._ways = np.array([lane.way for lane in self.lanes], dtype=int)
         self._space = space
@@ -277,7 +263,7 @@ class StreetGraph(WayGraph):
         reach = int(_TURN / _SPACING)
         near = np.convolve(bends, np.ones(2 * reach + 1), mode="same") > 0
         right = np.column_stack([along[:, 1], -along[:, 0]]) * self._side
-        found: WaypointDrive | Obstacle = Obstacle(middle[len(middle) // 2])
+        found: WaypointDrive | Obstacle = middle[len(middle) // 2]
         for tolerance, share in product(_TOLERANCES, _AT_TURNS):
             aside = rows[:, 2] * np.where(near, share, 1.0)
             aside = uniform_filter1d(aside, _SMOOTH_ASIDE, mode="nearest")

@@ -36,6 +36,8 @@ _SAMPLE_SPACING = 0.5
 # Room is searched within this distance of a city's middle: no drive is longer
 # [m].
 _FARTHEST = 1500.0
+# Least and greatest x and y (2,) [m].
+_Window = tuple[np.ndarray, np.ndarray]
 # Roads are used if their connected room has at least this area [m^2].
 _LEAST_ROAD = 800.0
 
@@ -91,20 +93,28 @@ class FreeSpace:
 def find_free_space(
     structures: Sequence[Imported], ground: Ground
 ) -> FreeSpace:
-    """Returns the room for a car, on roads if the file has any.
-
-    Args:
-        structures: all those of the city, at all stages.
-        ground: below them.
-    """
+    """Returns the room for a car at all stages, on roads if there are any."""
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1
-    grid = _Grid(low, high, (int(size[1]), int(size[0])))
-    roads = [o for o in structures if o.structure.semantic_class == "road"]
-    waters = [o for o in structures if o.kind.startswith("Water")]
-    on_road = grid.covered([one.triangles for one in roads])
-    in_water = grid.covered([one.triangles for one in waters])
-    blocked, walls = _blocked(structures, ground, grid)
+    window = (low, high)
+    on_road, in_water, blocked = np.zeros((3, *size[::-1]), dtype=bool)
+    for covered, some in (
+        (
+            on_road,
+            [o for o in structures if o.structure.semantic_class == "road"],
+        ),
+        (in_water, [o for o in structures if _is_water(o)]),
+    ):
+        # All at once: thousands of small groups would take far longer.
+        triangles = [one.triangles for one in some]
+        for row, column in _cells(_joined(triangles), window):
+            covered[row, column] = True
+    walls = []
+    for one in structures:
+        if not (one.is_ground or _is_water(one)):
+            cells, triangles = _blocked_by(one, ground, window)
+            blocked[cells] = True
+            walls.append(triangles)
     free = ~(blocked | (in_water & ~on_road))
     on_roads = False
     paved = binary_closing(on_road, iterations=1) & ~blocked
@@ -112,108 +122,57 @@ def find_free_space(
         free, on_roads = paved, True
     elif blocked.any():
         free &= _between(blocked)
-    least = _FROM_EDGE if on_roads else _FROM_WALL
-    outlines = walls[:, [0, 1, 2, 0], :2]
+    outlines = _joined(walls)[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
         _clearance(free),
         on_roads,
-        least,
+        _FROM_EDGE if on_roads else _FROM_WALL,
         STRtree(np.asarray(shapely.linearrings(outlines))),
     )
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """Cells of a window.
+def _is_water(one: Imported) -> bool:
+    return one.kind.startswith("Water")
 
-    Attributes:
-        low, high: (2,) corners of the window [m].
-        shape: rows and columns.
+
+def _joined(triangles: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate([np.zeros((0, 3, 3)), *triangles])
+
+
+def _cells(
+    triangles: np.ndarray, window: _Window, ground: Ground | None = None
+) -> Iterator[np.ndarray]:
+    """Yields rows and columns (2, N) that triangles (M, 3, 3) cover.
+
+    If there is a ground, only places that a car on it could hit count.
     """
-
-    low: np.ndarray
-    high: np.ndarray
-    shape: tuple[int, int]
-
-    def empty(self) -> np.ndarray:
-        return np.zeros(self.shape, dtype=bool)
-
-    def covered(self, groups: Sequence[np.ndarray]) -> np.ndarray:
-        """Returns which cells (rows, columns) are covered by triangles.
-
-        Args:
-            groups: (M, 3, 3) each [m].
-        """
-        found = self.empty()
-        # All at once: thousands of small groups would take far longer.
-        for row, column in self._batches(
-            np.concatenate([np.zeros((0, 3, 3)), *groups])
-        ):
-            found[row, column] = True
-        return found
-
-    def cells(
-        self, triangles: np.ndarray, ground: Ground | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns rows and columns that triangles (M, 3, 3) cover.
-
-        Args:
-            triangles: in the window or not [m].
-            ground: only triangles that a car on it could hit count; all if
-                None.
-        """
-        found = [np.zeros((2, 0), dtype=int), *self._batches(triangles, ground)]
-        row, column = np.concatenate(found, axis=1)
-        return row, column
-
-    def _batches(
-        self, triangles: np.ndarray, ground: Ground | None = None
-    ) -> Iterator[np.ndarray]:
-        """Yields what `cells` returns, (2, N) at a time."""
-        window = (self.low, self.high)
-        for points in surface_samples(triangles, _SAMPLE_SPACING, window):
-            if ground is not None:
-                above = points[:, 2] - ground.height(points[:, :2])
-                points = points[above < _HEADROOM]
-            cells = ((points[:, :2] - self.low) / CELL).astype(int)
-            yield cells.T[::-1]
-
-
-def _blocked(
-    structures: Sequence[Imported], ground: Ground, grid: _Grid
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the blocked cells, and the triangles (M, 3, 3) that block them.
-
-    The insides of buildings are blocked too.
-    """
-    solid = [
-        one
-        for one in structures
-        if not (one.is_ground or one.kind.startswith("Water"))
-    ]
-    blocked = grid.empty()
-    walls = [np.zeros((0, 3, 3))]
-    for one in solid:
-        cells, triangles = _blocked_by(one, ground, grid)
-        blocked[cells] = True
-        walls.append(triangles)
-    return blocked, np.concatenate(walls)
+    low, _ = window
+    for points in surface_samples(triangles, _SAMPLE_SPACING, window):
+        if ground is not None:
+            above = points[:, 2] - ground.height(points[:, :2])
+            points = points[above < _HEADROOM]
+        yield ((points[:, :2] - low) / CELL).astype(int).T[::-1]
 
 
 def _blocked_by(
-    one: Imported, ground: Ground, grid: _Grid
+    one: Imported, ground: Ground, window: _Window
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Returns the cells that a structure blocks, and with which triangles."""
+    """Returns the cells that a structure blocks, and with which triangles.
+
+    The insides of buildings are blocked too.
+    """
     corners = one.triangles.reshape(-1, 3)
     above = corners[:, 2] - ground.height(corners[:, :2])
     lowest = above.reshape(-1, 3).min(axis=1)
     highest = above.reshape(-1, 3).max(axis=1)
     is_low = (lowest < _HEADROOM) & (above.max() >= _KERB)
-    cells = grid.cells(one.triangles[is_low], ground)
-    if one.structure.semantic_class == "building" and len(cells[0]):
-        cells = _filled(*cells)
-    return cells, one.triangles[is_low & (highest > _KERB)]
+    found = [np.zeros((2, 0), dtype=int)]
+    found += _cells(one.triangles[is_low], window, ground)
+    row, column = np.concatenate(found, axis=1)
+    if one.structure.semantic_class == "building" and len(row):
+        row, column = _filled(row, column)
+    return (row, column), one.triangles[is_low & (highest > _KERB)]
 
 
 def _filled(
@@ -249,8 +208,8 @@ def _largest(cells: np.ndarray) -> int:
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 
-def _window(structures: Sequence[Imported]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the corners (2,) of the window in which room is searched [m]."""
+def _window(structures: Sequence[Imported]) -> _Window:
+    """Returns the corners of the window in which room is searched."""
     boxes = np.array(
         [
             (s.triangles.min(axis=(0, 1)), s.triangles.max(axis=(0, 1)))

@@ -31,6 +31,8 @@ _STEP = 0.25
 LONGEST = 1500.0
 SHORTEST = 80.0
 
+# The place (2,) of an obstacle: a bend too tight, or no room [m].
+Obstacle = np.ndarray
 # Takes places (N, 2) along a path [m] and returns the first (2,) where a car
 # has no room, or None.
 Room = Callable[[np.ndarray], np.ndarray | None]
@@ -75,17 +77,6 @@ class WaypointDrive:
         return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
 
 
-@dataclass(frozen=True)
-class Obstacle:
-    """The reason why there is no drive.
-
-    Attributes:
-        place: (2,) where a bend is too tight or room is missing [m].
-    """
-
-    place: np.ndarray
-
-
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointDrive | Obstacle:
@@ -102,17 +93,16 @@ def steerable_drive(
     try:
         points = make_waypoint_path(xyz, POINT_SPACING).points[:, :2]
     except InputError:
-        return Obstacle(xyz[len(xyz) // 2, :2])
+        return xyz[len(xyz) // 2, :2]
     driven, radii = driven_path(points)
     tightest = int(radii.argmin())
     if radii[tightest] < margin * TIGHTEST_RADIUS:
-        return Obstacle(driven[tightest])
+        return driven[tightest]
     missing = None if room is None else room(driven)
     if missing is not None:
-        return Obstacle(missing)
+        return missing
     drive = WaypointDrive(waypoints, points)
-    too_short = drive.length < SHORTEST
-    return Obstacle(points[len(points) // 2]) if too_short else drive
+    return drive if drive.length >= SHORTEST else points[len(points) // 2]
 
 
 def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
@@ -192,8 +182,8 @@ class WayGraph(ABC):
         """Returns a drive along a way, or the obstacle on it."""
 
     @abstractmethod
-    def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
-        """Returns the pieces of a way that an obstacle at (2,) blocks."""
+    def blocked(self, way: Sequence[int], place: Obstacle) -> np.ndarray:
+        """Returns the pieces of a way that an obstacle blocks."""
 
     def along(self, way: Sequence[int]) -> np.ndarray:
         """Returns (N,) how far the end of each piece lies on a way [m]."""
@@ -235,7 +225,7 @@ def find_drives(graph: WayGraph) -> list[WaypointDrive]:
         first = graph.drive(way)
         if isinstance(first, WaypointDrive):
             break
-        graph.close(graph.blocked(way, first.place))
+        graph.close(graph.blocked(way, first))
     else:
         return []
     for candidate in islice(_seconds(graph, way), _MOST_TRIES):
@@ -276,12 +266,8 @@ def _farthest(
 ) -> list[int]:
     """Returns the longest way from a piece that meets no place twice.
 
-    Args:
-        graph: all pieces.
-        links: between usable pieces; transposed links give the way to it,
-            in reverse order.
-        start: the piece.
-        longest: greatest length of the returned way [m].
+    It follows links between usable pieces, up to a length [m]. Transposed links
+    give the way to the piece, in reverse order.
     """
     cost, before = dijkstra(links, indices=start, return_predecessors=True)
     cost = np.where(np.isfinite(cost), cost + graph.lengths / 2.0, -1.0)
@@ -348,17 +334,10 @@ def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
 def _arm(
     graph: WayGraph, used: Sequence[int], joint: int, backwards: bool = False
 ) -> list[int]:
-    """Returns the longest way from a piece, or to it.
+    """Returns the longest way from a piece in use by drives, its joint.
 
-    Args:
-        graph: all pieces.
-        used: pieces of the drives.
-        joint: the piece among them where the way begins.
-        backwards: whether it ends there instead.
-
-    Returns:
-        The way from the joint on, backwards if it ends there; empty if it is
-        too short.
+    Backwards it ends there, and is in reverse order. It is empty if it is too
+    short.
     """
     links = graph.links(graph.beside(np.array(used), joint))
     if backwards:

@@ -153,12 +153,7 @@ class ImportedStreets:
     def __init__(
         self, bands: Sequence[LaneBand], kerbless: BaseGeometry = _NOWHERE
     ):
-        """Takes the lanes.
-
-        Args:
-            bands: the lanes.
-            kerbless: area without kerbs [m].
-        """
+        """Takes the lanes, and an area without kerbs [m]."""
         alike: dict[str, list[BaseGeometry]] = defaultdict(list)
         in_junctions: list[BaseGeometry] = []
         for band in bands:

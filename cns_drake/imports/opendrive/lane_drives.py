@@ -7,15 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.angles import wrapped
-from cns_drake.imports.drives.search import (
-    LONGEST,
-    Obstacle,
-    WayGraph,
-    WaypointDrive,
-    evenly_spaced,
-    find_drives,
-    steerable_drive,
-)
+from cns_drake.imports.drives import search
+from cns_drake.imports.drives.search import Obstacle, WaypointDrive
 from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import Walkway, resampled
@@ -42,7 +35,7 @@ _MARGIN, _MOST_HALF_WIDTH = 0.45, 1.05
 _LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
 
 
-class BandGraph(WayGraph):
+class BandGraph(search.WayGraph):
     """Lanes of sections in driving direction, each with its successors."""
 
     def __init__(self, bands: Sequence[LaneBand]):
@@ -103,13 +96,13 @@ class BandGraph(WayGraph):
 
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
         line = np.concatenate([self._lines[k] for k in way])
-        points = evenly_spaced(_forwards(line), _SPACING)[
-            : int(LONGEST / _SPACING) + 1
+        points = search.evenly_spaced(_forwards(line), _SPACING)[
+            : int(search.LONGEST / _SPACING) + 1
         ]
         limits = [limit for k in way for _, limit in self._bands[k].road.limits]
-        found: WaypointDrive | Obstacle = Obstacle(points[0, :2])
+        found: WaypointDrive | Obstacle = points[0, :2]
         for window in _SMOOTHING:
-            found = steerable_drive(_smoothed(points, window))
+            found = search.steerable_drive(_smoothed(points, window))
             if isinstance(found, WaypointDrive):
                 return replace(found, limit=min(limits, default=None))
         return found
@@ -125,10 +118,9 @@ class BandGraph(WayGraph):
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
     """Returns two drives that share a part, or one, or none.
 
-    Args:
-        bands: lanes of the whole network, on bridges too.
+    The lanes are those of the whole network, on bridges too.
     """
-    return find_drives(BandGraph(bands))
+    return search.find_drives(BandGraph(bands))
 
 
 def _is_driven(band: LaneBand) -> bool:
@@ -179,9 +171,7 @@ def _forwards(line: np.ndarray) -> np.ndarray:
 def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:
     """Returns the text of a file of lanes; None if no vehicle can drive on.
 
-    Args:
-        bands: lanes of the whole network.
-        kerb: how high sidewalks stand above the road [m].
+    A kerb is the height of sidewalks above the road [m].
     """
     graph = BandGraph(bands)
     lanes = [

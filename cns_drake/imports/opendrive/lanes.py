@@ -71,6 +71,8 @@ _CORE = 0.05
 # Places at a time.
 _BLOCK = 200_000
 _LEVEL = 1e-9
+# What a band has at each place along the road.
+_ARRAYS = ("inner", "outer", "middle", "heading", "roll", "grade", "s")
 
 
 def lane_class(kind: str) -> str | None:
@@ -81,9 +83,7 @@ def lane_class(kind: str) -> str | None:
 def is_raised(kind: str, height: float) -> bool:
     """Returns whether a lane is a kerb above the road.
 
-    Args:
-        kind: its type.
-        height: how high its inner edge stands above the road in the file [m].
+    Its inner edge stands at a height above the road in the file [m].
     """
     return kind in _RAISED or height >= _LEAST_KERB
 
@@ -132,7 +132,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     for k, section in enumerate(road.sections):
         s, inside = _stations(road, section)
         _, _, _, heading, roll = road.reference(s, inside).T
-        grade = road.elevation.slope(s, inside)
+        grade = road.elevation.at(s, inside, is_slope=True)
         offset = road.lane_offset.at(s, inside)
         middle_line = road.points(s, inside, offset)
         for side in (1, -1):
@@ -255,7 +255,8 @@ def split_levels(
         low, high = np.searchsorted(above, [band.s - _BEYOND, band.s + _BEYOND])
         is_bridge = high > low
         for run, carried in _runs(is_bridge):
-            (bridges if carried else ground).append(_cut(band, run))
+            parts = {name: getattr(band, name)[run] for name in _ARRAYS}
+            (bridges if carried else ground).append(replace(band, **parts))
     return ground, bridges
 
 
@@ -293,11 +294,6 @@ def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
         last = min(b + 1, len(is_bridge))
         if last - a > 1:
             yield slice(int(a), int(last)), bool(is_bridge[a])
-
-
-def _cut(band: LaneBand, run: slice) -> LaneBand:
-    names = ("inner", "outer", "middle", "heading", "roll", "grade", "s")
-    return replace(band, **{name: getattr(band, name)[run] for name in names})
 
 
 class RoadHeights:

@@ -218,15 +218,14 @@ def _painted(
             for a, b in _stretches(line, mark.start, last):
                 quads = _stripe(border, s, left, aside, (a, b), line.width)
                 if len(quads):
-                    yield mark.colour_of(_COLOURS), quads
+                    known = mark.colour in _COLOURS
+                    yield mark.colour if known else "standard", quads
 
 
 def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
     """Returns the lines of a mark, as the file has them or usual ones.
 
-    Args:
-        mark: as the file has it.
-        side: positive if outwards is to the left.
+    The side is positive if outwards is to the left.
     """
     styles = [word for word in mark.kind.split() if word in _STYLES]
     if mark.lines and (styles or mark.kind == "custom"):

@@ -3,10 +3,10 @@
 The course is made of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE 1.7,
 chapter 8, https://www.asam.net/standards/detail/opendrive"""
 
-from collections.abc import Container, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 import math
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,17 +20,9 @@ _PANELS = 64
 _NEWTON_STEPS = 8
 
 
-class Shape(Protocol):
-    """A curve in the frame of its first point."""
-
-    def evaluate(self, ds: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) u, v [m] and heading [rad] at distances (N,) [m]."""
-        ...
-
-    @property
-    def sharpest(self) -> float:
-        """The greatest curvature, about [1/m]."""
-        ...
+# A curve has `evaluate`, which returns (N, 3) u, v [m] and heading [rad] in the
+# frame of its first point at distances (N,) [m], and `sharpest`, its greatest
+# curvature, about [1/m].
 
 
 @dataclass(frozen=True)
@@ -95,11 +87,7 @@ class Spiral:
 
 
 class Cubic:
-    """A curve of two cubic polynomials of a parameter p.
-
-    Attributes:
-        sharpest: see `Shape`.
-    """
+    """A curve of two cubic polynomials of a parameter p."""
 
     def __init__(
         self,
@@ -166,6 +154,9 @@ class Cubic:
         return begin + size
 
 
+Shape = Arc | Spiral | Cubic
+
+
 @dataclass(frozen=True)
 class Piece:
     """One element of a plan view.
@@ -214,19 +205,28 @@ class Cubics:
         """Where the pieces begin [m]."""
         return self._table[:, 0]
 
-    def at(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
-        """Returns the values (N,) at distances (N,).
+    def at(
+        self, s: np.ndarray, inside: np.ndarray, is_slope: bool = False
+    ) -> np.ndarray:
+        """Returns the values (N,) at distances (N,), or the slopes there.
 
         Args:
             s: where [m].
             inside: places that select the piece, which differ on both sides of
                 a joint [m].
+            is_slope: whether to return the first derivatives.
         """
-        return self._evaluate(s, inside, (1.0, 1.0, 1.0, 1.0), 0)
-
-    def slope(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
-        """Returns the derivatives (N,); see `at`."""
-        return self._evaluate(s, inside, (0.0, 1.0, 2.0, 3.0), 1)
+        if not self:
+            return np.zeros(len(s))
+        index = np.searchsorted(self.starts, inside, side="right") - 1
+        rows = self._table[np.maximum(index, 0)]
+        ds = s - rows[:, 0]
+        value = np.zeros(len(s))
+        for power in range(is_slope, 4):
+            factor = power if is_slope else 1
+            value += factor * rows[:, 1 + power] * ds ** (power - is_slope)
+        # Before the first piece there is no value.
+        return np.where(index < 0, 0.0, value)
 
     def bend(self, start: float, end: float) -> float:
         """Returns the greatest second derivative on a stretch of one piece."""
@@ -238,25 +238,6 @@ class Cubics:
         return float(
             max(abs(2.0 * c + 6.0 * d * (s - begin)) for s in (start, end))
         )
-
-    def _evaluate(
-        self,
-        s: np.ndarray,
-        inside: np.ndarray,
-        factors: Sequence[float],
-        less: int,
-    ) -> np.ndarray:
-        if not self:
-            return np.zeros(len(s))
-        index = np.searchsorted(self.starts, inside, side="right") - 1
-        rows = self._table[np.maximum(index, 0)]
-        ds = s - rows[:, 0]
-        value = np.zeros(len(s))
-        for power in range(less, 4):
-            term = factors[power] * rows[:, 1 + power]
-            value += term * ds ** (power - less)
-        # Before the first piece there is no value.
-        return np.where(index < 0, 0.0, value)
 
 
 @dataclass(frozen=True)
@@ -296,10 +277,6 @@ class RoadMark:
     width: float
     lines: tuple[MarkLine, ...] = ()
 
-    def colour_of(self, known: Container[str]) -> str:
-        """Returns its colour, or the standard one if it is not known."""
-        return self.colour if self.colour in known else "standard"
-
 
 @dataclass(frozen=True)
 class Lane:
@@ -338,8 +315,7 @@ class LaneSection:
     middle_marks: tuple[RoadMark, ...] = ()
 
 
-@dataclass(frozen=True)
-class Thing:
+class Thing(NamedTuple):
     """A signal, or an object beside the road.
 
     Attributes:
@@ -399,7 +375,7 @@ class ImportedRoad:
     sections: tuple[LaneSection, ...]
     keeps_left: bool = False
     limits: tuple[tuple[float, float], ...] = ()
-    things: tuple[Thing, ...] = field(default=())
+    things: tuple[Thing, ...] = ()
     spans: tuple[str, ...] = ()
 
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:

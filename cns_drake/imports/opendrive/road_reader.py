@@ -14,20 +14,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
-from cns_drake.imports.opendrive.road_model import (
-    Arc,
-    Cubic,
-    Cubics,
-    ImportedRoad,
-    Lane,
-    LaneSection,
-    MarkLine,
-    Piece,
-    RoadMap,
-    RoadMark,
-    Shape,
-    Spiral,
-)
+from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.things import read_things
 from cns_drake.imports.options import ImportFaults
 
@@ -57,14 +44,11 @@ _LONGEST_NAME = 60
 
 def read_marks(
     lane: Element, start: float, road: str, faults: ImportFaults
-) -> list[RoadMark]:
+) -> list[road_model.RoadMark]:
     """Returns the marks of a lane, in their order along the road.
 
-    Args:
-        lane: the element.
-        start: where its section begins along the road [m].
-        road: name of the road.
-        faults: counts marks whose lines are not usable.
+    Its section begins at a start [m]. Marks whose lines are not usable are
+    counted.
 
     Raises:
         ValueError: naming line and fault, if a text is not a number.
@@ -75,61 +59,46 @@ def read_marks(
         width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
         if one.value("weight", "standard") == "bold" and not stated:
             width *= 2.0
-        lines: tuple[MarkLine, ...] = ()
-        try:
-            lines = tuple(_mark_lines(one, width))
-        except _NoPatternError:
+        lines = _mark_lines(one, width)
+        if lines is None:
             faults.add("road mark with impossible dashes, made usual", road)
         marks.append(
-            RoadMark(
+            road_model.RoadMark(
                 start + one.number("sOffset", 0.0),
                 one.value("type", "none"),
                 one.value("color", "standard"),
                 width,
-                lines,
+                tuple(lines or ()),
             )
         )
     return sorted(marks, key=lambda mark: mark.start)
 
 
-class _NoPatternError(Exception):
-    """The dashes of a line cannot be painted."""
+def _mark_lines(
+    mark: Element, usual: float
+) -> list[road_model.MarkLine] | None:
+    """Returns the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
 
-
-def _mark_lines(mark: Element, usual: float) -> Iterator[MarkLine]:
-    """Yields the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
-
-    Args:
-        mark: the element.
-        usual: width of a line that has no plausible one [m].
-
-    Raises:
-        _NoPatternError: if a line has lengths that cannot be.
+    A line without a plausible width has the usual one [m]. There are none if
+    one has lengths that cannot be.
     """
+    found = []
     for one in mark.all("type", "line"):
         dash, gap = one.number("length", 0.0), one.number("space", 0.0)
         # Programs write both as 0 for a line without gaps.
         if min(dash, gap) < 0.0 or (gap > 0.0 and dash == 0.0):
-            raise _NoPatternError
+            return None
         if gap > 0.0 and dash + gap < _CLOSEST_DASHES:
-            raise _NoPatternError
+            return None
         stated = one.number("width", 0.0)
-        yield MarkLine(
-            aside=one.number("tOffset", 0.0),
-            start=one.number("sOffset", 0.0),
-            dash=dash,
-            gap=gap,
-            width=stated if 0.0 < stated <= _WIDEST_MARK else usual,
-        )
+        aside, start = one.number("tOffset", 0.0), one.number("sOffset", 0.0)
+        width = stated if 0.0 < stated <= _WIDEST_MARK else usual
+        found.append(road_model.MarkLine(aside, start, dash, gap, width))
+    return found
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts the links of a file to things that are not in it.
-
-    Args:
-        top: the outermost element.
-        faults: the counts.
-    """
+    """Counts the links of a file to things that are not in it."""
     roads = {one.attrib.get("id", ""): one for one in top.all("road")}
     junctions = {one.attrib.get("id", "") for one in top.all("junction")}
     for name, road in roads.items():
@@ -169,41 +138,38 @@ def _dangling_lanes(
     road: Element, roads: Mapping[str, Element]
 ) -> Iterator[Element]:
     """Yields the links of a road's lanes to lanes that are not there."""
-    sections = _linked_sections(road)
-    for k, section in enumerate(sections):
+
+    def sections(one: Element) -> list[Element]:
+        found = list(one.all("lanes", "laneSection"))
+        return sorted(found, key=lambda section: section.number("s", 0.0))
+
+    def lanes(section: Element) -> Iterator[Element]:
+        for side in ("left", "center", "right"):
+            yield from section.all(side, "lane")
+
+    own = sections(road)
+    for k, section in enumerate(own):
         for end, at in zip(_ENDS, (k - 1, k + 1), strict=True):
-            if 0 <= at < len(sections):
-                beside = [sections[at]]
+            if 0 <= at < len(own):
+                beside = [own[at]]
             else:
                 kind, linked = _linked(road, end)
                 if kind != "road" or linked is None or linked not in roads:
                     continue
                 # The link names the end of the other road, which some files
                 # omit.
-                others = _linked_sections(roads[linked])
+                others = sections(roads[linked])
                 beside = others[:1] + others[-1:]
             there = {
-                lane.attrib.get("id")
-                for other in beside
-                for lane in _linked_lanes(other)
+                lane.attrib.get("id") for one in beside for lane in lanes(one)
             }
-            for lane in _linked_lanes(section):
+            for lane in lanes(section):
                 for link in lane.all("link", end):
                     if link.attrib.get("id") not in there:
                         yield link
 
 
-def _linked_sections(road: Element) -> list[Element]:
-    found = list(road.all("lanes", "laneSection"))
-    return sorted(found, key=lambda one: one.number("s", 0.0))
-
-
-def _linked_lanes(section: Element) -> Iterator[Element]:
-    for side in ("left", "center", "right"):
-        yield from section.all(side, "lane")
-
-
-def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
+def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     """Reads all roads of a file.
 
     Raises:
@@ -211,7 +177,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
             read or describes an impossible road.
     """
     top = read_elements(path, "OpenDRIVE")
-    roads: list[ImportedRoad] = []
+    roads: list[road_model.ImportedRoad] = []
     names: set[str] = set()
     together = 0.0
     for kind in ("road", "junction"):
@@ -249,7 +215,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
     if np.abs(ends).max() > _FAR:
         origin = np.round((low + high) / 2.0)
     reference = top.first("header", "geoReference")
-    return RoadMap(
+    return road_model.RoadMap(
         tuple(_moved(road, origin) for road in roads),
         " ".join((reference.text or "").split())
         if reference is not None
@@ -290,7 +256,9 @@ def _stem(own: str) -> str:
     return re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
 
 
-def _moved(road: ImportedRoad, origin: np.ndarray) -> ImportedRoad:
+def _moved(
+    road: road_model.ImportedRoad, origin: np.ndarray
+) -> road_model.ImportedRoad:
     pieces = tuple(
         replace(piece, x=piece.x - origin[0], y=piece.y - origin[1])
         for piece in road.pieces
@@ -300,7 +268,7 @@ def _moved(road: ImportedRoad, origin: np.ndarray) -> ImportedRoad:
 
 def _road(
     element: Element, name: str, faults: ImportFaults
-) -> ImportedRoad | None:
+) -> road_model.ImportedRoad | None:
     pieces = _pieces(element.all("planView", "geometry"), name, faults)
     if not pieces:
         faults.add("road without a course, left out", name)
@@ -323,9 +291,9 @@ def _road(
     along = np.linspace(0.0, length, math.ceil(length) + 1)
     if banking and np.abs(banking.at(along, along)).max() > _MOST_BANKED:
         faults.add("superelevation beyond 50 deg, taken as level", name)
-        banking = Cubics()
+        banking = road_model.Cubics()
     offsets = element.all("lanes", "laneOffset")
-    return ImportedRoad(
+    return road_model.ImportedRoad(
         name=name,
         junction=None if junction == "-1" else junction,
         length=length,
@@ -347,8 +315,8 @@ def _road(
 
 def _pieces(
     elements: Iterable[Element], name: str, faults: ImportFaults
-) -> list[Piece]:
-    found: list[Piece] = []
+) -> list[road_model.Piece]:
+    found: list[road_model.Piece] = []
     for one in elements:
         length = one.number("length")
         if length < 0.0:
@@ -369,37 +337,39 @@ def _pieces(
             prefix = "" if text.startswith("line") else at
             raise ValueError(prefix + text) from error
         s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
-        found.append(Piece(s, x, y, heading, length, shape))
+        found.append(road_model.Piece(s, x, y, heading, length, shape))
     found.sort(key=lambda piece: piece.s)
     return found
 
 
-def _shape(geometry: Element, length: float) -> Shape:
+def _shape(geometry: Element, length: float) -> road_model.Shape:
     """Returns the curve of a geometry.
 
     Raises:
         ValueError: if it has no curve, or one that is too sharp.
     """
-    shape: Shape | None = None
+    shape: road_model.Shape | None = None
     for one in geometry.all("*"):
         if one.tag == "line":
-            shape = Arc(0.0)
+            shape = road_model.Arc(0.0)
         elif one.tag == "arc":
-            shape = Arc(one.number("curvature"))
+            shape = road_model.Arc(one.number("curvature"))
         elif one.tag == "spiral":
             ends = one.number("curvStart"), one.number("curvEnd")
             if max(map(abs, ends)) > _SHARPEST:
                 raise ValueError(f"a spiral of curvature {max(ends):g} 1/m")
-            shape = Spiral(*ends, length)
+            shape = road_model.Spiral(*ends, length)
         elif one.tag == "poly3":
             v = [one.number(k) for k in "abcd"]
             # Where the curve has the file's length, u is not beyond it.
-            shape = Cubic((0, 1, 0, 0), v, length, length, stretched=False)
+            shape = road_model.Cubic(
+                (0, 1, 0, 0), v, length, length, stretched=False
+            )
         elif one.tag == "paramPoly3":
             u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
             by_arc = one.value("pRange", "normalized") == "arcLength"
             last = length if by_arc else 1.0
-            shape = Cubic(u, v, last, length, by_parameter=by_arc)
+            shape = road_model.Cubic(u, v, last, length, by_parameter=by_arc)
     if shape is None:
         raise ValueError("neither a line nor a known curve")
     if shape.sharpest > _SHARPEST:
@@ -409,8 +379,8 @@ def _shape(geometry: Element, length: float) -> Shape:
 
 def _cubics(
     elements: Iterable[Element], start: str, offset: float = 0.0
-) -> Cubics:
-    return Cubics(
+) -> road_model.Cubics:
+    return road_model.Cubics(
         [
             (
                 one.number(start, 0.0) + offset,
@@ -423,7 +393,7 @@ def _cubics(
 
 def _sections(
     road: Element, length: float, name: str, faults: ImportFaults
-) -> list[LaneSection]:
+) -> list[road_model.LaneSection]:
     elements = list(road.all("lanes", "laneSection"))
     elements.sort(key=lambda one: one.number("s"))
     starts = [one.number("s") for one in elements]
@@ -433,7 +403,7 @@ def _sections(
         start, end = max(start, 0.0), min(end, length)
         if end - start < _SHORTEST:
             continue
-        lanes: dict[int, Lane] = {}
+        lanes: dict[int, road_model.Lane] = {}
         for side in ("left", "right"):
             for element in one.all(side, "lane"):
                 lane = _lane(element, start, name, faults)
@@ -450,20 +420,20 @@ def _sections(
             for element in one.all("center", "lane")
             for mark in read_marks(element, start, name, faults)
         ]
-        found.append(LaneSection(start, end, lanes, tuple(middle)))
+        found.append(road_model.LaneSection(start, end, lanes, tuple(middle)))
     return found
 
 
 def _lane(
     element: Element, start: float, name: str, faults: ImportFaults
-) -> Lane:
+) -> road_model.Lane:
     number = element.number("id")
     if number != int(number):
         raise ValueError(
             f"line {element.line}: lane: id: {number} is not a valid id"
         )
     heights = element.first("height")
-    lane = Lane(
+    lane = road_model.Lane(
         number=int(number),
         kind=element.value("type", "none"),
         width=_cubics(element.all("width"), "sOffset", start),

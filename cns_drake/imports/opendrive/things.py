@@ -146,24 +146,17 @@ def _repeated(
             last = repeat.number(f"{name}End", first)
             return first + part * (last - first)
 
-        own = thing.size[0]
+        own, width, height = thing.size
         if distance <= 0.0 and length > 0.0:
             own = length / count
-        size = (
-            own,
-            value("width", thing.size[1]),
-            value("height", thing.size[2]),
-        )
-        yield Thing(
+        size = (own, value("width", width), value("height", height))
+        yield thing._replace(
             name=f"{thing.name}_{number}_{k}",
-            is_signal=False,
-            kind=thing.kind,
             s=start + at,
             t=value("t", thing.t),
             z=value("zOffset", thing.z),
-            heading=thing.heading,
             size=size,
-            outline=thing.outline,
+            road_outline=None,
         )
 
 
@@ -172,10 +165,7 @@ def thing_structures(
 ) -> Iterator[Structure]:
     """Yields structures of the signals and objects beside a road.
 
-    Args:
-        road: the road.
-        lanes: the area of all lanes, where no sign stands [m].
-        faults: counts things left out.
+    No sign stands in the area of all lanes. Things left out are counted.
     """
     for thing in road.things:
         if not 0.0 <= thing.s <= road.length + 1.0:
@@ -186,8 +176,7 @@ def thing_structures(
         name = thing.name
         x, y, z, heading = _place(road, thing)
         if thing.is_signal:
-            key = _signal_object(thing)
-            builder = OBJECTS[key]
+            builder = OBJECTS[_signal_object(thing)]
             facing = heading + thing.heading
             facing += 0.0 if thing.faces_back else _HALF_TURN
             if thing.is_dynamic:
@@ -203,10 +192,9 @@ def thing_structures(
             )
             if one.footprint_W.intersects(lanes):
                 faults.add("signal over a lane, left out", name)
-                continue
-            yield one
-            continue
-        if thing.kind.startswith(_FLAT):
+            else:
+                yield one
+        elif thing.kind.startswith(_FLAT):
             faults.add("object that is painted on the road, left out", name)
         elif thing.kind.startswith("tree"):
             model = tree(
@@ -251,24 +239,23 @@ def _solid(
 ) -> Structure | None:
     """Returns an object raised from its outline; None without an outline."""
     x, y, z, heading = place
-    high = thing.size[2]
+    length, width, high = thing.size
     if thing.road_outline is not None:
         s, t, heights = thing.road_outline.T
         s = np.clip(s, 0.0, road.length)
         inside = np.clip(s, 1e-6, road.length - 1e-6)
         polygon = Polygon(road.points(s, inside, t)[:, :2])
         high = float(heights.max()) or high
+    elif thing.outline is None and length == width == 0.0:
+        faults.add("object without a size, left out", name)
+        return None
     else:
-        length, width = thing.size[0], thing.size[1]
         if thing.outline is not None:
             footprint = Polygon(thing.outline[:, :2])
             high = float(thing.outline[:, 2].max()) or high
         else:
             half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
-            footprint = box(-half[0], -half[1], half[0], half[1])
-            if length == width == 0.0:
-                faults.add("object without a size, left out", name)
-                return None
+            footprint = box(-half[0], -half[1], *half)
         polygon = placed(footprint, (x, y), heading + thing.heading)
     if high < _LEAST_HEIGHT:
         faults.add("object without a height, left out", name)

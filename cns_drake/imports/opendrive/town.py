@@ -20,21 +20,11 @@ from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plan.stages import Stages
+from cns_drake.imports import map_files
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.map_files import (
-    draw_overview,
-    stage_size,
-    triangles_in,
-    write_drives,
-    write_facts,
-)
-from cns_drake.imports.opendrive.imported_streets import (
-    ImportedStreets,
-    bridge_decks,
-    bridge_ends,
-    lane_polygon,
-)
+from cns_drake.imports.opendrive import imported_streets
+from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lane_drives import (
     find_lane_drives,
     lanes_for_traffic,
@@ -111,11 +101,7 @@ def build_town(
 ) -> Town:
     """Reads a road network and builds a town along it.
 
-    Args:
-        source: OpenDRIVE.
-        seed: the seed of the generator's draws.
-        progress: takes one line at a time.
-        dressed: whether the file's road marks are painted.
+    The road marks of the file are painted in a dressed town only.
 
     Raises:
         InputError: if the file cannot be used.
@@ -143,7 +129,7 @@ def _build(
     except ValueError as error:
         raise InputError(f"{source}: {error}") from error
     ground, raised = split_levels(bands)
-    ends = bridge_ends(raised)
+    ends = imported_streets.bridge_ends(raised)
     streets = ImportedStreets(ground, ends)
     if streets.carriageway().is_empty:
         raise InputError(f"{source}: no lane in it has an area")
@@ -162,7 +148,7 @@ def _build(
         for road in roads.roads
         for one in thing_structures(road, lanes, faults)
     ]
-    decks = list(bridge_decks(raised))
+    decks = list(imported_streets.bridge_decks(raised))
     kerb = _kerb(ground)
     surface = RoadHeights(ground)
     marks: list[Structure] = []
@@ -185,7 +171,7 @@ def _build(
             margins=streets.margins,
             reserved=shapely.union_all(
                 [
-                    *(lane_polygon(band) for band in raised),
+                    *(imported_streets.lane_polygon(band) for band in raised),
                     *(one.footprint_W for one in things),
                 ]
             ),
@@ -228,10 +214,7 @@ def _count_spans(
 ) -> None:
     """Counts the bridges and tunnels of a file that are not built.
 
-    Args:
-        roads: the file's roads.
-        raised: names of the roads that pass over others on decks.
-        faults: takes the counts.
+    Raised roads pass over others on decks.
     """
     for road in roads.roads:
         for span in road.spans:
@@ -311,13 +294,7 @@ def write_town(
     town: Town,
     progress: Callable[[str], None],
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
-    """Writes all files of a town.
-
-    Args:
-        draft: the map's folder, with the map's name; it exists.
-        source: the file of the roads.
-        town: to write.
-        progress: takes one line at a time.
+    """Writes all files of a town to its folder, which has the map's name.
 
     Returns:
         What was imported; stage -> its numbers of structures and triangles.
@@ -340,7 +317,7 @@ def write_town(
         (draft / name).write_text(text, "utf-8")
     if town.lanes is not None:
         (draft / LANES_NAME).write_text(town.lanes, "utf-8")
-    write_facts(
+    map_files.write_facts(
         draft,
         source,
         {
@@ -353,7 +330,7 @@ def write_town(
         "# Where the roads of this map come from; all else is drawn at random."
         "\n# A place of the map plus the origin is one of the source [m].\n",
     )
-    write_drives(
+    map_files.write_drives(
         draft,
         {
             stage: "" if stage == list(stages)[-1] else ", not all of it built"
@@ -365,19 +342,19 @@ def write_town(
             for drive in town.drives
         ],
     )
-    draw_overview(
+    map_files.draw_overview(
         draft / "from_above.png",
         list(_seen_from_above(town.city.structures)),
         None,
         town.drives,
     )
     triangles = {
-        name: triangles_in(text)
+        name: map_files.triangles_in(text)
         for name, text in files.items()
         if name.endswith(".obj")
     }
     sizes = {
-        stage: stage_size(files[stage_name(stage)], triangles)
+        stage: map_files.stage_size(files[stage_name(stage)], triangles)
         for stage in stages
     }
     report = ImportReport(

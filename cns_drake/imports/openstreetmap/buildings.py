@@ -58,10 +58,8 @@ def standing_buildings(
 ) -> Iterator[OsmArea]:
     """Yields present and former buildings and parts above the ground.
 
-    Args:
-        areas: that are meant to be buildings.
-        faults: counts those that are left out.
-        with_gone: whether to include demolished buildings without a date.
+    Demolished ones without a date are among them on demand only. Others are
+    counted as faults.
     """
     for one in areas:
         absent = why_absent(one.tags)
@@ -83,12 +81,7 @@ def make_buildings(
 ) -> Iterator[Imported]:
     """Yields buildings; parts replace the area that they cover.
 
-    Args:
-        areas: buildings and their parts.
-        local: the map's coordinates.
-        year_attribute: see `construction_year`.
-        faults: counts what is not made as the file has it.
-        once: whether buildings that lie in each other are joined.
+    With `once`, buildings that lie in each other are joined.
     """
     outlines: list[_Block] = []
     parts: list[_Block] = []

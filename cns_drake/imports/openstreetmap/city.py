@@ -14,39 +14,19 @@ from shapely.geometry import LineString, Point
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
-from cns_drake.imports.faces import extruded, parts_of, sound_parts
+from cns_drake.imports.faces import extruded
 from cns_drake.imports.foreign_city import (
     ForeignCity,
     Imported,
     Thing,
-    make_imported,
 )
+from cns_drake.imports.openstreetmap import reading, streets
 from cns_drake.imports.openstreetmap.buildings import (
     TWICE,
     make_buildings,
     standing_buildings,
 )
-from cns_drake.imports.openstreetmap.grounds import coasts_of, ground_areas, sea
-from cns_drake.imports.openstreetmap.reading import (
-    Local,
-    OsmArea,
-    OsmFeatures,
-    OsmWay,
-    Tags,
-    has_tag,
-    is_building,
-    read_openstreetmap,
-    was_building,
-)
-from cns_drake.imports.openstreetmap.streets import (
-    Bridges,
-    bridges_of,
-    crossing_stripes,
-    drivable_streets,
-    parapets,
-    street_places,
-    street_surfaces,
-)
+from cns_drake.imports.openstreetmap.reading import has_tag
 from cns_drake.imports.openstreetmap.tags import TABLES, length, tag_value
 from cns_drake.imports.options import ImportFaults
 
@@ -61,7 +41,7 @@ _SEA = 60.0
 _LARGEST = 20_000.0  # [m]
 
 
-def object_of(tags: Tags) -> str | None:
+def object_of(tags: reading.Tags) -> str | None:
     """Returns the object of a node; None without one."""
     found = [
         name
@@ -86,19 +66,12 @@ def object_of(tags: Tags) -> str | None:
 
 
 def make_things(
-    nodes: Iterable[tuple[str, Tags, tuple[float, float]]],
-    ways: Iterable[OsmWay],
+    nodes: Iterable[tuple[str, reading.Tags, tuple[float, float]]],
+    ways: Iterable[reading.OsmWay],
     kinds: Mapping[str, str],
-    local: Local,
+    local: reading.Local,
 ) -> Iterator[Thing]:
-    """Yields things at their nodes, and the trees of rows.
-
-    Args:
-        nodes: id, tags and place of each [deg].
-        ways: the file's ways.
-        kinds: id -> kind of a thing.
-        local: brings places to metres.
-    """
+    """Yields things at their nodes, and the trees of rows."""
     for name, tags, place in nodes:
         kind = object_of(tags)
         if kind is not None:
@@ -119,7 +92,7 @@ def make_things(
                 yield Thing(name, kinds[name], kind, (x, y), None)
 
 
-def _direction(tags: Tags) -> float | None:
+def _direction(tags: reading.Tags) -> float | None:
     """Returns the heading of a thing, if its tags have one [rad]."""
     text = tags.get("direction", "")
     if not re.fullmatch(r"\d{1,3}(\.\d+)?", text):
@@ -132,23 +105,21 @@ def import_openstreetmap(
 ) -> ForeignCity:
     """Reads a file; its origin is the middle of its buildings.
 
-    Args:
-        path: the file.
-        year_attribute: see `construction_year`.
-        dressed: whether the sea, and grounds by what they are made of, are
-            made, bridges have parapets or are left out, and demolished
-            buildings without a date are made.
+    Only for a dressed city, the sea, and grounds by what they are made of, are
+    made, bridges have parapets or are left out, and demolished buildings
+    without a date are made.
 
     Raises:
         InputError: if it cannot be read, has no building, or is larger than
             20 km.
     """
-    features = read_openstreetmap(path)
+    features = reading.read_openstreetmap(path)
     faults = features.faults
     buildings = [
         one
         for one in features.areas
-        if is_building(one.tags) or (dressed and was_building(one.tags))
+        if reading.is_building(one.tags)
+        or (dressed and reading.was_building(one.tags))
     ]
     buildings = list(standing_buildings(buildings, faults, dressed))
     if dressed:
@@ -157,23 +128,29 @@ def import_openstreetmap(
         raise InputError(f"{path}: {_no_buildings(faults)}")
     low, high = _bounds(buildings)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
-    local = Local(longitude, latitude)
+    local = reading.Local(longitude, latitude)
     size = local.metres(high - low)
     if size.max() > _LARGEST:
         raise InputError(
             f"{path}: {size.max() / 1000:.0f} km across; cut out a piece of at"
             f" most {_LARGEST / 1000:.0f} km"
         )
-    bridges = bridges_of(features.ways, local) if dressed else Bridges()
-    coasts = coasts_of(features.ways) if dressed else []
+    bridges = (
+        streets.bridges_of(features.ways, local)
+        if dressed
+        else streets.Bridges()
+    )
+    coasts = streets.coasts_of(features.ways) if dressed else []
     limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
     found = [
         *make_buildings(buildings, local, year_attribute, faults, once=dressed),
-        *street_surfaces(features.ways, local, faults, bridges),
-        *crossing_stripes(features.crossings, features.ways, local, faults),
-        *ground_areas(features.areas, local, faults, dressed),
-        *sea(coasts, local, limits, faults),
-        *parapets(features.ways, bridges, local),
+        *streets.street_surfaces(features.ways, local, faults, bridges),
+        *streets.crossing_stripes(
+            features.crossings, features.ways, local, faults
+        ),
+        *streets.ground_areas(features.areas, local, faults, dressed),
+        *streets.sea(coasts, local, limits, faults),
+        *streets.parapets(features.ways, bridges, local),
         *_barriers(features.ways, local, faults),
         *_trees(features.trees, local, faults),
     ]
@@ -184,8 +161,8 @@ def import_openstreetmap(
         (latitude, longitude),
         "WGS 84",
         faults,
-        drivable_streets(features.ways, local, bridges),
-        street_places(features, local),
+        streets.drivable_streets(features.ways, local, bridges),
+        streets.street_places(features, local),
         any(
             tags.get("driving_side") == "left"
             for _, tags, _, _ in features.ways
@@ -197,8 +174,8 @@ def import_openstreetmap(
 
 
 def _without_outers(
-    buildings: Iterable[OsmArea], features: OsmFeatures
-) -> Iterator[OsmArea]:
+    buildings: Iterable[reading.OsmArea], features: reading.OsmFeatures
+) -> Iterator[reading.OsmArea]:
     """Yields buildings without the outlines of multipolygons.
 
     A way that is tagged like the multipolygon whose outline it is would fill
@@ -226,7 +203,9 @@ def _no_buildings(faults: ImportFaults) -> str:
     return f"the file has no usable building; {'; '.join(unfit)}"
 
 
-def _bounds(buildings: Iterable[OsmArea]) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(
+    buildings: Iterable[reading.OsmArea],
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and the greatest longitude and latitude (2,) [deg].
 
     Across the 180th meridian longitudes go on beyond 180.
@@ -240,23 +219,22 @@ def _bounds(buildings: Iterable[OsmArea]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _count_unused(
-    features: OsmFeatures, found: Iterable[Imported], also: AbstractSet[str]
+    features: reading.OsmFeatures,
+    found: Iterable[Imported],
+    also: AbstractSet[str],
 ) -> None:
     """Counts things in the file without a place in the city, by kind.
 
-    Buildings that are left out are counted elsewhere.
-
-    Args:
-        features: all of the file.
-        found: the city.
-        also: ids of other things with a place, or counted elsewhere.
+    Buildings that are left out, and the ids in `also`, are counted elsewhere.
     """
     used = {
         name
         for one in found
         for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
     }
-    used |= {one.name for one in features.areas if is_building(one.tags)}
+    used |= {
+        one.name for one in features.areas if reading.is_building(one.tags)
+    }
     used |= also
     for name, kind in features.kinds.items():
         is_relation_of_parts = kind == "relation of type building"
@@ -267,9 +245,7 @@ def _count_unused(
 
 
 def _barriers(
-    ways: Iterable[OsmWay],
-    local: Local,
-    faults: ImportFaults,
+    ways: Iterable[reading.OsmWay], local: reading.Local, faults: ImportFaults
 ) -> Iterator[Imported]:
     for name, tags, line, _ in ways:
         kind = tags.get("barrier")
@@ -282,24 +258,14 @@ def _barriers(
         where = (name, faults)
         high = tag_value(tags, "height", length, _TALLEST, where) or usual
         strip = LineString(local(line)).buffer(width / 2.0, cap_style="flat")
-        solids = [
-            np.concatenate(extruded(polygon, 0.0, high, name, faults))
-            for part in parts_of(strip)
-            for polygon in sound_parts(part, name, faults)
-        ]
-        if solids:
-            yield make_imported(
-                f"{kind}_{name}",
-                semantic_class,
-                "Barrier",
-                {"body": np.concatenate(solids)},
-                {},
-            )
+        yield from streets.raised(
+            f"{kind}_{name}", semantic_class, "Barrier", [strip], high, where
+        )
 
 
 def _trees(
-    trees: Iterable[tuple[str, Tags, tuple[float, float]]],
-    local: Local,
+    trees: Iterable[tuple[str, reading.Tags, tuple[float, float]]],
+    local: reading.Local,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
     for name, tags, place in trees:
@@ -312,12 +278,8 @@ def _trees(
             height=tag_value(tags, "height", length, _TALLEST, (name, faults))
             or None,
         )
-        structure = Structure(
-            f"tree_{name}",
-            "vegetation",
-            model,
-            (round(x, 3), round(y, 3), 0.0),
-        )
+        place_W = (round(x, 3), round(y, 3), 0.0)
+        structure = Structure(f"tree_{name}", "vegetation", model, place_W)
         trunk = Point(x, y).buffer(0.3, 2)
         walls, _ = extruded(trunk, 0.0, 2.0, name, ImportFaults())
         yield Imported(structure, "Tree", None, walls)

@@ -1,13 +1,17 @@
-"""Streets of OpenStreetMap, their bridges and tunnels: surfaces and lanes."""
+"""What lies on the ground of OpenStreetMap: streets, parks, water, the sea.
 
-from collections.abc import Iterable, Iterator
+https://wiki.openstreetmap.org/wiki/Map_features
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from shapely import STRtree
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports.faces import (
@@ -17,19 +21,19 @@ from cns_drake.imports.faces import (
     sound_parts,
 )
 from cns_drake.imports.foreign_city import (
+    LAWN,
+    WATER,
     Imported,
+    Rgb,
     Street,
     StreetPlaces,
     make_imported,
 )
-from cns_drake.imports.openstreetmap.reading import (
-    Local,
-    OsmFeatures,
-    OsmWay,
-    Tags,
-    has_tag,
-)
+from cns_drake.imports.openstreetmap import reading
+from cns_drake.imports.openstreetmap.reading import Local, OsmWay, has_tag
 from cns_drake.imports.openstreetmap.tags import (
+    TABLES,
+    area_kind,
     driven_ways,
     is_marked,
     lanes_beside,
@@ -44,6 +48,7 @@ _FROM_EDGE, _THICK, _HIGH = 0.2, 0.25, 1.0
 _BESIDE_BRIDGE = 2.0
 _SIDEWALK = 2.0
 _KERB = 0.12
+_STONE = (0.62, 0.60, 0.57)
 _WHITE = (0.86, 0.86, 0.84)
 # Width of the stripes of a zebra crossing, and of the gaps [m].
 _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
@@ -96,6 +101,58 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
     return Bridges(over, level, tunnels)
 
 
+def laid(
+    name: str,
+    semantic_class: str,
+    kind: str,
+    areas: Iterable[Polygon],
+    z: float,
+    faults: ImportFaults,
+    rgb: Rgb | None = None,
+) -> Iterator[Imported]:
+    """Yields a level surface, if the areas have any; z in metres.
+
+    The thing of the file that has it ends its name.
+    """
+    source = name.partition("_")[2]
+    surface = [
+        flat_surface(polygon, z, source, faults)
+        for area in areas
+        for polygon in sound_parts(area, source, faults)
+    ]
+    if surface:
+        triangles = {"surface": np.concatenate(surface)}
+        yield make_imported(
+            name, semantic_class, kind, triangles, {"surface": rgb}
+        )
+
+
+def raised(
+    name: str,
+    semantic_class: str,
+    kind: str,
+    areas: Iterable[BaseGeometry],
+    height: float,
+    source: tuple[str, ImportFaults],
+    rgb: Rgb | None = None,
+) -> Iterator[Imported]:
+    """Yields a solid on the ground, if the areas have any; height in metres.
+
+    The thing of the file that has it is the source, with its faults.
+    """
+    solids = [
+        np.concatenate(extruded(polygon, 0.0, height, *source))
+        for area in areas
+        for part in parts_of(area)
+        for polygon in sound_parts(part, *source)
+    ]
+    if solids:
+        triangles = {"body": np.concatenate(solids)}
+        yield make_imported(
+            name, semantic_class, kind, triangles, {"body": rgb}
+        )
+
+
 def parapets(
     ways: Iterable[OsmWay], bridges: Bridges, local: Local
 ) -> Iterator[Imported]:
@@ -105,25 +162,15 @@ def parapets(
         if width is None or name not in bridges.level:
             continue
         course = LineString(local(line))
-        solids = []
+        strips = []
         for side, walk in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
             aside = width / 2.0 + _FROM_EDGE + (_BESIDE_BRIDGE if walk else 0.0)
-            strip = course.offset_curve(side * aside).buffer(
-                _THICK / 2.0, cap_style="flat"
-            )
-            solids += [
-                np.concatenate(extruded(one, 0.0, _HIGH, name, ImportFaults()))
-                for part in parts_of(strip)
-                for one in sound_parts(part, name, ImportFaults())
-            ]
-        if solids:
-            yield make_imported(
-                f"parapet_{name}",
-                "fence",
-                "Parapet",
-                {"body": np.concatenate(solids)},
-                {"body": (0.62, 0.60, 0.57)},
-            )
+            edge = course.offset_curve(side * aside)
+            strips.append(edge.buffer(_THICK / 2.0, cap_style="flat"))
+        source = (name, ImportFaults())
+        yield from raised(
+            f"parapet_{name}", "fence", "Parapet", strips, _HIGH, source, _STONE
+        )
 
 
 def street_surfaces(
@@ -142,9 +189,7 @@ def street_surfaces(
     roads: list[tuple[str, BaseGeometry]] = []
     walks: list[tuple[str, BaseGeometry]] = []
     for name, tags, line, _ in ways:
-        if has_tag(tags, "tunnel") or has_tag(tags, "area"):
-            continue
-        if name in bridges.over_streets:
+        if _is_elsewhere(name, tags, bridges):
             continue
         width = street_width(tags, (name, faults))
         narrow = path_width(tags)
@@ -163,27 +208,20 @@ def street_surfaces(
                 strip = course.buffer(reach, single_sided=True)
                 walks.append((f"{name}_{'lr'[side < 0]}", strip))
     paved = shapely.union_all([area for _, area in roads])
-    for names, areas, semantic_class, z in (
-        ("road", roads, "road", 0.0),
-        ("walk", walks, "sidewalk", _KERB),
-    ):
-        for name, area in areas:
-            is_road = semantic_class == "road"
-            surface = [
-                flat_surface(polygon, z, name, faults)
-                for part in parts_of(
-                    area if is_road else area.difference(paved)
-                )
-                for polygon in sound_parts(part, name, faults)
-            ]
-            if surface:
-                yield make_imported(
-                    f"{names}_{name}",
-                    semantic_class,
-                    "Road" if is_road else "Sidewalk",
-                    {"surface": np.concatenate(surface)},
-                    {},
-                )
+    for name, area in roads:
+        areas = parts_of(area)
+        yield from laid(f"road_{name}", "road", "Road", areas, 0.0, faults)
+    for name, area in walks:
+        areas = parts_of(area.difference(paved))
+        yield from laid(
+            f"walk_{name}", "sidewalk", "Sidewalk", areas, _KERB, faults
+        )
+
+
+def _is_elsewhere(name: str, tags: reading.Tags, bridges: Bridges) -> bool:
+    """Returns whether a way is not a line on the ground."""
+    is_line = not (has_tag(tags, "tunnel") or has_tag(tags, "area"))
+    return not is_line or name in bridges.over_streets
 
 
 def drivable_streets(
@@ -193,29 +231,19 @@ def drivable_streets(
     streets = []
     for name, tags, line, nodes in ways:
         width = street_width(tags)
-        if width is None or has_tag(tags, "tunnel") or has_tag(tags, "area"):
+        if width is None or _is_elsewhere(name, tags, bridges):
             continue
-        if name in bridges.over_streets:
-            continue
-        forward, backward = driven_ways(tags)
-        if forward or backward:
-            beside = lanes_beside(tags, width)
+        ways_driven = driven_ways(tags)
+        if any(ways_driven):
+            aside = lanes_beside(tags, width)
+            place = (local(line), nodes)
             streets.append(
-                Street(
-                    local(line),
-                    nodes,
-                    forward,
-                    backward,
-                    beside,
-                    width,
-                    name,
-                    tags,
-                )
+                Street(*place, *ways_driven, aside, width, name, tags)
             )
     return streets
 
 
-def street_places(features: OsmFeatures, local: Local) -> StreetPlaces:
+def street_places(features: reading.OsmFeatures, local: Local) -> StreetPlaces:
     """Returns where people cross and signals stand, and ways for people."""
     signals = [
         place
@@ -243,7 +271,7 @@ def street_places(features: OsmFeatures, local: Local) -> StreetPlaces:
 
 
 def crossing_stripes(
-    crossings: Iterable[tuple[int, Tags]],
+    crossings: Iterable[tuple[int, reading.Tags]],
     ways: Iterable[OsmWay],
     local: Local,
     faults: ImportFaults,
@@ -292,3 +320,168 @@ def _stripes(
         )
         for middle in middles
     ]
+
+
+_SAND: Rgb = (0.76, 0.68, 0.51)
+_GRAVEL: Rgb = (0.50, 0.47, 0.43)
+_TARTAN: Rgb = (0.60, 0.34, 0.28)
+_LEVEL = -0.05  # [m]
+
+
+class _Look(NamedTuple):
+    """Kind, class, colour and height [m] of a ground."""
+
+    kind: str
+    semantic_class: str
+    rgb: Rgb | None
+    z: float
+
+
+def _look_of(entry: list) -> _Look:
+    kind, semantic_class, (red, green, blue), z = entry
+    return _Look(kind, semantic_class, (red, green, blue), z)
+
+
+_LOOKS = [(_look_of(entry["look"]), entry) for entry in TABLES["grounds"]]
+_WATER = _LOOKS[0][0]
+_PITCH = _Look("Pitch", "other-ground", _TARTAN, -0.035)
+_OF_GRASS = ("grass", "artificial_turf", "natural_grass")
+_SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
+_SURFACES = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
+# Cars there are below the ground, or in a building.
+_NO_GROUND = ("underground", "multi-storey", "rooftop")
+# Length by which a coast that ends within the city is extended [m], and
+# distance of the probes beside it that find the sea's side.
+_BEYOND, _BESIDE = 3000.0, 0.1
+
+
+def ground_areas(
+    areas: Iterable[reading.OsmArea],
+    local: Local,
+    faults: ImportFaults,
+    dressed: bool,
+) -> Iterator[Imported]:
+    """Yields the areas that are ground; dressed, by their material."""
+    for name, tags, polygons in areas:
+        look = _look(tags) if dressed else _plain_look(tags)
+        if look is None or has_tag(tags, "building"):
+            continue
+        areas = map(local.polygon, polygons)
+        yield from laid(
+            f"land_{name}",
+            look.semantic_class,
+            look.kind,
+            areas,
+            look.z,
+            faults,
+            look.rgb,
+        )
+
+
+def _plain_look(tags: reading.Tags) -> _Look | None:
+    found = area_kind(tags)
+    if found is None:
+        return None
+    kind, semantic_class = found
+    colours = {"WaterBody": WATER, "LandUse": LAWN}
+    return _Look(kind, semantic_class, colours.get(kind), _LEVEL)
+
+
+def _look(tags: reading.Tags) -> _Look | None:
+    if tags.get("tunnel", "no") != "no" or tags.get("layer", "").startswith(
+        "-"
+    ):
+        return None
+    if tags.get("leisure") == "pitch":
+        return _pitch(tags)
+    if tags.get("amenity") == "parking":
+        if tags.get("parking") in _NO_GROUND:
+            return None
+        return _Look("Parking", "parking", None, -0.03)
+    for look, entry in _LOOKS:
+        if any(
+            tags.get(key) in values.split()
+            for key, values in entry.items()
+            if key != "look"
+        ):
+            return look
+    return _plain_look(tags)
+
+
+def _pitch(tags: reading.Tags) -> _Look:
+    surface = tags.get("surface")
+    sports = tags.get("sport", "").split(";")
+    is_grass = surface in _OF_GRASS or (
+        surface is None and any(one in _SPORTS_ON_GRASS for one in sports)
+    )
+    rgb = LAWN if is_grass else _SURFACES.get(surface or "", _TARTAN)
+    return _PITCH._replace(
+        rgb=rgb, semantic_class="terrain" if is_grass else "other-ground"
+    )
+
+
+def coasts_of(ways: Iterable[OsmWay]) -> list[OsmWay]:
+    """Returns the coastlines; the land is on their left."""
+    return [way for way in ways if way.tags.get("natural") == "coastline"]
+
+
+def sea(
+    coasts: Sequence[OsmWay],
+    local: Local,
+    limits: np.ndarray,
+    faults: ImportFaults,
+) -> Iterator[Imported]:
+    """Yields the sea on the right of coasts, if there is any.
+
+    Limits (2, 2) are the least x and y, and greatest, of the city [m].
+    """
+    if not coasts:
+        return
+    lines = [LineString(local(way.line)) for way in coasts]
+    lines = [line for line in lines if line.length > 0.0]
+    merged = shapely.get_parts(shapely.line_merge(shapely.union_all(lines)))
+    whole = box(*limits.ravel().tolist())
+    cuts = [_prolonged(line, whole).intersection(whole) for line in merged]
+    edges = shapely.union_all([whole.boundary, *cuts])
+    areas = shapely.get_parts(shapely.polygonize([edges]))
+    water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
+    kind, semantic_class, rgb, z = _WATER
+    name = f"sea_{coasts[0].name}"
+    yield from laid(name, semantic_class, kind, parts_of(water), z, faults, rgb)
+
+
+def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
+    """Returns a line with its ends within an area extended straight on."""
+    points = np.array(line.coords)
+    if line.is_closed:
+        return line
+    for end, before in ((0, 1), (-1, -2)):
+        if whole.contains(Point(points[end])):
+            way = points[end] - points[before]
+            if not way.any():
+                continue
+            far = points[end] + _BEYOND * way / np.hypot(*way)
+            points = (
+                np.vstack([far, points])
+                if end == 0
+                else np.vstack([points, far])
+            )
+    return LineString(points)
+
+
+def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
+    """Returns whether an area is on the right of most of its coast."""
+    shapely.prepare(area)
+    right = 0.0
+    for coast in coasts:
+        points = np.array(coast.coords)
+        steps = np.diff(points, axis=0)
+        length = np.hypot(*steps.T)
+        used = length > 0.0
+        middles = (points[:-1] + steps / 2.0)[used]
+        steps, length = steps[used], length[used]
+        aside = _BESIDE * np.c_[steps[:, 1], -steps[:, 0]] / length[:, None]
+        for side in (1.0, -1.0):
+            places = shapely.points(middles + side * aside)
+            right += side * float(length[shapely.contains(area, places)].sum())
+    return right > 0.0

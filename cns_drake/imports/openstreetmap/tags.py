@@ -135,10 +135,6 @@ def heights(
     """Returns lowest and highest point of a building, and its roof's height.
 
     All three are measured from the ground [m].
-
-    Args:
-        tags: the building's tags.
-        where: see `tag_value`.
     """
 
     def metres(key: str, least: float = 0.0) -> float | None:
@@ -203,12 +199,7 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
 def street_width(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> float | None:
-    """Returns the width of a street for cars [m]; None for other ways.
-
-    Args:
-        tags: a way's tags.
-        where: see `tag_value`.
-    """
+    """Returns the width of a street for cars [m]; None for other ways."""
     kind = tags.get("highway", "").removesuffix("_link")
     usual: float | None = TABLES["streets"].get(kind)
     if usual is None:
@@ -244,9 +235,7 @@ def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
 def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     """Returns the distance of the outermost lane from a street's middle [m].
 
-    Args:
-        tags: the street's tags.
-        width: its carriageway's width [m].
+    The width is that of its carriageway [m].
     """
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
     if not lanes:
@@ -278,15 +267,14 @@ def path_width(tags: Mapping[str, str]) -> float | None:
 
 def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
     """Returns whether a street has a sidewalk on its left and right."""
-    both = tags.get("sidewalk:both") == "yes"
-    side = tags.get("sidewalk", "")
-    left = (
-        both or side in ("both", "left") or tags.get("sidewalk:left") == "yes"
-    )
-    right = (
-        both or side in ("both", "right") or tags.get("sidewalk:right") == "yes"
-    )
-    return left, right
+
+    def has(side: str) -> bool:
+        return tags.get("sidewalk") in ("both", side) or "yes" in (
+            tags.get("sidewalk:both"),
+            tags.get(f"sidewalk:{side}"),
+        )
+
+    return has("left"), has("right")
 
 
 def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
@@ -338,9 +326,7 @@ class LaneLayout(NamedTuple):
 def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
     """Returns the lanes of a street; none where vehicles cannot pass.
 
-    Args:
-        tags: the street's tags.
-        width: its carriageway's width [m].
+    The width is that of its carriageway [m].
     """
     is_along, is_against = driven_ways(tags)
     directions = is_along + is_against
@@ -374,12 +360,7 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
 
 
 def speed_limit(tags: Mapping[str, str], is_forward: bool = True) -> float:
-    """Returns the speed limit of a street [m/s].
-
-    Args:
-        tags: the street's tags.
-        is_forward: whether along its line.
-    """
+    """Returns the speed limit along a street, or against its line [m/s]."""
     side = "forward" if is_forward else "backward"
     for key in (f"maxspeed:{side}", "maxspeed", "maxspeed:type"):
         found = _speed(tags.get(key, ""))

@@ -13,15 +13,15 @@ from shapely.geometry import LineString, Point
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import HEADROOM, part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
-from cns_drake.imports.cityjson.structures import import_cityjson
-from cns_drake.imports.dressing import whole_city
+from cns_drake.imports.cityjson import import_cityjson
+from cns_drake.imports.dressing import dressed_city
+from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.dressing.grounds import (
     missing_sidewalks,
     paved,
     with_kerb,
 )
 from cns_drake.imports.dressing.street_dressing import dress_streets
-from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.ground import bottom_of, ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap, object_of
@@ -276,7 +276,7 @@ def test_a_city_counts_what_is_from_the_file_and_what_at_random(
         "building": {"dressed"}, "walk": {"dressed"}, "road": {"file"},
         "lamp_post_n": {"file"}, "car": {"lot"},
     }  # fmt: skip
-    monkeypatch.setattr(whole_city, "MAX_STRUCTURES", len(result.city.kept))
+    monkeypatch.setattr(dressed_city, "MAX_STRUCTURES", len(result.city.kept))
     with pytest.raises(InputError, match="more than instance ids"):
         dress_city(staged, again, [drive_of(again)], ground, 0)
     (bottom,) = bottom_of(staged.kept, ground)

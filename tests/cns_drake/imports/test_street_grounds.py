@@ -7,7 +7,7 @@ import pytest
 import shapely
 from shapely.geometry import LineString, box
 
-from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.grounds import guessed_streets, paved_gaps
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.ground import ground_of

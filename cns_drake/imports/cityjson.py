@@ -1,26 +1,31 @@
-"""CityJSON 1.0 to 2.0 and CityJSONSeq: objects and their faces.
+"""CityJSON 1.0 to 2.0 and CityJSONSeq: a file's objects as structures.
 
 https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON holds all
-objects; in a drive (.jsonl) a first line of that type is followed by a
+objects; in a sequence (.jsonl) a first line of that type is followed by a
 feature a line, each with vertices of its own.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
 from cns_drake.base.json_text import parse_json
-from cns_drake.imports.cityjson.reference_systems import (
+from cns_drake.imports import foreign_city
+from cns_drake.imports.building_years import construction_year
+from cns_drake.imports.faces import face_triangles
+from cns_drake.imports.foreign_city import ForeignCity, Imported, Rgb
+from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.reference_systems import (
     ReferenceSystem,
     reference_system,
 )
-from cns_drake.imports.options import ImportFaults
 
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
@@ -34,10 +39,30 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
+# Beginning of a type -> class, and a colour if the class's would mislead.
+_CLASSES: dict[str, tuple[str, Rgb | None]] = {
+    "Building": ("building", None),
+    "Bridge": ("other-structure", None),
+    "Tunnel": ("other-structure", None),
+    "OtherConstruction": ("other-structure", None),
+    "Road": ("road", None),
+    "Railway": ("other-ground", None),
+    "TransportSquare": ("road", None),
+    "Square": ("road", None),
+    "Track": ("road", None),
+    "Waterway": ("other-ground", foreign_city.WATER),
+    "WaterBody": ("other-ground", foreign_city.WATER),
+    "LandUse": ("other-ground", None),
+    "PlantCover": ("terrain", foreign_city.LAWN),
+    "SolitaryVegetationObject": ("vegetation", None),
+    "TINRelief": ("terrain", None),
+    "CityFurniture": ("other-object", None),
+    "GenericCityObject": ("other-structure", None),
+}
+_LONGEST_NAME = 80
 
 
-@dataclass(frozen=True)
-class CityGeometry:
+class CityGeometry(NamedTuple):
     """One geometry of an object.
 
     Attributes:
@@ -53,34 +78,22 @@ class CityGeometry:
     is_solid: bool
 
 
-@dataclass(frozen=True)
-class CityObject:
-    """An object of a city.
+class CityObject(NamedTuple):
+    """An object of a city: its id, type, ids of parents, readable geometries.
 
-    Attributes:
-        name: its id.
-        kind: its type, such as Building.
-        attributes: as the file has them.
-        parents: ids.
-        geometries: the readable ones.
+    The attributes are as the file has them.
     """
 
     name: str
     kind: str
     attributes: Mapping[str, Any]
-    parents: tuple[str, ...]
-    geometries: tuple[CityGeometry, ...]
+    parents: list[str]
+    geometries: list[CityGeometry]
 
 
 @dataclass
 class CityFile:
-    """The content of a file.
-
-    Attributes:
-        objects: by id.
-        system: its reference system.
-        faults: counts of unreadable parts.
-    """
+    """The objects of a file by id, its system, and counts of faulty parts."""
 
     objects: dict[str, CityObject] = field(default_factory=dict)
     system: ReferenceSystem = field(default_factory=ReferenceSystem)
@@ -92,15 +105,15 @@ class CityFile:
         At least one object must have a face.
         """
         points = np.concatenate(
-            [
-                ring
-                for one in self.objects.values()
-                for geometry in one.geometries
-                for face in geometry.faces
-                for ring in face
-            ]
+            [ring for face in self.faces() for ring in face]
         )
         return points.min(axis=0), points.max(axis=0)
+
+    def faces(self) -> Iterator[Face]:
+        """Yields the faces of all objects."""
+        for one in self.objects.values():
+            for geometry in one.geometries:
+                yield from geometry.faces
 
 
 def read_cityjson(path: Path) -> CityFile:
@@ -128,7 +141,15 @@ def read_cityjson(path: Path) -> CityFile:
         _read_objects(document, whole, where, city)
     if not city.objects:
         raise InputError(f"{path}: the file has no objects")
-    _check_metres(city, path)
+    if not any(city.faces()):
+        raise InputError(f"{path}: no object has a surface")
+    low, high = city.bounds()
+    within = (np.abs([low, high]) <= [180.0, 90.0, np.inf]).all()
+    if within and (high - low)[:2].max() < 1.0 < (high - low)[2]:
+        raise InputError(
+            f"{path}: coordinates look like degrees; project them to metres"
+            " first (for example with cjio's crs_reproject)"
+        )
     return city
 
 
@@ -171,22 +192,6 @@ def _reference_system(document: dict, where: str) -> ReferenceSystem:
     return reference_system(str(found), f"{where}: metadata.referenceSystem")
 
 
-def _check_metres(city: CityFile, path: Path) -> None:
-    if not any(
-        geometry.faces
-        for one in city.objects.values()
-        for geometry in one.geometries
-    ):
-        raise InputError(f"{path}: no object has a surface")
-    low, high = city.bounds()
-    within = (np.abs([low, high]) <= [180.0, 90.0, np.inf]).all()
-    if within and (high - low)[:2].max() < 1.0 < (high - low)[2]:
-        raise InputError(
-            f"{path}: coordinates look like degrees; project them to metres"
-            " first (for example with cjio's crs_reproject)"
-        )
-
-
 def _read_objects(
     document: dict, whole: dict, where: str, city: CityFile
 ) -> None:
@@ -207,24 +212,19 @@ def _read_objects(
         ):
             city.faults.add("object without a type, left out", name)
             continue
-        geometries = []
         listed = value.get("geometry") or []
-        for geometry in listed if isinstance(listed, list) else [listed]:
-            found = _read_geometry(
-                geometry, vertices, templates, name, city.faults
-            )
-            if found is not None:
-                geometries.append(found)
+        geometries = [
+            _read_geometry(geometry, templates, name, city.faults)
+            for geometry in (listed if isinstance(listed, list) else [listed])
+        ]
         parents = value.get("parents") or []
         attributes = value.get("attributes")
         city.objects[name] = CityObject(
-            name=name,
-            kind=value["type"],
-            attributes=attributes if isinstance(attributes, dict) else {},
-            parents=tuple(
-                map(str, parents if isinstance(parents, list) else [])
-            ),
-            geometries=tuple(geometries),
+            name,
+            value["type"],
+            attributes if isinstance(attributes, dict) else {},
+            list(map(str, parents if isinstance(parents, list) else [])),
+            [one for one in geometries if one is not None],
         )
 
 
@@ -233,17 +233,15 @@ def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
     defined = city.system
     middle = vertices[len(vertices) // 2]
     city.system = defined.as_used(middle)
-    if city.system == defined and defined.name:
-        first, second, _ = middle.tolist()
-        if not defined.has_place(first, second):
-            city.faults.add(
-                "coordinates beyond the area of their reference system",
-                defined.name,
-            )
-    if city.system != defined:
+    if city.system is not defined:
         city.faults.add(
             "reference system with north first, but coordinates with east "
             "first; read as east first",
+            defined.name,
+        )
+    elif defined.name and not defined.has_place(*middle[:2].tolist()):
+        city.faults.add(
+            "coordinates beyond the area of their reference system",
             defined.name,
         )
     if defined.heights_assumed and not defined.is_plain:
@@ -258,9 +256,9 @@ def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
     """Returns the vertices (N, 3) in coordinates of the file."""
     points = _numbers(document.get("vertices", []), f"{where}: vertices")
     if isinstance(transform, dict):
-        scale = _numbers([transform.get("scale")], f"{where}: transform.scale")
-        move = _numbers(
-            [transform.get("translate")], f"{where}: transform.translate"
+        scale, move = (
+            _numbers([transform.get(key)], f"{where}: transform.{key}")
+            for key in ("scale", "translate")
         )
         with np.errstate(over="ignore", invalid="ignore"):
             points = points * scale + move
@@ -297,39 +295,37 @@ class _Templates:
     ):
         templates = whole.get("geometry-templates")
         templates = templates if isinstance(templates, dict) else {}
-        self.geometries = templates.get("templates") or []
-        self.points = _numbers(
+        self._geometries = templates.get("templates") or []
+        self._points = _numbers(
             templates.get("vertices-templates", []),
             f"{where}: geometry-templates.vertices-templates",
         )
         self.vertices = vertices
-        self.system = system
+        self._system = system
 
-    def place(self, instance: dict) -> tuple[object, np.ndarray]:
+    def place(self, instance: dict) -> tuple[Any, np.ndarray]:
         """Returns a template and its vertices in the world.
 
         Raises:
             LookupError, TypeError, ValueError: if the instance is faulty.
         """
-        template = self.geometries[instance["template"]]
+        template = self._geometries[instance["template"]]
         (reference,) = instance["boundaries"]
         X = np.array(instance["transformationMatrix"], dtype=np.float64)
         X = X.reshape(4, 4)
         with np.errstate(over="ignore", invalid="ignore"):
-            placed = self.points @ X[:3, :3].T + X[:3, 3]
+            placed = self._points @ X[:3, :3].T + X[:3, 3]
         if reference < 0 or not (np.abs(placed) <= _FARTHEST).all():
             raise ValueError
-        in_metres = self.system.to_metres(placed)
-        return template, in_metres + self.vertices[reference]
+        return template, (
+            self._system.to_metres(placed) + self.vertices[reference]
+        )
 
 
 def _read_geometry(
-    geometry: Any,
-    vertices: np.ndarray,
-    templates: _Templates,
-    name: str,
-    faults: ImportFaults,
+    geometry: Any, templates: _Templates, name: str, faults: ImportFaults
 ) -> CityGeometry | None:
+    vertices = templates.vertices
     try:
         lod = _lod(geometry.get("lod"))
         kind = geometry["type"]
@@ -402,3 +398,171 @@ def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
         else str(surfaces[value].get("type", ""))
         for value in values
     ]
+
+
+def import_cityjson(
+    path: Path, lod: float | None, year_attribute: str | None
+) -> ForeignCity:
+    """Reads a CityJSON file; its origin is the middle of its city.
+
+    Raises:
+        InputError: if it cannot be used.
+    """
+    city = read_cityjson(path)
+    low, high = city.bounds()
+    origin = np.array([*np.round((low + high)[:2] / 2.0), np.floor(low[2])])
+    return ForeignCity(
+        import_structures(city, origin, lod, year_attribute),
+        tuple(origin.tolist()),
+        city.system.name,
+        city.faults,
+        axes=() if city.system.is_plain else city.system.axes,
+    )
+
+
+def import_structures(
+    city: CityFile,
+    origin: np.ndarray,
+    lod: float | None,
+    year_attribute: str | None,
+) -> list[Imported]:
+    """Returns a structure for each object that has a surface.
+
+    A building with its parts is one.
+
+    Args:
+        city: the content of the file; its faults are extended.
+        origin: (3,) the world's origin in the file's coordinates [m].
+        lod: level of detail to take; the highest of each object if None.
+        year_attribute: see `construction_year`.
+    """
+    groups = _families(city)
+    names = _unique_names(groups)
+    found = []
+    for root, members in groups.items():
+        first = city.objects[root]
+        chosen = _geometries(members, lod)
+        surfaces = _surfaces(chosen, root, city.faults, origin)
+        if not any(map(len, surfaces.values())):
+            kind = "object without a surface"
+            if not chosen and any(one.geometries for one in members):
+                kind = f"object without level of detail {lod:g}"
+            city.faults.add(f"{kind}, left out", root)
+            continue
+        name = names[root]
+        semantic_class, rgb = _class_of(first.kind)
+        years = [
+            construction_year(one.attributes, year_attribute, name, city.faults)
+            for one in members
+        ]
+        found.append(
+            foreign_city.make_imported(
+                name,
+                semantic_class,
+                first.kind,
+                surfaces,
+                {"body": rgb, "roof": foreign_city.RED_ROOF},
+                next((year for year in years if year is not None), None),
+                tags={
+                    key: str(value)
+                    for one in reversed(members)
+                    for key, value in one.attributes.items()
+                    if isinstance(value, str | int | float)
+                },
+                lod=max(geometry.lod for geometry in chosen),
+            )
+        )
+    return found
+
+
+def _families(city: CityFile) -> dict[str, list[CityObject]]:
+    """Returns id of each topmost object -> the object and its parts."""
+    groups: dict[str, list[CityObject]] = {}
+    for name, one in city.objects.items():
+        root, seen = name, {name}
+        while True:
+            parents = [
+                p
+                for p in city.objects[root].parents
+                if p in city.objects
+                # A group is not one structure: it may hold half a city.
+                and city.objects[p].kind != "CityObjectGroup"
+            ]
+            if not parents or parents[0] in seen:
+                break
+            root = parents[0]
+            seen.add(root)
+        groups.setdefault(root, []).append(one)
+    return groups
+
+
+def _unique_names(ids: Iterable[str]) -> dict[str, str]:
+    """Returns id -> name of letters, digits, dots and dashes."""
+    plain = {
+        one: re.sub(r"[^\w.-]+", "_", one, flags=re.ASCII)[:_LONGEST_NAME]
+        or "object"
+        for one in ids
+    }
+    counts = Counter(plain.values())
+    names: dict[str, str] = {}
+    taken: set[str] = set()
+    for one, name in plain.items():
+        number = 1
+        while name in taken or (number == 1 and counts[plain[one]] > 1):
+            name = f"{plain[one]}_{number}"
+            number += 1
+        taken.add(name)
+        names[one] = name
+    return names
+
+
+def _geometries(
+    members: list[CityObject], lod: float | None
+) -> list[CityGeometry]:
+    """Returns the geometry to use of an object and its parts."""
+    chosen = []
+    for one in members:
+        usable = [g for g in one.geometries if lod is None or g.lod == lod]
+        if usable:
+            highest = max(g.lod for g in usable)
+            chosen += [g for g in usable if g.lod == highest]
+    # A footprint is dropped if there is any better geometry.
+    return [g for g in chosen if g.lod >= 1.0] or chosen
+
+
+def _surfaces(
+    geometries: Iterable[CityGeometry],
+    name: str,
+    faults: ImportFaults,
+    origin: np.ndarray,
+) -> dict[str, np.ndarray]:
+    """Returns `body` and `roof`, if any -> triangles (M, 3, 3) in the world."""
+    found: dict[str, list[np.ndarray]] = {}
+    for geometry in geometries:
+        faces = [
+            face_triangles([ring - origin for ring in face], name, faults)
+            for face in geometry.faces
+        ]
+        if geometry.is_solid and _volume(faces) < -1e-3:
+            faults.add("solid turned inside out, reversed", name)
+            faces = [triangles[:, ::-1] for triangles in faces]
+        for triangles, kind in zip(faces, geometry.kinds, strict=True):
+            part = "roof" if kind == "RoofSurface" else "body"
+            found.setdefault(part, []).append(triangles)
+    return {part: np.concatenate(found[part]) for part in sorted(found)}
+
+
+def _volume(faces: list[np.ndarray]) -> float:
+    """Returns the volume that triangles (M, 3, 3) enclose [m^3]."""
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *faces])
+    if len(triangles) == 0:
+        return 0.0
+    a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def _class_of(kind: str) -> tuple[str, Rgb | None]:
+    for beginning, look in _CLASSES.items():
+        if kind.startswith(beginning):
+            return look
+    return "other-object", None

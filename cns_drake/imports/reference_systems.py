@@ -7,7 +7,7 @@ https://www.cityjson.org/specs/2.0.1/#referencesystem-crs
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pyproj
@@ -29,7 +29,7 @@ _NEAR_AREA_DEG = 0.5
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReferenceSystem:
     """The meaning of a file's three coordinates.
 
@@ -42,12 +42,8 @@ class ReferenceSystem:
     """
 
     name: str = ""
-    axes: tuple[str, str, str] = _PLAIN
-    matrix: tuple[tuple[float, ...], ...] = (
-        (1.0, 0.0, 0.0),
-        (0.0, 1.0, 0.0),
-        (0.0, 0.0, 1.0),
-    )
+    axes: tuple[str, ...] = _PLAIN
+    matrix: np.ndarray = field(default_factory=lambda: np.eye(3))
     heights_assumed: bool = False
 
     @property
@@ -59,7 +55,7 @@ class ReferenceSystem:
         """Returns coordinates (N, 3) as metres east, north and up (N, 3)."""
         if self.is_plain:
             return points
-        return points @ np.array(self.matrix).T
+        return points @ self.matrix.T
 
     def as_used(self, point: np.ndarray) -> ReferenceSystem:
         """Returns the system as a file uses it.
@@ -76,11 +72,8 @@ class ReferenceSystem:
         first, second, _ = point.tolist()
         if self.has_place(first, second) or not self.has_place(second, first):
             return self
-        exchanged = np.array(self.matrix)[:, [1, 0, 2]]
         axes = (self.axes[1], self.axes[0], self.axes[2])
-        return replace(
-            self, axes=axes, matrix=tuple(map(tuple, exchanged.tolist()))
-        )
+        return replace(self, axes=axes, matrix=self.matrix[:, [1, 0, 2]])
 
     def has_place(self, first: float, second: float) -> bool:
         """Returns whether coordinates, as defined, are in the area of use.
@@ -127,32 +120,23 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
             f"{where}: {name} is in degrees; project it to metres first (for"
             " example with cjio's crs_reproject)"
         )
-    rows = [_ROWS.get(axis.direction, (-1, 0.0)) for axis in axes]
+    # Direction, unit and metres of it for each axis.
+    meanings = [
+        (axis.direction, axis.unit_name, axis.unit_conversion_factor)
+        for axis in axes
+    ]
     heights_assumed = len(axes) == 2
     if heights_assumed:
-        rows.append((2, 1.0))
+        meanings.append(("up", *meanings[0][1:]))
+    rows = [_ROWS.get(direction, (-1, 0.0)) for direction, _, _ in meanings]
     if sorted(row for row, _ in rows) != [0, 1, 2]:
         listed = ", ".join(f"{a.name} ({a.direction})" for a in axes)
         raise InputError(
             f"{where}: {name} ({system.name}) has the axes {listed}, which are"
             " not east, north and up; reproject the file first"
         )
-    units = [(axis.unit_conversion_factor, axis.unit_name) for axis in axes]
-    if heights_assumed:
-        units.append(units[0])
     matrix = np.zeros((3, 3))
-    for column, ((row, sign), (unit, _)) in enumerate(
-        zip(rows, units, strict=True)
-    ):
-        matrix[row, column] = sign * unit
-    directions = [axis.direction for axis in axes] + ["up"] * heights_assumed
-    first, second, third = (
-        f"{direction} [{unit}]"
-        for direction, (_, unit) in zip(directions, units, strict=True)
-    )
-    return ReferenceSystem(
-        name,
-        (first, second, third),
-        tuple(map(tuple, matrix.tolist())),
-        heights_assumed,
-    )
+    for column, (row, sign) in enumerate(rows):
+        matrix[row, column] = sign * meanings[column][2]
+    words = tuple(f"{direction} [{unit}]" for direction, unit, _ in meanings)
+    return ReferenceSystem(name, words, matrix, heights_assumed)

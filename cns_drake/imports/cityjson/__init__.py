@@ -1,1 +1,0 @@
-"""CityJSON: a file's objects as structures of a city."""
