@@ -31,7 +31,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 if TYPE_CHECKING:
     from cns_drake.base.jobs.cluster import Cluster
     from cns_drake.scenarios.scenario import Scenario
-    from evaluation.report.compared import ComparedPair
+    from evaluation.study.localisation import ComparedPair
 
 
 def _run_task(

@@ -43,7 +43,6 @@ from evaluation.recognition.protocol import (
     DEFAULT_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.report.compared import ComparedPair
 from evaluation.report.ladder import (
     LadderRow,
     LadderRung,
@@ -58,9 +57,10 @@ from evaluation.report.ladder import (
     strongest_causes,
 )
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.localisation import ComparedPair
 from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
 from evaluation.study.rungs import DescribedSource, measure_rung
-from evaluation.study.surveys import DescribeDrive
+from evaluation.study.surveys import Survey
 
 # With --quick only the strongest level of each cause is measured, on every
 # other query.
@@ -242,67 +242,71 @@ class RungPlan:
     def add_rung(self, rung: Rung) -> Part:
         """Adds the jobs of a rung; returns the part that they write."""
         needs: list[str] = []
-        others = self.distractors if rung.drives.num_distractors else ()
+
+        def described(
+            drive: Scenario, role: Role, *, with_scans: bool
+        ) -> tuple[Part, ...]:
+            job, files = describe_job(
+                drive,
+                role,
+                self._methods,
+                self._protocol,
+                self._files,
+                with_scans=with_scans,
+            )
+            self.jobs[job.name] = job
+            needs.append(job.name)
+            parts = (files.described(one.name) for one in self._methods)
+            return (files.scans, *parts) if with_scans else tuple(parts)
+
+        def source(side: str, role: Role) -> DescribedSource:
+            drive = getattr(rung.drives, side)
+            # Only drives without a change serve several rungs.
+            is_changed = side == "query" and rung.drives.query_changes
+            if is_changed or drive != getattr(self._plain, side):
+                return DriveSimulation(drive)
+            return described(drive, role, with_scans=True)
+
         name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
         if self._viewpoint != NEAR:
             name += f" {self._viewpoint}"
         part = self._files.rung(name)
-        step = MakePart(
-            part,
-            measure_rung,
-            (
-                self._drive(rung, "database", "places", needs),
-                self._drive(rung, "query", "queries", needs),
-                tuple(
-                    self._descriptions(
-                        self._describe(drive, "places", needs, with_scans=False)
-                    )
-                    for drive in others
-                ),
-                rung.drives.num_distractors,
-                self._methods,
-                rung.drives.protocol(self._protocol),
-            ),
+        others = self.distractors if rung.drives.num_distractors else ()
+        arguments = (
+            source("database", "places"),
+            source("query", "queries"),
+            tuple(described(one, "places", with_scans=False) for one in others),
+            rung.drives.num_distractors,
+            self._methods,
+            rung.drives.protocol(self._protocol),
         )
+        step = MakePart(part, measure_rung, arguments)
         self.jobs[name] = Job(name, step, tuple(needs), _RUNG_COST)
         return part
 
-    def _drive(
-        self, rung: Rung, side: str, role: Role, needs: list[str]
-    ) -> DescribedSource:
-        drive = getattr(rung.drives, side)
-        # Only drives without a change serve several rungs.
-        is_changed = side == "query" and rung.drives.query_changes
-        if is_changed or drive != getattr(self._plain, side):
-            return DriveSimulation(drive)
-        files = self._describe(drive, role, needs)
-        return files.scans, *self._descriptions(files)
 
-    def _descriptions(self, files: SurveyFiles) -> tuple[Part, ...]:
-        return tuple(files.described(one.name) for one in self._methods)
-
-    def _describe(
-        self,
-        drive: Scenario,
-        role: Role,
-        needs: list[str],
-        *,
-        with_scans: bool = True,
-    ) -> SurveyFiles:
-        """Adds the job that describes a drive for several rungs."""
-        files = self._files.survey(f"{drive.name} {role}")
-        name = f"describe {drive.name}"
-        step = DescribeDrive(
-            DriveSimulation(drive),
-            role,
-            self._methods,
-            self._protocol,
-            files,
-            with_scans,
-        )
-        self.jobs[name] = Job(name, step, cost=_DESCRIPTION_COST)
-        needs.append(name)
-        return files
+def describe_job(
+    drive: Scenario,
+    role: Role,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    files: StudyFiles,
+    *,
+    with_scans: bool = False,
+) -> tuple[Job, SurveyFiles]:
+    """Returns the job that describes a drive, and the files that it writes."""
+    written = files.survey(f"{drive.name} {role}")
+    step = Survey(
+        DriveSimulation(drive),
+        frozenset({role}),
+        methods,
+        protocol,
+        written,
+        with_scans=with_scans,
+        with_map=False,
+    )
+    job = Job(f"describe {drive.name}", step, cost=_DESCRIPTION_COST)
+    return job, written
 
 
 def _labelled(

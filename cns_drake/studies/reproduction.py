@@ -22,11 +22,11 @@ from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.report.compared import ComparedPair
 from evaluation.report.ladder import LadderRung
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
+from evaluation.study.localisation import ComparedPair
 from evaluation.study.plan import plan_study
 from evaluation.study.surveys import DriveSource, RecordedDrive, Survey
 

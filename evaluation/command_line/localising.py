@@ -131,7 +131,7 @@ def localise(
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.TrackSummary(rows).to_json()
         if output is not None:
-            from evaluation.report.localisation import draw_track
+            from evaluation.report.curve_figures import draw_track
 
             draw_track(rows, output / "track")
     else:

@@ -1,7 +1,8 @@
 """The results of a ladder: their numbers, tables, words and figure."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+import itertools
 import math
 from operator import attrgetter
 from pathlib import Path
@@ -580,13 +581,14 @@ class CauseCell(NamedTuple):
     """One level of a cell of a figure of methods over causes.
 
     Attributes:
-        method: its column.
-        cause: its line.
-        level: strength of the cause.
+        map_name: its line of panels.
+        title: which of the two panels there.
         share: the colour, from 0 to 1; NaN for none.
         label: the number of the strongest level.
     """
 
+    map_name: str
+    title: str
     method: str
     cause: str
     level: int
@@ -597,46 +599,35 @@ class CauseCell(NamedTuple):
 def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
     """Draws the share of the AUC without a change that each cause leaves.
 
-    A cell has a strip for each level, the weakest at its left; the number is
-    that of the strongest level [%]. Without a change it is AUC itself.
-
-    Args:
-        rows: rows for all maps.
-        stem: path to write, without ending.
+    The numbers are in per cent. Without a change they are AUC itself.
     """
-    maps = list(dict.fromkeys(row.rung.map_name for row in rows))
-    panels = {
-        (name, f"{name}, {words}"): [
-            CauseCell(
-                row.method,
-                row.rung.cause,
-                row.rung.level,
-                row.kept.share,
-                _label(row),
-            )
-            for row in rows
-            if row.rung.map_name == name and row.is_gated == is_gated
-        ]
-        for name in maps
-        for is_gated, words in _TITLES.items()
-    }
-    draw_cells(panels, "part of AUC that is kept", stem)
+    cells = [
+        CauseCell(
+            row.rung.map_name,
+            _TITLES[row.is_gated],
+            row.method,
+            row.rung.cause,
+            row.rung.level,
+            row.kept.share,
+            _label(row),
+        )
+        for row in rows
+    ]
+    draw_cells(cells, "part of AUC that is kept", stem)
 
 
-def draw_cells(
-    panels: Mapping[tuple[str, str], Sequence[CauseCell]],
-    meaning: str,
-    stem: Path,
-) -> None:
-    """Draws methods over causes, a strip for each level.
+def draw_cells(cells: Sequence[CauseCell], meaning: str, stem: Path) -> None:
+    """Draws methods over causes, two panels for each map.
+
+    A cell has a strip for each level, the weakest at its left; the number is
+    that of the strongest level.
 
     Args:
-        panels: map and title -> cells; those of a map are side by side.
         meaning: of the colours.
         stem: path to write, without ending.
     """
-    cells = [cell for panel in panels.values() for cell in panel]
-    maps = list(dict.fromkeys(name for name, _ in panels))
+    maps = list(dict.fromkeys(cell.map_name for cell in cells))
+    titles = dict.fromkeys(cell.title for cell in cells)
     methods = in_table_order(cell.method for cell in cells)
     causes = list(dict.fromkeys(cell.cause for cell in cells))
     size = (
@@ -645,11 +636,11 @@ def draw_cells(
     )
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(len(maps), 2, squeeze=False, sharey=True)
-    for axes, ((_, words), panel) in zip(
-        grid.flat, panels.items(), strict=True
-    ):
-        _draw_panel(axes, panel, methods, causes)
-        axes.set_title(plain(words), fontsize=_FONT_SIZE + 1)
+    panels = itertools.product(maps, titles)
+    for axes, panel in zip(grid.flat, panels, strict=True):
+        of_panel = [one for one in cells if (one.map_name, one.title) == panel]
+        _draw_panel(axes, of_panel, methods, causes)
+        axes.set_title(plain(", ".join(panel)), fontsize=_FONT_SIZE + 1)
     bar = figure.colorbar(
         ScalarMappable(_SHARES, _COLOURS),
         ax=grid[:, 1],

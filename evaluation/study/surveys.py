@@ -5,8 +5,7 @@ before or after the drive is recorded. The job therefore has the source of the
 drive, not the drive.
 """
 
-import abc
-from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 import io
 import os
@@ -236,18 +235,21 @@ class RecordingSurvey:
     """A recording's maps, places and queries, which replace its scans.
 
     Attributes:
-        drive: with its map on the grid of the TCR.
-        fine: (K, 3) cloud for pictures, in W [m].
+        placed: name and world of the drive.
         described: method -> its descriptions of the drive; empty if the
             recording has no role. Those by another protocol are under a
             `described_key`.
         scans: those of the places and queries; None unless they are kept.
+            Without maps they are (N, 3) float32, as their role sees them.
+        drive: with its map on the grid of the TCR; None without maps.
+        fine: (K, 3) cloud for pictures, in W [m]; likewise.
     """
 
-    drive: SurveyedDrive
-    fine: np.ndarray
+    placed: PlacedDrive
     described: dict[str, DescribedDrive]
-    scans: KeptScans | None = None
+    scans: KeptScans | list[np.ndarray] | None = None
+    drive: SurveyedDrive | None = None
+    fine: np.ndarray | None = None
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
@@ -263,88 +265,86 @@ def survey_recording(
     track: Track = silent,
     *,
     with_scans: bool = False,
+    with_map: bool = True,
     further: Sequence[Request] = (),
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
-    Each scan is read once, in order.
+    Each scan is read once, in order; without a map, only those of places and
+    queries.
 
     Args:
-        recording: the drive.
         roles: the roles of the drive in place recognition; may be empty.
         methods: that describe it; may be none.
-        protocol: sets the places and queries.
-        track: reports progress.
         with_scans: whether to keep the scans of places and queries, too.
         further: descriptions by another protocol; none without a role.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
     """
-    frames, thumbnails = [], []
-    scans_per_place = [
-        *map(protocol.scans, methods),
-        *(other.scans(method) for method, _, other in further),
-    ]
-    mapped = MappedDrive(recording, kept=max(scans_per_place, default=1))
+    frames: list[int] = []
+    thumbnails = []
+    number = max(
+        [
+            *map(protocol.scans, methods),
+            *(other.scans(method) for method, _, other in further),
+        ],
+        default=1,
+    )
+    mapped = MappedDrive(recording, number) if with_map else None
+    drive = mapped or RecentScans(recording, number)
+    seen: list[np.ndarray] = []
+    instances = recording.instances if with_map and with_scans else None
+    kept = KeptScans(instances=instances and dict(instances))
 
-    scans = None
-    if with_scans:
-        instances = recording.instances
-        scans = KeptScans(instances=instances and dict(instances))
-
-    def keep(frame: int, _: np.ndarray) -> None:
+    def keep(frame: int, cloud: np.ndarray) -> None:
+        if mapped is None:
+            seen.append(cloud.astype(np.float32))
+            return
         # Pictures show the scan as recorded, whatever its query sees.
         frames.append(frame)
         scan = mapped.scan(frame)
-        if scans is not None:
-            scans.keep(frame, scan, protocol.max_range)
+        if with_scans:
+            kept.keep(frame, scan, protocol.max_range)
         height = MethodConfig().sensor_height
-        cloud = cropped(scan, protocol.max_range)
-        thumbnails.append(thumbnail(cloud, height, seed=frame))
+        shown = cropped(scan, protocol.max_range)
+        thumbnails.append(thumbnail(shown, height, seed=frame))
 
     described = {}
     if roles:
-        drives = describe_drive(
-            mapped,
+        found = describe_drive(
+            drive,
             methods,
             roles,
             protocol,
             track,
-            visit=keep,
+            visit=keep if with_map or with_scans else None,
             further=further,
         )
-        keys = [
-            *(method.name for method in methods),
-            *(
-                described_key(method.name, other)
-                for method, _, other in further
-            ),
-        ]
-        described = dict(zip(keys, drives, strict=True))
+        keys = [method.name for method in methods]
+        keys += [described_key(method.name, one) for method, _, one in further]
+        described = dict(zip(keys, found, strict=True))
+    placed = PlacedDrive.of(recording)
+    if mapped is None:
+        return RecordingSurvey(placed, described, seen if with_scans else None)
     coarse, fine = mapped.finish(track)
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
-    drive = SurveyedDrive(
-        placed=PlacedDrive.of(recording),
+    surveyed = SurveyedDrive(
+        placed=placed,
         stamps_ns=mapped.stamps_ns,
         X_WS=mapped.X_WS,
         coarse=coarse,
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )
-    return RecordingSurvey(drive, fine, described, scans)
+    scans = kept if with_scans else None
+    return RecordingSurvey(placed, described, scans, surveyed, fine)
 
 
 @dataclass(frozen=True)
 class Description:
-    """What a method describes of a drive by a second protocol.
-
-    Attributes:
-        method: the method.
-        roles: the roles of the drive that are described.
-        protocol: sets the places and queries.
-    """
+    """What a method describes of a drive by a second protocol."""
 
     method: MethodChoice
     roles: frozenset[Role]
@@ -360,34 +360,13 @@ class Description:
         return self.method.make(), self.roles, self.protocol
 
 
-class _PartsStep(Step):
-    """Writes those parts of a drive that are missing."""
-
-    files: SurveyFiles
-
-    @property
-    def output(self) -> Path:
-        return self.files.folder
-
-    def is_done(self) -> bool:
-        return not self._missing()
-
-    @abc.abstractmethod
-    def _missing(self) -> dict[Part, Mapping]:
-        """Returns the missing parts, each with its inputs."""
-
-
 @dataclass(frozen=True)
-class Survey(_PartsStep):
+class Survey(Step):
     """Writes the survey of a drive, or its missing parts.
 
     Attributes:
-        source: opens the drive.
-        roles: the roles of the drive in place recognition; may be empty.
-        methods: the methods that describe its places and queries.
-        protocol: sets the places and queries.
+        roles, with_scans, with_map: see `survey_recording`.
         files: the parts to write.
-        with_scans: whether to keep the scans of places and queries, too.
         further: descriptions by a second protocol; none without a role.
     """
 
@@ -397,7 +376,15 @@ class Survey(_PartsStep):
     protocol: RetrievalProtocol
     files: SurveyFiles
     with_scans: bool = False
+    with_map: bool = True
     further: tuple[Description, ...] = ()
+
+    @property
+    def output(self) -> Path:
+        return self.files.folder
+
+    def is_done(self) -> bool:
+        return not self._missing()
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
@@ -414,7 +401,6 @@ class Survey(_PartsStep):
 
         Args:
             drive: that of the source, or the same drive while it is being made.
-            reporter: takes the progress.
             missing: parts that are needed; all by default.
 
         Raises:
@@ -425,15 +411,15 @@ class Survey(_PartsStep):
             part = self.files.described(key)
             return bool(self.roles) and (missing is None or part in missing)
 
-        methods, further = self.methods, self.further
         return survey_recording(
             drive,
             self.roles,
-            [one.make() for one in methods if needed(one.name)],
+            [one.make() for one in self.methods if needed(one.name)],
             self.protocol,
             reporter.track,
             with_scans=self.with_scans,
-            further=[one.request() for one in further if needed(one.key)],
+            with_map=self.with_map,
+            further=[one.request() for one in self.further if needed(one.key)],
         )
 
     def write(
@@ -450,7 +436,7 @@ class Survey(_PartsStep):
         for key in list(found.described):
             part = self.files.described(key)
             # Each value is dropped when it is written.
-            value = found.drive.placed, found.described.pop(key)
+            value = found.placed, found.described.pop(key)
             if part in missing:
                 part.write(missing[part], value)
         for part, one in (
@@ -462,6 +448,7 @@ class Survey(_PartsStep):
                 part.write(missing[part], one)
 
     def _missing(self) -> dict[Part, Mapping]:
+        """Returns the parts that are missing or stale, and their inputs."""
         drive = self.source.identity()
 
         def inputs(
@@ -473,11 +460,14 @@ class Survey(_PartsStep):
                     "drive": drive,
                     "roles": sorted(roles),
                     "protocol": options if roles else None,
+                    "with_map": self.with_map,
                 }
             )
 
         own = inputs(self.roles, self.protocol)
-        expected = dict.fromkeys([self.files.fine, self.files.drive], own)
+        expected: dict[Part, Mapping] = {}
+        if self.with_map:
+            expected = dict.fromkeys([self.files.fine, self.files.drive], own)
         if self.with_scans:
             expected[self.files.scans] = own
         if self.roles:
@@ -489,116 +479,8 @@ class Survey(_PartsStep):
                     **inputs(one.roles, one.protocol),
                     "method": one.method.identity(),
                 }
-        return _stale(expected)
-
-
-@dataclass(frozen=True)
-class DescribeDrive(_PartsStep):
-    """Writes each method's descriptions of a drive, without its map.
-
-    Only the scans that are described are read.
-
-    Attributes:
-        source: opens the drive.
-        role: the role of the drive.
-        methods: the methods that describe it.
-        protocol: where it has places and queries.
-        files: the parts to write; only those of the descriptions, and of the
-            scans.
-        with_scans: whether to keep the described scans, too.
-    """
-
-    source: DriveSource
-    role: Role
-    methods: tuple[MethodChoice, ...]
-    protocol: RetrievalProtocol
-    files: SurveyFiles
-    with_scans: bool = False
-
-    def run(self, reporter: Reporter) -> None:
-        missing = self._missing()
-        files = {one: self.files.described(one.name) for one in self.methods}
-        methods = [one for one in self.methods if files[one] in missing]
-        scans: list[np.ndarray] | None = [] if self.with_scans else None
-        found = describe(
-            self.source, self.role, methods, self.protocol, reporter, scans
-        )
-        for choice in methods:
-            # Each value is dropped when it is written.
-            part = files[choice]
-            part.write(missing[part], found.pop(choice.name))
-        if self.files.scans in missing:
-            self.files.scans.write(missing[self.files.scans], scans)
-
-    def _missing(self) -> dict[Part, Mapping]:
-        inputs = self.made_of(
-            {
-                "drive": self.source.identity(),
-                "role": self.role,
-                "protocol": self.protocol.described(
-                    queries=self.role == "queries"
-                ),
-            }
-        )
-        expected = {
-            self.files.described(method.name): {
-                **inputs,
-                "method": method.identity(),
-            }
-            for method in self.methods
+        return {
+            part: made_of
+            for part, made_of in expected.items()
+            if not part.is_current(made_of)
         }
-        if self.with_scans:
-            expected[self.files.scans] = inputs
-        return _stale(expected)
-
-
-def _stale(expected: Mapping[Part, Mapping]) -> dict[Part, Mapping]:
-    """Returns the parts that are missing or have other inputs than these."""
-    return {
-        part: inputs
-        for part, inputs in expected.items()
-        if not part.is_current(inputs)
-    }
-
-
-def describe(
-    source: DriveSource,
-    role: Role,
-    methods: Iterable[MethodChoice],
-    protocol: RetrievalProtocol,
-    reporter: Reporter,
-    scans: list[np.ndarray] | None = None,
-) -> dict[str, DescribedDrive]:
-    """Returns name of method -> its descriptions of a drive.
-
-    Args:
-        source: opens the drive.
-        role: the role of the drive.
-        methods: that describe it.
-        protocol: where it has places and queries.
-        reporter: takes the progress.
-        scans: gets the single scan (N, 3) float32 of each described frame, in
-            the frame of the sensor.
-
-    Raises:
-        InputError: see `describe_drive`.
-    """
-    running = [choice.make() for choice in methods]
-    kept = max(map(protocol.scans, running), default=1)
-    drive = RecentScans(source(), kept)
-
-    def keep(_: int, scan: np.ndarray) -> None:
-        assert scans is not None
-        scans.append(scan.astype(np.float32))
-
-    found = describe_drive(
-        drive,
-        running,
-        {role},
-        protocol,
-        reporter.track,
-        visit=None if scans is None else keep,
-    )
-    return {
-        method.name: one for method, one in zip(running, found, strict=True)
-    }

@@ -30,6 +30,7 @@ from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import (
     DriveSource,
     KeptDrive,
+    KeptScans,
     RecordedDrive,
     Survey,
     survey_recording,
@@ -258,12 +259,9 @@ def measure_database(
     """Returns the points of one database.
 
     Args:
-        reporter: takes the progress.
         source: opens the database, which is in the world of the query.
         surveyed: the `SurveyedDrive` and the `KeptScans` of the query drive.
         described: each method's descriptions of the query drive.
-        methods: to run.
-        protocol: that of place recognition.
     """
     running = [method.make() for method in methods]
     database = survey_recording(
@@ -274,10 +272,13 @@ def measure_database(
         reporter.track,
         with_scans=True,
     )
+    drive, scans = database.drive, database.scans
+    assert drive is not None
+    assert isinstance(scans, KeptScans)
     query_track, query_scans = (part.read() for part in surveyed)
-    check_same_world(database.drive.placed, query_track.placed)
+    check_same_world(database.placed, query_track.placed)
     change = temporal_change(
-        database.drive.coarse.centroids_W, query_track.coarse.centroids_W
+        drive.coarse.centroids_W, query_track.coarse.centroids_W
     )
     points: list[TrendPoint] = []
     visible_change = math.nan
@@ -290,9 +291,8 @@ def measure_database(
         )
         if not points:
             # Matches do not depend on the method.
-            assert database.scans is not None
             visible_change = _visible_change(
-                KeptDrive(database.drive, database.scans),
+                KeptDrive(drive, scans),
                 KeptDrive(query_track, query_scans),
                 retrieval,
                 protocol,
