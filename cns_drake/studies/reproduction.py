@@ -23,11 +23,10 @@ from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report.ladder import LadderRung
-from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.localisation import ComparedPair
-from evaluation.study.plan import plan_study
+from evaluation.study.plan import Study
 from evaluation.study.surveys import DriveSource, RecordedDrive, Survey
 
 
@@ -89,32 +88,23 @@ def reproduce_maps(
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
     make_folder(output)
-    reference = reference_for(folder.name for folder in folders)
-    study = plan_study(
+    study = Study(
         recordings,
         report,
         methods,
         protocol,
-        with_costs=with_costs,
-        reference=reference,
+        with_costs,
+        reference_for(folder.name for folder in folders),
     )
-    jobs = [_surveyed(job, study) for job in jobs]
-    run_jobs([*jobs, *study, *pictures], cluster)
+    measuring = study.jobs()
+    jobs = [_surveyed(job, measuring) for job in jobs]
+    run_jobs([*jobs, *measuring, *pictures], cluster)
     addresses = {
         name: f"../pages/{page.name}"
         for name, page in pages.items()
         if page.is_file()
     }
-    return assemble(
-        recordings,
-        report,
-        methods,
-        pages=addresses,
-        protocol=protocol,
-        with_costs=with_costs,
-        reference=reference,
-        on_note=on_note,
-    )
+    return study.assemble(addresses, on_note)
 
 
 def stage_pairs(maps: Sequence[str] | None, output: Path) -> list[ComparedPair]:
