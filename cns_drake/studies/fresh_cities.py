@@ -41,9 +41,7 @@ class Version:
     """A version of a shipped map.
 
     Attributes:
-        map_name: the map.
         number: from 1 on.
-        seed: seed of the city.
         turn_deg: turn of the whole city about the world's origin [deg].
     """
 
@@ -109,10 +107,6 @@ def draw_fresh_cities(
     maps: Sequence[str], numbers: Sequence[int], output: Path, cluster: Cluster
 ) -> list[Path]:
     """Draws fresh cities; returns their map folders, `<output>/<map>_fNN`.
-
-    Args:
-        maps, numbers: see `evaluate_fresh_cities`.
-        output: the folder of cities; created if need be.
 
     Raises:
         InputError: there is no such version, or it could not be drawn.

@@ -41,12 +41,7 @@ _TITLES = {
 
 @dataclass(frozen=True)
 class Effect:
-    """A pair of drives with one of the knobs taken back.
-
-    Attributes:
-        title: the title of the variant.
-        points: a point for each method.
-    """
+    """A pair of drives with one of the knobs taken back."""
 
     title: str
     points: tuple[TrendPoint, ...]

@@ -161,8 +161,6 @@ class RungDrives:
     """The drives of a rung of a ladder.
 
     Attributes:
-        database: drive of the mapped places.
-        query: drive of the queries.
         num_distractors: places of other cities in the database.
         lateral: distance between the two ways that a match has to bridge [m].
         query_changes: option of the protocol -> what it does to the sensor of
@@ -319,9 +317,6 @@ class Rung:
     Attributes:
         cause: one of `CAUSES`.
         level: from 1 to 4; 0 for `none`.
-        seed: the seed of random draws.
-        strength: in words.
-        drives: to simulate.
     """
 
     cause: str
@@ -350,8 +345,6 @@ class Extent:
         causes: some of `CAUSES`, without `none`, which is always there.
         levels: from 1 to 4. A cause that lacks one gets its nearest lower
             level.
-        seeds: the seeds of random draws.
-        most_places: most places of other cities.
         strengths: cause -> level -> strength; construction's are the map's
             stages.
         viewpoint: one of `VIEWPOINTS`; of the database on all rungs.
@@ -370,11 +363,7 @@ class Extent:
 def plan_pairs(
     scenario: Scenario, causes: Sequence[str], extent: Extent
 ) -> list[Rung]:
-    """Returns the rungs with two causes at once, each at its strongest level.
-
-    Args:
-        causes: to be crossed two by two.
-    """
+    """Returns the rungs of each two causes at once, at their strongest."""
     plain = plain_drives(scenario, extent.viewpoint)
     known, _ = _known_strengths(scenario, extent)
     rungs = []

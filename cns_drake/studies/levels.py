@@ -61,9 +61,7 @@ class LevelResult:
     """A method on a level of a map.
 
     Attributes:
-        map_name: the name of the city.
         level: from 0 to 4.
-        method: its name.
         is_gated: whether the gate was used (the method had the radius).
         auc, low, high: with its 95 % interval.
     """

@@ -75,10 +75,8 @@ class MapPair:
     """A test pair.
 
     Attributes:
-        name: of the pair.
         source: a shipped map, or the name of a city's file.
         years: that a shipped map lives; None for an import.
-        seed: of what happens.
         sha256: digest of the file.
     """
 
@@ -231,8 +229,6 @@ def measure_maps(
     """Maps two drives, and scores methods by exact labels.
 
     Args:
-        database: the older drive, simulated or recorded.
-        query: the newer one.
         methods: see `score_methods`.
         spacing: way between two scans [m].
 
@@ -261,9 +257,6 @@ def update_pairs(
 
     Writes `map_update.csv`, a row for each pair and method, and a figure.
     Finished pairs are not repeated.
-
-    Args:
-        pairs: the pairs.
 
     Returns:
         The path of the table.

@@ -306,14 +306,7 @@ def observed(
 
 @dataclass(frozen=True)
 class _Look:
-    """What a LiDAR observes from a place.
-
-    Attributes:
-        scene: the world as it was then.
-        X_WS: pose of the LiDAR.
-        pattern: the pattern of its beams.
-        coverage: what their directions cover.
-    """
+    """What a LiDAR observes from a place."""
 
     scene: RayCastingScene
     X_WS: RigidTransform

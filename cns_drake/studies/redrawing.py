@@ -49,8 +49,6 @@ def redraw_cities(
 
     Args:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
-        stage: name of the only stage, the whole city.
-        output: the folder of cities; created if need be.
 
     Returns:
         Seed -> map folder of that city, `<output>/<map>_c<seed>`, absolute.
@@ -83,9 +81,7 @@ class RedrawCity(Step):
     """Draws the city of a map anew.
 
     Attributes:
-        map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city.
-        seed: the seed of the city.
         folder: the map folder to write; an older redrawn city of this name is
             replaced, anything else is refused.
     """
@@ -127,11 +123,7 @@ class RedrawCity(Step):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes inputs that depend on the city itself.
-
-        Args:
-            draft: the folder with all others.
-        """
+        """Writes inputs that depend on the city itself."""
 
     def sources(self) -> dict[str, object]:
         """Returns all that the city depends on, ready for JSON."""
@@ -148,7 +140,6 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     """Returns the inputs of a map's city drawn anew.
 
     Args:
-        map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city. The map's own
             stages name structures that another draw need not have.
 

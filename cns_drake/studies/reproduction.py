@@ -199,11 +199,7 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
 def recording_info(
     scenario: Scenario, output: Path, is_waiting: bool
 ) -> RecordingInfo:
-    """Returns the description of a recording before it is made.
-
-    Args:
-        is_waiting: whether the recording's job has to be done first.
-    """
+    """Returns the description of a recording before it is made."""
     assert scenario.stage is not None  # It has a map.
     return RecordingInfo(
         name=scenario.name,

@@ -48,7 +48,6 @@ def measure_sizes(
 
     Args:
         map_name: name or folder of the map whose last drive asks.
-        sizes: numbers of places of other cities.
 
     Returns:
         The path of `size.csv`.

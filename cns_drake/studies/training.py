@@ -280,8 +280,6 @@ def train(
     """Trains a network.
 
     Args:
-        steps: number of batches.
-        seed: seed of the first weights and of all batches.
         state: file that keeps the state; a training that was interrupted goes
             on from there.
 
@@ -419,7 +417,6 @@ def write_weights(
 
     Args:
         seen: least and greatest part of the sectors with a point in training.
-        made_by: what made them, ready for JSON.
     """
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
@@ -444,9 +441,6 @@ class TrainingPlan:
     """What a training sees, and for how long.
 
     Attributes:
-        cities: number of drawn cities.
-        steps: number of batches.
-        seed: seed of everything.
         change: whether drives see different stages, and passing changes.
         returns: whether some have calibrated returns and weather.
         driver: whether drivers wander and change lanes.

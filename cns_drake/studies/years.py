@@ -85,15 +85,7 @@ _AGE_COST, _MAP_COST = 40.0, 20.0
 
 @dataclass(frozen=True)
 class AgeCity(Step):
-    """Lets a city live.
-
-    Attributes:
-        source: the folder of the map.
-        years: of the stages.
-        seed: of its history.
-        rates: event -> rate a year.
-        folder: the map folder to write.
-    """
+    """Lets a city live."""
 
     source: Path
     years: tuple[int, ...]
@@ -161,8 +153,6 @@ def measure_years(
         rates: event -> rate a year.
         directions: whether the database is of today, the query, or both in
             turn.
-        localises: also localise the queries in the maps of the databases.
-        updates: also score baselines that find the changes of the maps.
 
     Returns:
         The path of `years.csv`, and the findings.

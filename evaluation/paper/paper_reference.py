@@ -132,8 +132,6 @@ class Trend:
         rho: Spearman's rank correlation; NaN if either does not vary.
         p_value: two-sided, of no correlation.
         slope: slope of the least-squares line, AUC for 0.1 of TCR_sym.
-        spread: greatest less least AUC.
-        num_pairs: how many.
     """
 
     rho: float

@@ -22,13 +22,7 @@ _LEAST_POINTS = 5
 def draw_pr_curves(
     map_name: str, results: Sequence[RecognitionResult], stem: Path
 ) -> None:
-    """Draws precision over recall: a column for each pair, a row for each mode.
-
-    Args:
-        map_name: name of the city.
-        results: one for each of its pairs and methods.
-        stem: path to write, without ending.
-    """
+    """Draws precision over recall, a column a pair and a row a mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
     figure = Figure(figsize=(0.4 + 2.7 * len(pairs), 5.4), layout="constrained")
     grid = figure.subplots(
@@ -66,9 +60,6 @@ def draw_auc_over_change(
     them are the reference's values, if there are any.
 
     Args:
-        results: one for each pair and method.
-        changes: each pair's TCR_sym.
-        stem: path to write, without ending.
         reference: published values to draw beside ours.
     """
     methods = in_table_order(result.method for result in results)
@@ -195,7 +186,6 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
 
     Args:
         rows: (K,) of `TRACKED`.
-        stem: path to write, without ending.
     """
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))

@@ -79,7 +79,6 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
     letters that can be read on a phone.
 
     Args:
-        figure: to write.
         stem: path without ending.
         kinds: the formats, `LINES` or `PIXELS`.
 

@@ -62,9 +62,7 @@ class LadderRung:
     """The change between two drives.
 
     Attributes:
-        map_name: name of the city.
         database: name of the drive along the database's route.
-        query: name of the query drive.
         cause: what changes; `none` without a change.
         level: its strength, from 1 to 4; 0 without a change.
         strength: in words.
@@ -85,8 +83,6 @@ class MeasuredRung:
     """The outcomes of all methods on a rung, with one random draw.
 
     Attributes:
-        rung: the rung.
-        seed: number of the draw.
         drives: fingerprint of the drives.
         outcomes: one for each method, without and with the gate.
     """
@@ -102,7 +98,6 @@ class LadderRow:
     """A method on a rung: means over the draws.
 
     Attributes:
-        rung: the rung.
         drives: fingerprint of the drives of all draws.
         draws: outcome of each draw.
         unchanged: those on the rung `none` of the same map.
@@ -303,8 +298,6 @@ def ladder_table(
     """Returns one row for each rung, method and gate.
 
     Args:
-        rows: rows for all maps.
-        protocol: that all rungs share.
         viewpoint: name of the database's place beside the queries.
     """
     options: Columns[LadderRow] = keyed(
@@ -368,7 +361,6 @@ def crossed_rows(
     """Compares pairs of causes with each cause alone.
 
     Args:
-        rows: rows for all maps, with single causes.
         pairs: rows with two, whose names are joined by "+".
     """
     strongest = _strongest(rows)

@@ -94,16 +94,12 @@ class Report:
         survivals: place recognition of all pairs, with their controls.
         recognitions: the same results without controls, and those of drives
             compared with themselves.
-        differences: AUC of each two methods, compared.
         evidence: (database, query) -> evidence why best places are wrong.
         tracks: drive -> its track, also for the controls.
         drives: name -> drive, for all drives of a pair.
         illustrations: figures, already written.
-        costs: costs of the methods; empty if they were not measured.
-        notes: cities without a pair to compare.
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
-        reference: published numbers and claims.
         repeated: results by the protocol of the published numbers, if that is
             another one.
     """

@@ -129,13 +129,7 @@ def change_table(
     reference: Reference = NO_REFERENCE,
     evidence: Evidence = MappingProxyType({}),
 ) -> Table:
-    """Returns Table I: the change of each pair, and its parts.
-
-    Args:
-        results: for all pairs.
-        reference: its published values stand beside ours, and below.
-        evidence: for the visible change of pairs.
-    """
+    """Returns Table I: the change of each pair, and its parts."""
 
     def visible(one: ChangeResult) -> tuple[float | None, int | None]:
         return _visible_change(evidence, one.report.source, one.report.target)
@@ -245,12 +239,8 @@ def recognition_table(
     F1 is only in the form that is compared with the reference.
 
     Args:
-        results: for all pairs and methods.
-        changes: for the TCR_sym of the pairs.
         mode: mode in which methods are counted; None for the mode that the
             reference used for each.
-        reference: its values stand beside ours.
-        evidence: for the visible change of the pairs.
 
     Raises:
         InputError: results of two protocols.
@@ -401,8 +391,6 @@ class MethodDifference(NamedTuple):
     """Two results of a pair, with the difference of their AUC.
 
     Attributes:
-        result: of the first method.
-        other: of the second one.
         difference: the first less the second.
         p_value: corrected for the number of all differences; NaN if unknown.
     """
@@ -543,7 +531,6 @@ def fault_table(
     """Returns the reasons for wrong best places for print.
 
     Args:
-        results: for all pairs and methods.
         evidence: a pair without it has no row.
     """
 
@@ -672,7 +659,6 @@ class _Queries(NamedTuple):
 
     Attributes:
         pair: map, database and query.
-        result: the result.
         query, match: moments of the queries, and of their best places.
         distances: to the best places [m]; NaN without one.
         evidence: for the pair; None if there is none.
@@ -742,7 +728,6 @@ def query_table(
     """Returns a row for each pair, method and query, in the queries' order.
 
     Args:
-        results: each with its map, database and query.
         tracks: drive -> its track, for all drives.
         evidence: why best places are wrong; its columns are empty for pairs
             without it.

@@ -190,7 +190,6 @@ def draw_survival(
     Args:
         survivals: one for each pair and method; at least one has a
             control.
-        stem: path to write, without ending.
         beaten: pair and name of methods that another beats with the change,
             beyond doubt.
     """

@@ -47,12 +47,8 @@ def explain_faults(
     """Returns the evidence of two drives; None if a drive closes no loop.
 
     Args:
-        reporter: takes the progress.
         surveyed: the `SurveyedDrive` and the `KeptScans` of the database, and
             of the query.
-        methods: the methods.
-        results: their `RecognitionResult` on the two drives.
-        protocol: the protocol of these results.
     """
     found = []
     for choice, part in zip(methods, results, strict=True):
@@ -77,11 +73,7 @@ def find_evidence(
     """Compares the scans of queries, of their matches and of wrong answers.
 
     Args:
-        database: the drive of the places.
-        query: the drive of the queries, in the same world frame.
         results: what one method or several found on the two.
-        protocol: that of these results.
-        track: reports progress.
 
     Raises:
         InputError: a scan cannot be read.

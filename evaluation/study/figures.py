@@ -29,8 +29,6 @@ def draw_city(
     """Draws the routes of a city; returns its drives for the page, by name.
 
     Args:
-        reporter: takes the progress.
-        map_name: the name of the city.
         stages: the name of each, and its drive's `SurveyedDrive` and cloud.
         stem: path of the figure, without ending.
     """
@@ -60,8 +58,6 @@ def draw_changes(
     """Draws what changed between two stages, and the sets of the TCR.
 
     Args:
-        reporter: not used.
-        change: the `ChangeResult`.
         drives: `SurveyedDrive` and cloud of the earlier drive, and of the later
             one.
         stems: paths of the two figures, without endings.
@@ -164,7 +160,6 @@ def auc_illustration(folder: Path, beside: str = "") -> Illustration:
     """Returns the figure of all cities together.
 
     Args:
-        folder: the folder of figures.
         beside: title of the reference in the figure; empty for none.
     """
     others = f", and of {beside}" if beside else ""

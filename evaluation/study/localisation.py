@@ -42,7 +42,6 @@ class ComparedPair:
     Attributes:
         rung: the change between them; the drive of the map is the database.
         sources: open both drives.
-        seed: number of the random draw.
     """
 
     rung: LadderRung

@@ -34,9 +34,6 @@ def measure_change(
     """Returns the change between two drives; they must be of one world.
 
     Args:
-        reporter: not used.
-        map_name: the name of the city.
-        stages: the stage of the earlier drive, and of the later one.
         drives: the `SurveyedDrive` of the earlier drive, of the later one, and
             of their control if there is one.
     """
@@ -90,13 +87,8 @@ def measure_costs(
     """Returns the cost of each method, measured on one core.
 
     Args:
-        reporter: takes the progress.
-        source: opens the query drive.
-        surveyed: the `SurveyedDrive` of the query drive.
-        methods: to measure.
         described: each method's descriptions of a database, and of the query
             drive.
-        protocol: the protocol of the descriptions.
     """
     drive, known = source(), surveyed.read()
     # A recording would be unpacked as a whole for its poses.

@@ -194,11 +194,7 @@ def _find(module: str, name: str) -> Any:
 
 @dataclass(frozen=True)
 class Part:
-    """An intermediate result in a file.
-
-    Attributes:
-        path: the file, which need not exist yet.
-    """
+    """An intermediate result in a file."""
 
     path: Path
 
@@ -207,7 +203,6 @@ class Part:
 
         Args:
             inputs: all that the value depends on, ready for JSON.
-            value: a value of types that `encode` can keep.
 
         Raises:
             InputError: if it cannot be kept or written.
@@ -294,7 +289,6 @@ class MakePart(Step):
     """Writes what a function returns as a part.
 
     Attributes:
-        part: the file to write.
         function: a function of a module, whose code counts as an input; it
             takes a `Reporter` before the arguments.
         arguments: the inputs. Each is plain, a dataclass of plain values, a
@@ -355,9 +349,6 @@ class SurveyFiles:
     A key is the name of a method, or a `described_key`.
 
     A job that needs one method's descriptions reads no other's.
-
-    Attributes:
-        folder: the folder of the parts.
     """
 
     folder: Path
@@ -387,9 +378,6 @@ class RecognitionFiles:
     """The parts that hold the results of methods on two recordings.
 
     A key is the name of a method, or a `described_key`.
-
-    Attributes:
-        folder: the folder of the parts.
     """
 
     folder: Path
@@ -406,11 +394,7 @@ class RecognitionFiles:
 
 @dataclass(frozen=True)
 class StudyFiles:
-    """The files of a study.
-
-    Attributes:
-        output: the folder of the study.
-    """
+    """The files of a study."""
 
     output: Path
 

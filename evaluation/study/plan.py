@@ -53,7 +53,6 @@ class Study:
         recordings: each may be made by the jobs that it needs; drives of
             one map that share stage and route with others serve as same-stage
             controls.
-        output: folder to write.
         methods: by default those of this package.
         with_costs: whether to measure the costs of the methods, too, after all
             other jobs.

@@ -154,10 +154,7 @@ class SizePoint:
     Times are of the processor.
 
     Attributes:
-        method: its name.
         others: number of places of other cities.
-        places: number of all places.
-        queries: number of queries.
         auc: without the gate; NaN if all queries would take over an hour.
         r1: R@1, likewise.
         query_ms: of one query, the median of some [ms].
@@ -188,7 +185,6 @@ def measure_size(
     Args:
         database, query: the method's descriptions of both drives.
         distractors: likewise of drives through other cities.
-        num_distractors: number of their places in the database.
     """
     method = choice.make()
     (_, mapped), (_, asked) = database.read(), query.read()

@@ -101,12 +101,7 @@ class DriveSource(Protocol):
 
 @dataclass(frozen=True)
 class RecordedDrive:
-    """A drive on disk, in any format that can be read.
-
-    Attributes:
-        path: the file or folder of the drive.
-        lidar: name of the LiDAR, for a drive with several.
-    """
+    """A drive on disk, in any format that can be read."""
 
     path: Path
     lidar: str | None = None
@@ -147,10 +142,8 @@ class SurveyedDrive:
     """A drive with its map on the grid of the TCR.
 
     Attributes:
-        placed: name and world of the drive.
         stamps_ns: (N,) int64 of its frames.
         X_WS: (N, 4, 4) poses of the sensor along the drive.
-        coarse: the map.
         frames: (K,) frames that are places or queries, increasing; none if
             the drive has no role.
         thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
@@ -366,7 +359,6 @@ class Survey(Step):
 
     Attributes:
         roles, with_scans, with_map: see `survey_recording`.
-        files: the parts to write.
         further: descriptions by a second protocol; none without a role.
     """
 

@@ -170,10 +170,6 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
     The line is smooth, or straight from point to point where points are few.
 
     A second panel shows the kept share of AUC, if databases have controls.
-
-    Args:
-        points: those of all databases and methods.
-        stem: path to write, without ending.
     """
     survives = any(not math.isnan(point.kept) for point in points)
     figure = Figure(

@@ -45,14 +45,9 @@ class TrendPoint:
     """A method on one database.
 
     Attributes:
-        database: name of the drive.
-        method: its name.
-        tcr_sym: between database and query.
         auc, auc_low, auc_high: with its 95 % interval over blocks of the
             route.
         recall_at_1: over queries with a match.
-        queries, with_match: numbers of queries, and of those with a match.
-        protocol: that of place recognition.
         auc_strict: with recall = TP / N.
         auc_unchanged: AUC of the database's control; NaN without one.
         visible_change: mean over queries, see `PairEvidence`.
@@ -90,7 +85,6 @@ class TrendDatabase:
     """A database drive and its control.
 
     Attributes:
-        source: opens it.
         control: name of the drive on its route through the city of the
             query; None if there is none.
     """
@@ -117,17 +111,8 @@ def measure_trend(
     the surveys of many would fill a disk.
 
     Args:
-        query: the query drive.
-        databases: the drives whose places are searched.
-        output: folder for intermediate results, made if needed.
-        cluster: where the work is done.
-        own_methods: Python files with one method each, to run besides those
-            of this package.
-        protocol: that of place recognition.
         controls: drives on the routes of databases, but in the stage of the
             query; each serves the databases whose route it has.
-        lidar: name of the LiDAR, for recordings with several.
-        settings: `METHOD.NAME=VALUE` of parameters of methods.
 
     Raises:
         InputError: a recording cannot be read, two have one name, a control
@@ -186,16 +171,6 @@ def measure_drives(
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
 ) -> list[TrendPoint]:
     """Returns the points of drives that need not be recorded.
-
-    Args:
-        query_name: name of the query drive.
-        query: opens it.
-        databases: name -> drive whose places are searched.
-        controls: name -> source of a control of databases.
-        output: folder for intermediate results, made if needed.
-        cluster: where the work is done.
-        methods: to run.
-        protocol: that of place recognition.
 
     Raises:
         InputError: see `measure_trend`.
