@@ -12,17 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress_bars import count_progress, show_progress
 from cns_drake.base.terminal import note
-from cns_drake.command_line.options import (
-    LIDAR_OPTION,
-    Frames,
-    Graphviz,
-    Jobs,
-    LidarPreset,
-    Output,
-    Overwrite,
-    Recording,
-    Scheduler,
-)
+from cns_drake.command_line import options
 
 if TYPE_CHECKING:
     from cns_drake.base.jobs.cluster import Cluster
@@ -120,9 +110,9 @@ def simulate(
             help="A shipped drive, or a scenario file of your own.",
         ),
     ],
-    output: Output,
-    frames: Frames = None,
-    lidar: LidarPreset = None,
+    output: options.Output,
+    frames: options.Frames = None,
+    lidar: options.LidarPreset = None,
     returns: Returns = None,
     fog: Fog = None,
     rain: Rain = 0.0,
@@ -166,9 +156,9 @@ def simulate(
             help="Samples of the IMU a second, in place of the scenario's.",
         ),
     ] = None,
-    recording: Recording = None,
-    graphviz: Graphviz = None,
-    overwrite: Overwrite = False,
+    recording: options.Recording = None,
+    graphviz: options.Graphviz = None,
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Simulate a drive and record it.
 
@@ -225,7 +215,7 @@ def scan(
     output: Annotated[
         Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
     ],
-    lidar: Annotated[str, LIDAR_OPTION] = "cns",
+    lidar: Annotated[str, options.LIDAR_OPTION] = "cns",
     returns: Returns = None,
     seed: Annotated[
         int, typer.Option(min=0, metavar="N", help="Seed of noise and weather.")
@@ -255,17 +245,13 @@ def scan(
             make_pattern,
             make_returns,
         )
-        from cns_drake.simulation.scanning import (
-            check_ending,
-            save_scan,
-            scan_world,
-        )
+        from cns_drake.simulation import scanning
 
     if not np.isfinite(pose).all():
         raise InputError("--pose: not finite")
     if max(map(abs, pose)) > LARGEST_SIZE:
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
-    check_ending(output)
+    scanning.check_ending(output)
     config = make_lidar_config(lidar)
     pattern = make_pattern(config)
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
@@ -275,19 +261,19 @@ def scan(
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
     config = config.replaced(returns=chosen or "ideal")
     model = make_returns(config, weather or WeatherConfig(), "lidar", seed)
-    points = scan_world(loaded, X_WS, pattern, model)
-    save_scan(points, output)
+    points = scanning.scan_world(loaded, X_WS, pattern, model)
+    scanning.save_scan(points, output)
     typer.echo(f"{output}: {len(points)} points")
 
 
 def generate(
     names: DriveNames = None,
     *,
-    output: Output,
-    frames: Frames = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    overwrite: Overwrite = False,
+    output: options.Output,
+    frames: options.Frames = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    overwrite: options.Overwrite = False,
     vary: Annotated[
         Path | None,
         typer.Option(

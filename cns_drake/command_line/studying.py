@@ -13,17 +13,8 @@ from cns_drake.base.drives.drive import PlacedDrive, check_same_map
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
+from cns_drake.command_line import options
 from cns_drake.command_line.maps import RateFactor, RatesFile, maps_and_years
-from cns_drake.command_line.options import (
-    Jobs,
-    Maps,
-    MethodFiles,
-    Output,
-    Results,
-    Scheduler,
-    Task,
-    TaskName,
-)
 from cns_drake.command_line.simulating import family_members
 from evaluation.command_line.options import Costs, Settings, with_named_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -35,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def _run_task(
-    task: Task,
+    task: options.Task,
     pairs: Sequence[ComparedPair],
     output: Path,
     cluster: Cluster,
@@ -43,7 +34,7 @@ def _run_task(
     own_methods: Sequence[Path] | None,
 ) -> Path:
     """Runs a task other than `PLACE` on pairs of drives; returns its table."""
-    if task is Task.LOCALISE:
+    if task is options.Task.LOCALISE:
         from evaluation.study.localisation import SHIPPED, localise_pairs
 
         methods = (*SHIPPED, *map(str, own_methods or ()))
@@ -60,11 +51,11 @@ def _run_task(
 
 @with_named_protocol
 def reproduce(
-    maps: Maps = None,
+    maps: options.Maps = None,
     *,
-    output: Output,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    output: options.Output,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
     pages: Annotated[
         bool | None,
         typer.Option(
@@ -80,35 +71,32 @@ def reproduce(
             help="Only the report: simulate without recording.",
         ),
     ] = False,
-    method: MethodFiles = None,
+    method: options.MethodFiles = None,
     parameter: Settings = None,
     costs: Costs = True,
-    task: TaskName = Task.PLACE,
+    task: options.TaskName = options.Task.PLACE,
     protocol: RetrievalProtocol,
 ) -> None:
     """Simulate a map, evaluate it and report."""
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.reproduction import (
-            reproduce_maps,
-            stage_pairs,
-        )
+        from cns_drake.studies import reproduction
 
     cluster = choose_cluster(jobs, scheduler)
     if quick and pages:
         raise InputError(
             "--quick and --pages exclude each other; give one of them"
         )
-    if task is not Task.PLACE:
+    if task is not options.Task.PLACE:
         if parameter or pages:
             raise InputError(
                 f"--task {task.value}: leave out --set and --pages"
             )
-        drives = stage_pairs(maps, output)
+        drives = reproduction.stage_pairs(maps, output)
         spacing = protocol.query_spacing
         typer.echo(_run_task(task, drives, output, cluster, spacing, method))
         return
-    report = reproduce_maps(
+    report = reproduction.reproduce_maps(
         maps,
         output,
         cluster,
@@ -132,7 +120,7 @@ def fresh(
         ),
     ] = None,
     *,
-    output: Results,
+    output: options.Results,
     number: Annotated[
         list[int] | None,
         typer.Option(
@@ -140,9 +128,9 @@ def fresh(
             help="A version, from 1 to 5; may be repeated. All by default.",
         ),
     ] = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    method: MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    method: options.MethodFiles = None,
     protocol: RetrievalProtocol,
 ) -> None:
     """Evaluate cities that no method has seen.
@@ -169,9 +157,9 @@ def fresh(
 
 
 def ladder(
-    maps: Maps = None,
+    maps: options.Maps = None,
     *,
-    output: Results,
+    output: options.Results,
     quick: Annotated[
         bool,
         typer.Option(
@@ -217,10 +205,10 @@ def ladder(
             help="Repeat all random draws N times, and give means.",
         ),
     ] = 1,
-    task: TaskName = Task.PLACE,
-    method: MethodFiles = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    task: options.TaskName = options.Task.PLACE,
+    method: options.MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
 ) -> None:
     """What each change costs each method.
 
@@ -231,43 +219,39 @@ def ladder(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.studies import ladder_rungs
         from cns_drake.studies.ladder import (
             QUICK_EXTENT,
             QUICK_PROTOCOL,
             climb_ladder,
             rung_pairs,
         )
-        from cns_drake.studies.ladder_rungs import (
-            CAUSES,
-            EXTRAS,
-            NEAR,
-            VIEWPOINTS,
-            Extent,
-        )
         from cns_drake.studies.levels import LEVELS_EXTENT, LEVELS_PROTOCOL
         from evaluation.recognition.protocol import DEFAULT_PROTOCOL
         from evaluation.study.chosen_methods import choose_methods
 
-    if viewpoint not in VIEWPOINTS:
-        known = ", ".join(VIEWPOINTS)
+    if viewpoint not in ladder_rungs.VIEWPOINTS:
+        known = ", ".join(ladder_rungs.VIEWPOINTS)
         raise InputError(
             f"--viewpoint: no viewpoint {viewpoint!r} (there are: {known})"
         )
-    is_own = quick or cause or seeds > 1 or pairs or viewpoint != NEAR
+    is_own = (
+        quick or cause or seeds > 1 or pairs or viewpoint != ladder_rungs.NEAR
+    )
     if levels and is_own:
         raise InputError(
             "--levels: the levels are frozen; leave out --quick, --cause, "
             "--seeds, --pairs and --viewpoint"
         )
-    if task is not Task.PLACE and (levels or pairs):
+    if task is not options.Task.PLACE and (levels or pairs):
         raise InputError(f"--task {task.value}: leave out --levels and --pairs")
     cluster = choose_cluster(jobs, scheduler)
-    causes = tuple(cause or CAUSES)
+    causes = tuple(cause or ladder_rungs.CAUSES)
     for name in causes:
-        if name not in (*CAUSES, *EXTRAS):
-            known = ", ".join((*CAUSES, *EXTRAS))
+        if name not in (*ladder_rungs.CAUSES, *ladder_rungs.EXTRAS):
+            known = ", ".join((*ladder_rungs.CAUSES, *ladder_rungs.EXTRAS))
             raise InputError(f"--cause: no cause {name!r} (there are: {known})")
-    extent, protocol = Extent(), DEFAULT_PROTOCOL
+    extent, protocol = ladder_rungs.Extent(), DEFAULT_PROTOCOL
     if quick:
         extent, protocol = QUICK_EXTENT, QUICK_PROTOCOL
         note(
@@ -282,7 +266,7 @@ def ladder(
     )
     if levels:
         extent, protocol = LEVELS_EXTENT, LEVELS_PROTOCOL
-    if task is not Task.PLACE:
+    if task is not options.Task.PLACE:
         rungs = rung_pairs(maps, extent, note)
         spacing = protocol.query_spacing
         typer.echo(_run_task(task, rungs, output, cluster, spacing, method))
@@ -330,7 +314,7 @@ def size(
         typer.Argument(metavar="MAP", help="The map that is asked about."),
     ],
     *,
-    output: Results,
+    output: options.Results,
     places: Annotated[
         list[int] | None,
         typer.Option(
@@ -339,9 +323,9 @@ def size(
             "repeated. By default 0, 1000, 10000 and 100000.",
         ),
     ] = None,
-    method: MethodFiles = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    method: options.MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
 ) -> None:
     """AUC and time among many places.
 
@@ -371,7 +355,7 @@ def years(
         list[str],
         typer.Argument(metavar="MAP", help="Maps, by name or folder."),
     ],
-    output: Results,
+    output: options.Results,
     years: Annotated[
         list[int] | None,
         typer.Option(
@@ -409,9 +393,9 @@ def years(
             help="Also score what finds the changes of the maps.",
         ),
     ] = False,
-    method: MethodFiles = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    method: options.MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
 ) -> None:
     """How old a map may be for each method.
 
@@ -462,10 +446,10 @@ def trend(
             help="The query drive: a shipped drive or a scenario file.",
         ),
     ],
-    output: Results,
-    method: MethodFiles = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    output: options.Results,
+    method: options.MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
     parameter: Settings = None,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -479,12 +463,9 @@ def trend(
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.simulated_drive import DriveSimulation
+        from evaluation.study import trend_databases
         from evaluation.study.chosen_methods import choose_methods
         from evaluation.study.trend import write_trend
-        from evaluation.study.trend_databases import (
-            TrendDatabase,
-            measure_drives,
-        )
 
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or (), parameter or ())
@@ -493,11 +474,11 @@ def trend(
     for member in members:
         check_same_map(*map(_placed, (member, query_drive)))
     controls = family_controls(members, query_drive)
-    points = measure_drives(
+    points = trend_databases.measure_drives(
         query_drive.name,
         DriveSimulation(query_drive),
         {
-            member.name: TrendDatabase(
+            member.name: trend_databases.TrendDatabase(
                 DriveSimulation(member), controls[member.name].name
             )
             for member in members

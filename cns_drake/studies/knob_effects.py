@@ -21,12 +21,8 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.study import trend_databases
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.trend_databases import (
-    TrendDatabase,
-    TrendPoint,
-    measure_drives,
-)
 
 _AS_IT_IS = "as_it_is"
 # Variant of the earlier stage -> its title.
@@ -44,7 +40,7 @@ class Effect:
     """A pair of drives with one of the knobs taken back."""
 
     title: str
-    points: tuple[TrendPoint, ...]
+    points: tuple[trend_databases.TrendPoint, ...]
 
 
 def knob_effects(
@@ -62,11 +58,11 @@ def knob_effects(
     with tempfile.TemporaryDirectory(prefix="calibration_") as scratch:
         folder = Path(scratch) / "map"
         drives = _variants(earlier, later, folder)
-        points = measure_drives(
+        points = trend_databases.measure_drives(
             later.name,
             DriveSimulation(later),
             {
-                name: TrendDatabase(DriveSimulation(drive))
+                name: trend_databases.TrendDatabase(DriveSimulation(drive))
                 for name, drive in drives.items()
             },
             {},

@@ -16,13 +16,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
-from cns_drake.studies.ladder_rungs import (
-    ALL,
-    NONE,
-    STRENGTHS,
-    Extent,
-    plan_rungs,
-)
+from cns_drake.studies import ladder_rungs
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.report.tables import Table, in_table_order, title
 
@@ -37,13 +31,15 @@ LEVEL_STRENGTHS: Mapping[str, Mapping[int, Any]] = {
     "furniture": {1: 0.25, 2: 0.33, 3: 0.42, 4: 0.5},
     "traffic": {1: 15, 2: 20, 3: 25, 4: 30},
     "weather": {1: 400.0, 2: 320.0, 3: 250.0, 4: 200.0},
-    "returns": STRENGTHS["returns"],
+    "returns": ladder_rungs.STRENGTHS["returns"],
     "ride": {1: "A", 4: "B"},
     "viewpoint": {1: (2.0, 0), 2: (2.4, 0), 3: (2.7, 0), 4: (3.0, 0)},
     "size": {1: 300},
 }
 # The seed was drawn before any method was run on it.
-LEVELS_EXTENT = Extent(causes=(ALL,), seeds=(4708,), strengths=LEVEL_STRENGTHS)
+LEVELS_EXTENT = ladder_rungs.Extent(
+    causes=(ladder_rungs.ALL,), seeds=(4708,), strengths=LEVEL_STRENGTHS
+)
 LEVELS_PROTOCOL = replace(FAIR_PROTOCOL, query_spacing=20.0)
 # A level is solved when the interval of the best method begins above this.
 _SOLVED = 0.98
@@ -81,7 +77,7 @@ def planned_levels() -> dict[tuple[str, int], str]:
     for name, folder in shipped_maps().items():
         query = load_scenario(MapFolder(folder).recordable_drives()[-1])
         drives: dict[int, list[str]] = {}
-        for rung in plan_rungs(query, LEVELS_EXTENT)[0]:
+        for rung in ladder_rungs.plan_rungs(query, LEVELS_EXTENT)[0]:
             drives.setdefault(rung.level, []).append(rung.fingerprint())
         for level, prints in drives.items():
             found[name, level] = fingerprint({"drives": prints})
@@ -137,7 +133,7 @@ def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
 def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
     columns = ("map", "cause", "level", "method", "gate", "drives")
     for line, row in read_records(file, (*columns, *_NUMBERS)):
-        if row["cause"] not in (NONE, ALL):
+        if row["cause"] not in (ladder_rungs.NONE, ladder_rungs.ALL):
             continue
         where = f"{file}: line {line}"
         try:

@@ -11,12 +11,8 @@ from pathlib import Path
 
 import yaml
 
+from cns_drake.base import files
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    draft_folder,
-    make_folder,
-    user_errors,
-)
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -63,7 +59,7 @@ def redraw_cities(
     load_plan(MapFolder(map_folder).plan)
     for folder in folders.values():
         _is_replaced(folder)
-    make_folder(output)
+    files.make_folder(output)
     jobs = [
         Job(
             name=f"city {folder.name}",
@@ -101,7 +97,7 @@ class RedrawCity(Step):
 
     def run(self, reporter: Reporter) -> None:
         folder, made_of = self.folder, self.sources()
-        with draft_folder(folder, replaces=True) as draft:
+        with files.draft_folder(folder, replaces=True) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)
             try:
@@ -153,7 +149,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     source = MapFolder(map_folder)
     roads, plan = source.roads, source.plan
     load_plan(plan)
-    with user_errors(roads):
+    with files.user_errors(roads):
         network = roads.read_bytes()
     stages = {stage: {"story": f"The whole city, as seed {seed} draws it."}}
     return {
@@ -181,7 +177,7 @@ def to_yaml(title: str, values: dict) -> bytes:
 def _is_replaced(folder: Path) -> bool:
     """Returns whether an older redrawn city has this name."""
     plan = MapFolder(folder).plan
-    with user_errors(folder):
+    with files.user_errors(folder):
         if not os.path.lexists(folder):
             return False
         if not (plan.is_file() and plan.read_bytes().startswith(_MARK)):

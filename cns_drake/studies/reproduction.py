@@ -10,12 +10,8 @@ from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    describe_scenario,
-    load_scenario,
-    map_folder,
-)
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures
@@ -161,7 +157,8 @@ def _surveyed(recording: Job, study: Sequence[Job]) -> Job:
 
 def _drives(folder: Path) -> list[Scenario]:
     drives = [
-        load_scenario(path) for path in MapFolder(folder).recordable_drives()
+        scenario_files.load_scenario(path)
+        for path in MapFolder(folder).recordable_drives()
     ]
     for drive in drives:
         if drive.map is None:
@@ -204,9 +201,9 @@ def recording_info(
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
-        map_name=map_folder(scenario).name,
+        map_name=scenario_files.map_folder(scenario).name,
         stage=scenario.stage,
-        way=driven_way(describe_scenario(scenario)),
+        way=driven_way(scenario_files.describe_scenario(scenario)),
         needs=(scenario.name,) if is_waiting else (),
     )
 

@@ -15,29 +15,9 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example, number
+from evaluation.command_line import options
 from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
-from evaluation.command_line.options import (
-    Align,
-    Costs,
-    Gate,
-    Jobs,
-    Json,
-    LidarName,
-    MethodName,
-    OwnMethods,
-    Parameters,
-    Radius,
-    Scheduler,
-    SensorHeight,
-    Settings,
-    aligned,
-    open_noted,
-    overlap_of,
-    show,
-    with_named_protocol,
-    with_protocol,
-)
 from evaluation.command_line.trajectories import drives, trajectory
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 
@@ -68,9 +48,9 @@ def tcr(
             "A's stage. It gives the TCR_sym that the routes alone cause.",
         ),
     ] = None,
-    align: Align = "auto",
-    lidar: LidarName = None,
-    json: Json = False,
+    align: options.Align = "auto",
+    lidar: options.LidarName = None,
+    json: options.Json = False,
 ) -> None:
     """Structural change of two drives or maps.
 
@@ -102,7 +82,7 @@ def tcr(
             )
     for alignment in alignments:
         terminal.note(alignment.to_text())
-    show(report.to_json(), _change_rows(report), json=json)
+    options.show(report.to_json(), _change_rows(report), json=json)
 
 
 app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(drives)
@@ -114,19 +94,19 @@ app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(drives)
         "    --method scan-context++",
     )
 )
-@with_protocol
+@options.with_protocol
 def pr(
     database: Annotated[Path, typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
-    method: MethodName,
+    method: options.MethodName,
     mode: Annotated[
         Literal["all", "filtered"],
         typer.Option(help="Count all queries, or those that have a match."),
     ] = "all",
-    parameter: Parameters = None,
-    sensor_height: SensorHeight = 1.6,
-    align: Align = "auto",
-    lidar: LidarName = None,
+    parameter: options.Parameters = None,
+    sensor_height: options.SensorHeight = 1.6,
+    align: options.Align = "auto",
+    lidar: options.LidarName = None,
     across_maps: Annotated[
         bool,
         typer.Option(
@@ -180,7 +160,7 @@ def pr(
     seed: Annotated[
         int, typer.Option(help="Seed of the changes of queries.")
     ] = 0,
-    json: Json = False,
+    json: options.Json = False,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -191,16 +171,11 @@ def pr(
     different world frames are aligned.
     """
     from cns_drake.base.errors import InputError
-    from evaluation.recognition import place_recognition
-    from evaluation.recognition.overlap_truth import (
-        compared_frames,
-        read_overlaps,
-        write_overlaps,
-    )
+    from evaluation.recognition import overlap_truth, place_recognition
 
     protocol = replace(
         protocol,
-        overlap=overlap_of(truth),
+        overlap=options.overlap_of(truth),
         turn_queries=turn_queries,
         tilt_queries=tilt_queries,
         hide_sector=hide_sector,
@@ -219,15 +194,15 @@ def pr(
             f"is not {database}"
         )
     chosen = _chosen_method(method, parameter, sensor_height)
-    places, query_drive = aligned(
-        open_noted(database, query, lidar=lidar),
+    places, query_drive = options.aligned(
+        options.open_noted(database, query, lidar=lidar),
         align,
         across_maps=across_maps,
     )
     exact = None
     if exact_overlaps is not None:
-        frames = compared_frames(places, query_drive, protocol)
-        exact = read_overlaps(exact_overlaps, *frames)
+        frames = overlap_truth.compared_frames(places, query_drive, protocol)
+        exact = overlap_truth.read_overlaps(exact_overlaps, *frames)
     result = place_recognition.run(
         places,
         query_drive,
@@ -241,7 +216,7 @@ def pr(
     if overlaps is not None:
         found = result.retrieval
         assert found.overlaps is not None
-        write_overlaps(
+        overlap_truth.write_overlaps(
             overlaps, found.query_frames, found.database_frames, found.overlaps
         )
         terminal.note(f"wrote {overlaps}")
@@ -250,7 +225,7 @@ def pr(
             f"{query}: every scan finds itself (--exclude-recent leaves out "
             "recent places)"
         )
-    show(result.to_json(), _recognition_rows(result), json=json)
+    options.show(result.to_json(), _recognition_rows(result), json=json)
 
 
 @app.command(
@@ -261,14 +236,14 @@ def pr(
     )
 )
 def scores(
-    method: MethodName,
+    method: options.MethodName,
     database: Annotated[Path, typer.Option(help="Folder of single scans.")],
     query: Annotated[Path, typer.Option(help="Folder of single scans.")],
     output: Annotated[Path, typer.Option(help="CSV file to write.")],
-    parameter: Parameters = None,
-    sensor_height: SensorHeight = 1.6,
-    gate: Gate = False,
-    radius: Radius = DEFAULT_PROTOCOL.radius,
+    parameter: options.Parameters = None,
+    sensor_height: options.SensorHeight = 1.6,
+    gate: options.Gate = False,
+    radius: options.Radius = DEFAULT_PROTOCOL.radius,
 ) -> None:
     """Scores of all pairs of scans of folders.
 
@@ -302,16 +277,16 @@ app.command(
 
 
 @app.command(epilog=example("cns-eval report drives --output report"))
-@with_named_protocol
+@options.with_named_protocol
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
-    method: OwnMethods = None,
-    parameter: Settings = None,
-    lidar: LidarName = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    costs: Costs = True,
+    method: options.OwnMethods = None,
+    parameter: options.Settings = None,
+    lidar: options.LidarName = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    costs: options.Costs = True,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -346,7 +321,7 @@ def report(
         "    --query family/riverside_02 --output trend",
     )
 )
-@with_named_protocol
+@options.with_named_protocol
 def trend(
     databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Option(help="The query drive.")],
@@ -359,11 +334,11 @@ def trend(
             "repeated."
         ),
     ] = None,
-    method: OwnMethods = None,
-    lidar: LidarName = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    parameter: Settings = None,
+    method: options.OwnMethods = None,
+    lidar: options.LidarName = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    parameter: options.Settings = None,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -404,7 +379,7 @@ def ranking(
             "only one there is.",
         ),
     ] = None,
-    json: Json = False,
+    json: options.Json = False,
 ) -> None:
     """Whether two reports rank methods alike.
 
@@ -427,7 +402,7 @@ def ranking(
     low, high = map(number, (found.interval.low, found.interval.high))
     tau = f"{number(found.tau)}  (95 %: {low} to {high})"
     rows = [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
-    show(found.to_json(), rows, json=json)
+    options.show(found.to_json(), rows, json=json)
 
 
 app.command(

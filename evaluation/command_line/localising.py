@@ -9,15 +9,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
-from evaluation.command_line.options import (
-    Align,
-    Jobs,
-    Json,
-    LidarName,
-    Parameters,
-    aligned,
-    show,
-)
+from evaluation.command_line import options
 
 
 def localise(
@@ -38,7 +30,7 @@ def localise(
         float, typer.Option(help="Angle of a start to the truth [deg].")
     ] = 2.0,
     seed: Annotated[int, typer.Option(help="Seed of the starts.")] = 0,
-    parameter: Parameters = None,
+    parameter: options.Parameters = None,
     query_spacing: Annotated[
         float,
         typer.Option(help="Distance between two queries along the path [m]."),
@@ -58,9 +50,9 @@ def localise(
             "many degrees for each metre.",
         ),
     ] = 0.01,
-    align: Align = "auto",
-    lidar: LidarName = None,
-    jobs: Jobs = None,
+    align: options.Align = "auto",
+    lidar: options.LidarName = None,
+    jobs: options.Jobs = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -69,7 +61,7 @@ def localise(
             "picture.",
         ),
     ] = None,
-    json: Json = False,
+    json: options.Json = False,
 ) -> None:
     """Localisation of scans in a map.
 
@@ -86,32 +78,27 @@ def localise(
     from cns_drake.base.process import num_cores
     from evaluation.change.drive_change import open_source
     from evaluation.drives import Drive, check_same_world
+    from evaluation.localisation import estimators, tracking
     from evaluation.localisation import localise as queries
-    from evaluation.localisation import tracking
-    from evaluation.localisation.estimators import (
-        default_settings,
-        make_estimator,
-        make_map,
-    )
     from evaluation.study.chosen_methods import parse_setting
 
     starts = queries.Starts(start, start_turn, seed)
     if not (math.isfinite(query_spacing) and query_spacing > 0.0):
         raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
     tracking.check_drift(odometry_drift)
-    settings = default_settings(method).with_values(
+    settings = estimators.default_settings(method).with_values(
         map(parse_setting, parameter or [])
     )
-    estimator = make_estimator(method, settings)
+    estimator = estimators.make_estimator(method, settings)
     source = open_source(place, lidar)
     drive = queries.as_query(open_source(query, lidar))
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)
     if isinstance(source, Drive):
-        source, drive = aligned((source, drive), align)
+        source, drive = options.aligned((source, drive), align)
         check_same_world(source, drive)
-    surroundings = make_map(source, settings, terminal.track)
+    surroundings = estimators.make_map(source, settings, terminal.track)
     is_mapped = queries.mapped_frames(source, surroundings, drive)
     localiser = queries.Localiser(surroundings, estimator, settings)
     if output is not None:
@@ -148,7 +135,7 @@ def localise(
     if output is not None:
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
-    show(values, _rows(values), json=json)
+    options.show(values, _rows(values), json=json)
 
 
 def _rows(values: dict) -> Iterator[tuple[str, str]]:

@@ -55,14 +55,9 @@ def map_update(
     """
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
+    from evaluation.map_update import sessions
     from evaluation.map_update.baselines import run_baseline
     from evaluation.map_update.scores import Labels, score
-    from evaluation.map_update.sessions import (
-        read_labels,
-        read_pair,
-        read_truth,
-        write_labels,
-    )
     from evaluation.map_update.structures import class_names
 
     if (labels_a is None) != (labels_b is None):
@@ -71,20 +66,20 @@ def map_update(
         raise InputError("--baseline: not together with --labels-a")
     if output is not None:
         make_folder(output)
-    pair = read_pair(folder)
-    truth = Labels(*read_truth(pair))
+    pair = sessions.read_pair(folder)
+    truth = Labels(*sessions.read_truth(pair))
     name = "labels"
     if labels_a is not None and labels_b is not None:
         found = Labels(
-            read_labels(labels_a, pair.A, truth=False),
-            read_labels(labels_b, pair.B, truth=False),
+            sessions.read_labels(labels_a, pair.A, truth=False),
+            sessions.read_labels(labels_b, pair.B, truth=False),
         )
     else:
         name = (baseline or BaselineName.FREE_SPACE).value
         found = run_baseline(name, pair, terminal.track)
     if output is not None:
         for session, labels in zip(pair, found, strict=True):
-            write_labels(output / f"{session.side}.npy", labels)
+            sessions.write_labels(output / f"{session.side}.npy", labels)
     scores = score(pair, truth, found, class_names(folder))
     if json:
         terminal.print_json({"method": name, **scores})

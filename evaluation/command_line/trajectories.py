@@ -10,14 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cns_drake.base import terminal
-from evaluation.command_line.options import (
-    Align,
-    Json,
-    LidarName,
-    aligned,
-    open_noted,
-    show,
-)
+from evaluation.command_line import options
 
 if TYPE_CHECKING:
     from evaluation.drives.comparison import DriveComparison
@@ -26,9 +19,9 @@ if TYPE_CHECKING:
 def drives(
     first: Annotated[Path, typer.Argument(metavar="A")],
     second: Annotated[Path, typer.Argument(metavar="B")],
-    align: Align = "auto",
-    lidar: LidarName = None,
-    json: Json = False,
+    align: options.Align = "auto",
+    lidar: options.LidarName = None,
+    json: options.Json = False,
 ) -> None:
     """How the ways of two drives differ.
 
@@ -38,9 +31,11 @@ def drives(
     """
     from evaluation.drives.comparison import compare_drives
 
-    pair = aligned(open_noted(first, second, lidar=lidar), align)
+    pair = options.aligned(
+        options.open_noted(first, second, lidar=lidar), align
+    )
     found = compare_drives(*pair)
-    show(found.to_json(), _drive_rows(found), json=json)
+    options.show(found.to_json(), _drive_rows(found), json=json)
 
 
 def trajectory(
@@ -59,8 +54,8 @@ def trajectory(
             metavar="S", help="Time to add to that of the estimate [s]."
         ),
     ] = 0.0,
-    lidar: LidarName = None,
-    json: Json = False,
+    lidar: options.LidarName = None,
+    json: options.Json = False,
 ) -> None:
     """Errors of an estimated trajectory.
 
@@ -72,7 +67,7 @@ def trajectory(
     from evaluation.alignment.trajectory_errors import trajectory_errors
     from evaluation.drives.text_tables import read_tum
 
-    (truth,) = open_noted(drive, lidar=lidar)
+    (truth,) = options.open_noted(drive, lidar=lidar)
     errors = trajectory_errors(truth, read_tum(estimate), frame, time_offset)
     if errors.num_outside:
         terminal.note(
@@ -80,7 +75,7 @@ def trajectory(
             " left out"
         )
     named = {"drive": truth.name, "frame": frame}
-    show(named | errors.to_json(), errors.to_rows(), json=json)
+    options.show(named | errors.to_json(), errors.to_rows(), json=json)
 
 
 def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:

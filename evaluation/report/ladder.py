@@ -17,14 +17,7 @@ from matplotlib.patches import Rectangle
 import numpy as np
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.recognition.metrics import (
-    UNKNOWN,
-    Interval,
-    percentile_interval,
-    pr_curve,
-    resampled_metrics,
-    resampled_weights,
-)
+from evaluation.recognition import metrics
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.rung_outcome import FAULTS, RungOutcome
@@ -110,7 +103,7 @@ class LadderRow:
     drives: str
     draws: Sequence[RungOutcome]
     unchanged: Sequence[RungOutcome]
-    auc_interval: Interval
+    auc_interval: metrics.Interval
     kept: Kept
 
     @property
@@ -178,14 +171,16 @@ def _row(
     draws: Sequence[RungOutcome],
 ) -> LadderRow:
     num_queries = len(draws[0].outcomes)
-    weights = resampled_weights(num_queries, blocks=draws[0].outcomes.blocks)
+    weights = metrics.resampled_weights(
+        num_queries, blocks=draws[0].outcomes.blocks
+    )
     samples = _sampled_auc(draws, weights)
-    share = UNKNOWN
+    share = metrics.UNKNOWN
     if len(unchanged[0].outcomes) == num_queries:
         before = _sampled_auc(unchanged, weights)
-        share = percentile_interval(kept_share(samples, before))
+        share = metrics.percentile_interval(kept_share(samples, before))
     none, changed = (
-        float(np.mean([pr_curve(one.outcomes).auc for one in outcomes]))
+        float(np.mean([metrics.pr_curve(one.outcomes).auc for one in outcomes]))
         for outcomes in (unchanged, draws)
     )
     return LadderRow(
@@ -193,7 +188,7 @@ def _row(
         drives,
         draws,
         unchanged,
-        percentile_interval(samples),
+        metrics.percentile_interval(samples),
         Kept(none, changed, share),
     )
 
@@ -203,7 +198,8 @@ def _sampled_auc(
 ) -> np.ndarray:
     """Returns the mean AUC over draws, of samples of the queries."""
     return np.mean(
-        [resampled_metrics(one.outcomes, weights)[0] for one in draws], axis=0
+        [metrics.resampled_metrics(one.outcomes, weights)[0] for one in draws],
+        axis=0,
     )
 
 
@@ -315,7 +311,7 @@ def ladder_table(
 
 def _strict_auc(one: RungOutcome) -> float:
     number = int(one.outcomes.has_match.sum())
-    return pr_curve(one.outcomes).strict_auc(number)
+    return metrics.pr_curve(one.outcomes).strict_auc(number)
 
 
 def strongest_causes(rows: Sequence[LadderRow]) -> list[str]:
@@ -347,7 +343,7 @@ class CrossedRow:
     pair: LadderRow
     alone: tuple[LadderRow, LadderRow]
     excess: float
-    interval: Interval
+    interval: metrics.Interval
 
     @property
     def is_more(self) -> bool:
@@ -371,14 +367,14 @@ def crossed_rows(
             strongest[(*drive, cause)] for cause in pair.rung.cause.split("+")
         )
         draws = (pair.unchanged, one.draws, other.draws, pair.draws)
-        weights = resampled_weights(
+        weights = metrics.resampled_weights(
             len(pair.outcomes), blocks=pair.outcomes.blocks
         )
-        interval = UNKNOWN
+        interval = metrics.UNKNOWN
         if len({len(part[0].outcomes) for part in draws}) == 1:
             none, *kept = (_sampled_auc(part, weights) for part in draws)
             first, second, both = (kept_share(part, none) for part in kept)
-            interval = percentile_interval(first * second - both)
+            interval = metrics.percentile_interval(first * second - both)
         excess = one.kept.share * other.kept.share - pair.kept.share
         found.append(CrossedRow(pair, (one, other), excess, interval))
     return found

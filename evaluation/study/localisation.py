@@ -15,12 +15,7 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from evaluation.localisation import estimators, localise
 from evaluation.localisation.localise import Starts
-from evaluation.report.ladder import (
-    RUNG_COLUMNS,
-    CauseCell,
-    LadderRung,
-    draw_cells,
-)
+from evaluation.report import ladder
 from evaluation.report.tables import Table
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import DriveSource
@@ -44,14 +39,14 @@ class ComparedPair:
         sources: open both drives.
     """
 
-    rung: LadderRung
+    rung: ladder.LadderRung
     sources: tuple[Callable[[], Drive], Callable[[], Drive]]
     seed: int = 1
 
     @property
     def keys(self) -> dict[str, object]:
         """The first columns of a row."""
-        return {name: get(self) for name, get in RUNG_COLUMNS.items()}
+        return {name: get(self) for name, get in ladder.RUNG_COLUMNS.items()}
 
     @property
     def name(self) -> str:
@@ -126,7 +121,7 @@ def localise_pairs(
             queries.append({**keys, **named_columns})
             error = numbers["translation_median"]
             cells.append(
-                CauseCell(
+                ladder.CauseCell(
                     pair.rung.map_name,
                     f"start {start.radius:g} m, {start.turn_deg:g} deg",
                     method,
@@ -140,7 +135,7 @@ def localise_pairs(
     Table.of_rows(summaries).write_csv(table)
     Table.of_rows(queries).write_csv(output / "localisation_queries.csv")
     meaning = "part within 0.3 m and 1 deg; numbers: cm"
-    draw_cells(cells, meaning, output / "localisation")
+    ladder.draw_cells(cells, meaning, output / "localisation")
     return table
 
 

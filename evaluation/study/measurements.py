@@ -9,11 +9,8 @@ from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
+from evaluation.recognition import place_recognition
 from evaluation.recognition.costs import Cost, measure_cost
-from evaluation.recognition.place_recognition import (
-    RecognitionResult,
-    judge_retrieval,
-)
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice
@@ -55,7 +52,7 @@ def recognise_places(
     described: tuple[Part, Part],
     choice: MethodChoice,
     protocol: RetrievalProtocol,
-) -> RecognitionResult | None:
+) -> place_recognition.RecognitionResult | None:
     """Returns the result of a method on two drives of one world.
 
     It is None if a drive is compared with itself and closes no loop.
@@ -70,10 +67,10 @@ def recognise_places(
         # A route need not close a loop.
         reporter.note(f"{query.name}: it never comes back to where it was")
         return None
-    outcome = judge_retrieval(
+    outcome = place_recognition.judge_retrieval(
         method, database.name, query.name, retrieval, protocol
     )
-    return RecognitionResult.of(map_name, stages, outcome)
+    return place_recognition.RecognitionResult.of(map_name, stages, outcome)
 
 
 def measure_costs(

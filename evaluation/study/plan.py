@@ -14,14 +14,9 @@ from evaluation.change.drive_change import symmetric_changes
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.survival import Survival
-from evaluation.report import page
+from evaluation.report import page, result_tables
 from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.result_tables import (
-    DriveTrack,
-    beaten,
-    method_differences,
-)
 from evaluation.report.survival import draw_survival
 from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
@@ -134,7 +129,9 @@ class Study:
             report.notes = nothing_to_compare(self.cities)
         for note in report.notes:
             on_note(note)
-        report.differences = method_differences(report.recognitions)
+        report.differences = result_tables.method_differences(
+            report.recognitions
+        )
         if report.recognitions:
             known = self.reference if report.compared else NO_REFERENCE
             shown = figures.auc_illustration(folder, known.title)
@@ -145,7 +142,7 @@ class Study:
             report.illustrations.insert(0, shown)
         if any(one.unchanged is not None for one in report.survivals):
             shown = figures.survival_illustration(folder)
-            behind = beaten(report.differences)
+            behind = result_tables.beaten(report.differences)
             draw_survival(report.survivals, shown.stem, behind)
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
@@ -374,7 +371,7 @@ class Study:
             for drive in (*pair, *(control or ())):
                 if drive.name not in report.tracks:
                     survey = files.survey(drive.name).drive.read()
-                    report.tracks[drive.name] = DriveTrack(
+                    report.tracks[drive.name] = result_tables.DriveTrack(
                         survey.stamps_ns, survey.X_WS
                     )
         compared = [*(one.changed for one in survivals), *closures]

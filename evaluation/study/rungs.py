@@ -11,12 +11,8 @@ from typing import TypeAlias
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
+from evaluation.recognition import description
 from evaluation.recognition.costs import cpu_ms, query_ms
-from evaluation.recognition.description import (
-    DescribedDrive,
-    DescribedScans,
-    Role,
-)
 from evaluation.recognition.metrics import pr_curve
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -98,11 +94,11 @@ def measure_rung(
 
 def _describe(
     drive: DescribedSource,
-    role: Role,
+    role: description.Role,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
     reporter: Reporter,
-) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
+) -> tuple[list[np.ndarray], Callable[[int], description.DescribedDrive]]:
     """Returns the scans of a drive, and what gives each description once."""
     if isinstance(drive, tuple):
         scans, *parts = drive
@@ -121,8 +117,8 @@ def _describe(
 
 
 def joined_places(
-    drives: Sequence[DescribedScans], num_others: int
-) -> DescribedScans:
+    drives: Sequence[description.DescribedScans], num_others: int
+) -> description.DescribedScans:
     """Returns the places of a drive together with places of others.
 
     Args:
@@ -138,7 +134,7 @@ def joined_places(
         X_WS[:, 0, 3] += number * _APART
         poses.append(X_WS)
     end = len(first.frames) + num_others
-    return DescribedScans(
+    return description.DescribedScans(
         frames=np.concatenate([one.frames for one in drives])[:end],
         stamps_ns=np.concatenate([one.stamps_ns for one in drives])[:end],
         X_WS=np.concatenate(poses)[:end],

@@ -25,12 +25,7 @@ from evaluation.drives.sampling import cropped, within_range
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VOXEL_SIZE, VoxelAccumulator, VoxelMap
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.description import (
-    DescribedDrive,
-    Request,
-    Role,
-    describe_drive,
-)
+from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
@@ -239,7 +234,7 @@ class RecordingSurvey:
     """
 
     placed: PlacedDrive
-    described: dict[str, DescribedDrive]
+    described: dict[str, description.DescribedDrive]
     scans: KeptScans | list[np.ndarray] | None = None
     drive: SurveyedDrive | None = None
     fine: np.ndarray | None = None
@@ -252,14 +247,14 @@ def described_key(method: str, protocol: RetrievalProtocol) -> str:
 
 def survey_recording(
     recording: Drive,
-    roles: Set[Role],
+    roles: Set[description.Role],
     methods: Sequence[Method],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     track: Track = silent,
     *,
     with_scans: bool = False,
     with_map: bool = True,
-    further: Sequence[Request] = (),
+    further: Sequence[description.Request] = (),
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
@@ -305,7 +300,7 @@ def survey_recording(
 
     described = {}
     if roles:
-        found = describe_drive(
+        found = description.describe_drive(
             drive,
             methods,
             roles,
@@ -340,7 +335,7 @@ class Description:
     """What a method describes of a drive by a second protocol."""
 
     method: MethodChoice
-    roles: frozenset[Role]
+    roles: frozenset[description.Role]
     protocol: RetrievalProtocol
 
     @property
@@ -348,7 +343,7 @@ class Description:
         """The `described_key`."""
         return described_key(self.method.name, self.protocol)
 
-    def request(self) -> Request:
+    def request(self) -> description.Request:
         """Returns it as `describe_drive` takes it."""
         return self.method.make(), self.roles, self.protocol
 
@@ -363,7 +358,7 @@ class Survey(Step):
     """
 
     source: DriveSource
-    roles: frozenset[Role]
+    roles: frozenset[description.Role]
     methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
     files: SurveyFiles
@@ -444,7 +439,7 @@ class Survey(Step):
         drive = self.source.identity()
 
         def inputs(
-            roles: Set[Role], protocol: RetrievalProtocol
+            roles: Set[description.Role], protocol: RetrievalProtocol
         ) -> dict[str, object]:
             options = protocol.described(queries="queries" in roles)
             return self.made_of(
