@@ -142,13 +142,18 @@ def fresh(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.fresh_cities import evaluate_fresh_cities
+        from cns_drake.studies.fresh_cities import draw_fresh_cities
+        from cns_drake.studies.reproduction import reproduce_maps
 
-    report = evaluate_fresh_cities(
-        maps or (),
-        number or (),
+    cluster = choose_cluster(jobs, scheduler)
+    cities = draw_fresh_cities(
+        maps or (), number or (), output / "cities", cluster
+    )
+    report = reproduce_maps(
+        [str(folder) for folder in cities],
         output,
-        choose_cluster(jobs, scheduler),
+        cluster,
+        quick=True,
         protocol=protocol,
         own_methods=method or (),
         on_note=note,

@@ -5,8 +5,7 @@ are absent at the earlier stage, and those that are lower there. Each is taken
 back in turn, and the drives are simulated anew.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 import shutil
 import tempfile
@@ -35,18 +34,13 @@ _TITLES = {
 }
 
 
-@dataclass(frozen=True)
-class Effect:
-    """A pair of drives with one of the knobs taken back."""
-
-    title: str
-    points: tuple[trend_databases.TrendPoint, ...]
-
-
 def knob_effects(
     earlier: Scenario, later: Scenario, cluster: Cluster
-) -> list[Effect]:
+) -> dict[str, list[trend_databases.TrendPoint]]:
     """Simulates the pair as it is and with each knob taken back.
+
+    Returns:
+        Title -> a point for each method.
 
     Args:
         earlier: a drive; the database.
@@ -72,13 +66,10 @@ def knob_effects(
             # Cities were fitted to the paper's numbers.
             PAPER_PROTOCOL,
         )
-    return [
-        Effect(
-            _TITLES[name],
-            tuple(point for point in points if point.database == name),
-        )
+    return {
+        _TITLES[name]: [one for one in points if one.database == name]
         for name in drives
-    ]
+    }
 
 
 def _variants(
@@ -124,13 +115,15 @@ def _variants(
     }
 
 
-def effect_lines(effects: Sequence[Effect]) -> Iterator[str]:
+def effect_lines(
+    effects: Mapping[str, Sequence[trend_databases.TrendPoint]],
+) -> Iterator[str]:
     """Yields a table of TCR_sym, and of AUC and R@1 of each method."""
-    methods = [point.method for point in effects[0].points]
+    methods = [point.method for point in next(iter(effects.values()))]
     yield "  ".join(
         [f"{'AUC/R@1':<44} TCR_sym", *(f"{m:>15}" for m in methods)]
     )
-    for effect in effects:
-        numbers = [f"{p.auc:>10.3f}/{p.recall_at_1:.2f}" for p in effect.points]
-        change = effect.points[0].tcr_sym
-        yield "  ".join([f"{effect.title:<44}  {change:.4f}", *numbers])
+    for title, points in effects.items():
+        numbers = [f"{p.auc:>10.3f}/{p.recall_at_1:.2f}" for p in points]
+        change = points[0].tcr_sym
+        yield "  ".join([f"{title:<44}  {change:.4f}", *numbers])

@@ -250,7 +250,7 @@ class RungPlan:
         name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
         if self._viewpoint != ladder_rungs.NEAR:
             name += f" {self._viewpoint}"
-        part = self._files.rung(name)
+        part = self._files.part("rungs", name)
         others = self.distractors if rung.drives.num_distractors else ()
         arguments = (
             source("database", "places"),

@@ -39,7 +39,6 @@ from evaluation.map_update.sessions import Label, read_pair, read_truth
 from evaluation.report.ladder import CauseCell, draw_cells
 from evaluation.report.tables import Table
 from evaluation.study.localisation import ComparedPair, measure_pairs
-from evaluation.study.parts import StudyFiles
 from evaluation.study.surveys import RecordedDrive
 
 # Share of an imported city's buildings that its first stage lacks.
@@ -270,7 +269,7 @@ def update_pairs(
         cluster,
         measure_maps,
         (study_methods(on_note), STUDY_SPACING),
-        StudyFiles.map_scores,
+        "maps",
     )
     rows, cells = [], []
     for pair, of_pair in zip(pairs, found, strict=True):

@@ -28,8 +28,6 @@ from evaluation.study.parts import Part
 _MARK = b"# Of a city drawn anew by cns-drake"
 # The file in its folder with the fingerprint of a city.
 _PART = "drawn.data"
-# Expected time to draw a city [s].
-_COST = 7.0
 
 
 def redraw_cities(
@@ -64,7 +62,6 @@ def redraw_cities(
         Job(
             name=f"city {folder.name}",
             step=RedrawCity(map_folder, stage, seed, folder),
-            cost=_COST,
         )
         for seed, folder in folders.items()
     ]

@@ -90,7 +90,7 @@ def measure_sizes(
     for number in numbers:
         for method in methods:
             name = f"size {number} {method.name}"
-            part = files.rung(name)
+            part = files.part("rungs", name)
             first, *rest = (one.described(method.name) for one in places)
             step = MakePart(
                 part,

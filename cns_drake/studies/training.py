@@ -432,8 +432,6 @@ def write_weights(
 MAPS = ("riverside", "suburbia", "downtown")
 # Cities and batches for each minute of one core.
 _CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
-# Expected time for a city [s].
-_CITY_COST = 60.0
 
 
 @dataclass(frozen=True)
@@ -504,7 +502,6 @@ def make_weights(
         Job(
             f"city {one.number} ({one.map_name})",
             MakePart(part, scan_city, (one, work / f"city_{one.number:03d}")),
-            cost=_CITY_COST,
         )
         for one, part in zip(drawn, parts, strict=True)
     ]

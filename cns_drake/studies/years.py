@@ -79,8 +79,8 @@ QUICK_PROTOCOL = replace(YEARS_PROTOCOL, query_spacing=30.0, place_spacing=10.0)
 _MAP_SPACING = 5.0
 # The file in its folder with the fingerprint of an aged map.
 _PART = "aged.data"
-# Expected seconds: to age a city, and to map it.
-_AGE_COST, _MAP_COST = 40.0, 20.0
+# Expected seconds to map a city.
+_MAP_COST = 20.0
 
 
 @dataclass(frozen=True)
@@ -180,10 +180,7 @@ def measure_years(
     }
     on_note(f"{len(cities)} cities age")
     run_jobs(
-        [
-            Job(f"age {step.folder.name}", step, cost=_AGE_COST)
-            for step in cities.values()
-        ],
+        [Job(f"age {step.folder.name}", step) for step in cities.values()],
         cluster,
     )
     files = StudyFiles(output)
@@ -194,21 +191,22 @@ def measure_years(
     tasks: dict[str, tuple] = {}
     if localises:
         tasks["localise"] = (
-            files.localised,
+            "localised",
             measure_localisation,
             (SHIPPED, ("",) * len(SHIPPED), FAR_STARTS, protocol.query_spacing),
         )
     if updates:
         tasks[MAP_TASK] = (
-            files.map_scores,
+            "maps",
             measure_maps,
             (study_methods(on_note), STUDY_SPACING),
         )
 
     def add_tasks(name: str, drives: RungDrives) -> None:
         both = DriveSimulation(drives.database), DriveSimulation(drives.query)
-        for task, (file, function, arguments) in tasks.items():
-            step = MakePart(file(name), function, (*both, *arguments))
+        for task, (kind, function, arguments) in tasks.items():
+            part = files.part(kind, name)
+            step = MakePart(part, function, (*both, *arguments))
             jobs.append(Job(f"{task} task of {name}", step, cost=_MAP_COST))
             further.setdefault(task, []).append(step.part)
 
@@ -288,7 +286,7 @@ def _values(task: str, found: Any) -> dict[tuple[str, str], tuple[float, int]]:
 
 def _map_job(drive: Scenario, files: StudyFiles, jobs: list[Job]) -> Part:
     """Adds the job that maps a city along a drive; returns its part."""
-    part = files.trend_points("map", drive.name)
+    part = files.part("trend", "map", drive.name)
     step = MakePart(part, map_city, (DriveSimulation(drive), _MAP_SPACING))
     jobs.append(Job(f"map {drive.name}", step, cost=_MAP_COST))
     return part

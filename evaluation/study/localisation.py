@@ -17,7 +17,7 @@ from evaluation.localisation import estimators, localise
 from evaluation.localisation.localise import Starts
 from evaluation.report import ladder
 from evaluation.report.tables import Table
-from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.parts import MakePart, StudyFiles
 from evaluation.study.surveys import DriveSource
 
 # Near starts measure accuracy, far ones the basin [m, deg].
@@ -27,7 +27,6 @@ FAR_STARTS = STARTS[1:]
 SHIPPED = tuple(
     name for name in estimators.METHODS if name != estimators.KISS_MATCHER
 )
-_COST = 60.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ def localise_pairs(
         cluster,
         measure_localisation,
         (named, texts, STARTS, spacing),
-        StudyFiles.localised,
+        "localised",
     )
     summaries, queries, cells = [], [], []
     for pair, of_pair in zip(pairs, found, strict=True):
@@ -149,7 +148,7 @@ def measure_pairs(
     cluster: Cluster,
     function: Callable[..., Any],
     arguments: tuple[object, ...],
-    file: Callable[[StudyFiles, str], Part],
+    kind: str,
 ) -> list[Any]:
     """Returns what a function finds for each pair, once it is measured.
 
@@ -157,19 +156,18 @@ def measure_pairs(
         output: the folder for everything; it is made.
         function: takes a `Reporter`, the sources of a pair, and the arguments.
         arguments: further ones, see `MakePart`.
-        file: gives the file of the pair of a name.
+        kind: see `StudyFiles.part`.
 
     Raises:
         InputError: the folder cannot be made, or a step failed.
     """
     make_folder(output)
     files = StudyFiles(output.absolute())
-    parts = [file(files, pair.name) for pair in pairs]
+    parts = [files.part(kind, pair.name) for pair in pairs]
     jobs = [
         Job(
             f"compare {pair.name}",
             MakePart(part, function, (*pair.sources, *arguments)),
-            cost=_COST,
         )
         for pair, part in zip(pairs, parts, strict=True)
     ]

@@ -30,7 +30,7 @@ from evaluation.study.collection import (
 )
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.parts import MakePart, StudyFiles
-from evaluation.study.surveys import Description, Survey
+from evaluation.study.surveys import Further, Survey
 
 # Expected seconds: for the maps of a drive of 3000 scans, for its places or
 # queries, to draw a city or a change, and to compare two drives by a method.
@@ -146,7 +146,7 @@ class Study:
             draw_survival(report.survivals, shown.stem, behind)
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
-            report.costs = self._files.costs.read()
+            report.costs = self._files.part("costs", "costs").read()
         return page.write_report(report, self.output)
 
     def _pairs(self, city: City) -> list[Pair]:
@@ -201,9 +201,7 @@ class Study:
         ]
         return jobs
 
-    def _further(
-        self, city: City, drive: RecordingInfo
-    ) -> tuple[Description, ...]:
+    def _further(self, city: City, drive: RecordingInfo) -> tuple[Further, ...]:
         """Returns what repetitions describe of a drive."""
         roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]] = {}
         for pair in city.recognition_pairs():
@@ -215,7 +213,7 @@ class Study:
                 if database is drive and not one.shares_places:
                     roles.setdefault(key, set()).add("places")
         return tuple(
-            Description(method, frozenset(needed), protocol)
+            (method, frozenset(needed), protocol)
             for (method, protocol), needed in roles.items()
         )
 
@@ -224,7 +222,7 @@ class Study:
         surveys = [(one.stage, self._files.survey(one.name)) for one in stages]
         stem = self._files.figures / figures.routes_stem(city)
         step = MakePart(
-            self._files.page_drives(city.name),
+            self._files.part("pages", city.name),
             figures.draw_city,
             (
                 city.name,
@@ -242,7 +240,7 @@ class Study:
         drives = [*pair] if control is None else [*pair, control]
         earlier, later = pair
         surveys = tuple(self._files.survey(one.name) for one in drives)
-        change = self._files.change(earlier.name, later.name)
+        change = self._files.part("changes", earlier.name, later.name)
         names = figures.change_stems(city, pair)
         stems = tuple(self._files.figures / name for name in names)
         steps = (
@@ -256,7 +254,7 @@ class Study:
                 ),
             ),
             MakePart(
-                self._files.drawn(names[0]),
+                self._files.part("figures", names[0]),
                 figures.draw_changes,
                 (
                     change,
@@ -338,7 +336,9 @@ class Study:
             self.protocol,
         )
         step = MakePart(
-            self._files.costs, measurements.measure_costs, arguments
+            self._files.part("costs", "costs"),
+            measurements.measure_costs,
+            arguments,
         )
         return Job("costs of the methods", step, needs, _DRAWING_COST)
 
@@ -346,7 +346,7 @@ class Study:
         """Adds the results of a city to a report."""
         files = self._files
         for earlier, later in city.change_pairs():
-            change = files.change(earlier.name, later.name).read()
+            change = files.part("changes", earlier.name, later.name).read()
             report.changes.append(change)
         survivals, closures = [], []
         for pair in self._pairs(city):
@@ -380,7 +380,7 @@ class Study:
             draw_pr_curves(city.name, compared, stem)
         report.survivals += survivals
         report.recognitions += compared
-        report.drives.update(files.page_drives(city.name).read())
+        report.drives.update(files.part("pages", city.name).read())
         report.illustrations += figures.illustrations(city, files.figures)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import io
 import os
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import zstandard
@@ -32,6 +32,8 @@ from evaluation.study.parts import Part, SurveyFiles
 
 # Divisions of a voxel's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 10
+# A method, and what it describes of a drive by a second protocol.
+Further: TypeAlias = "tuple[MethodChoice, frozenset[str], RetrievalProtocol]"
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
 
@@ -331,24 +333,6 @@ def survey_recording(
 
 
 @dataclass(frozen=True)
-class Description:
-    """What a method describes of a drive by a second protocol."""
-
-    method: MethodChoice
-    roles: frozenset[description.Role]
-    protocol: RetrievalProtocol
-
-    @property
-    def key(self) -> str:
-        """The `described_key`."""
-        return described_key(self.method.name, self.protocol)
-
-    def request(self) -> description.Request:
-        """Returns it as `describe_drive` takes it."""
-        return self.method.make(), self.roles, self.protocol
-
-
-@dataclass(frozen=True)
 class Survey(Step):
     """Writes the survey of a drive, or its missing parts.
 
@@ -364,7 +348,7 @@ class Survey(Step):
     files: SurveyFiles
     with_scans: bool = False
     with_map: bool = True
-    further: tuple[Description, ...] = ()
+    further: tuple[Further, ...] = ()
 
     @property
     def output(self) -> Path:
@@ -406,7 +390,11 @@ class Survey(Step):
             reporter.track,
             with_scans=self.with_scans,
             with_map=self.with_map,
-            further=[one.request() for one in self.further if needed(one.key)],
+            further=[
+                (choice.make(), roles, protocol)
+                for choice, roles, protocol in self.further
+                if needed(described_key(choice.name, protocol))
+            ],
         )
 
     def write(
@@ -461,10 +449,11 @@ class Survey(Step):
             for choice in self.methods:
                 part = self.files.described(choice.name)
                 expected[part] = {**own, "method": choice.identity()}
-            for one in self.further:
-                expected[self.files.described(one.key)] = {
-                    **inputs(one.roles, one.protocol),
-                    "method": one.method.identity(),
+            for choice, roles, protocol in self.further:
+                key = described_key(choice.name, protocol)
+                expected[self.files.described(key)] = {
+                    **inputs(roles, protocol),
+                    "method": choice.identity(),
                 }
         return {
             part: made_of

@@ -141,17 +141,6 @@ def _correlations(values: np.ndarray) -> np.ndarray:
     return (ranks[..., :1] * ranks[..., 1:]).sum(axis=-2)
 
 
-def _draw_failures(points: Sequence[TrendPoint], stem: Path) -> None:
-    """Draws what fails over both measures of change."""
-    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
-    panels = figure.subplots(1, len(_CHANGES), sharey=True)
-    for axes, change in zip(panels, _CHANGES, strict=True):
-        _draw_panel(axes, points, "1 - AUC", lambda one: one.failure, change)
-        axes.set_ylim(-0.02, 1.02)
-    _add_legend(panels[0], points)
-    save(figure, stem)
-
-
 def _rounded(value: object) -> object:
     if not isinstance(value, float) or math.isnan(value):
         return value
@@ -166,36 +155,38 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
     A second panel shows the kept share of AUC, if databases have controls.
     """
     survives = any(not math.isnan(point.kept) for point in points)
-    figure = Figure(
-        figsize=(12.0 if survives else 6.4, 4.4), layout="constrained"
-    )
-    panels = figure.subplots(1, 2 if survives else 1, squeeze=False)[0]
+    number = 2 if survives else 1
+    width = 12.0 if survives else 6.4
+    figure = Figure(figsize=(width, 4.4), layout="constrained")
+    panels = figure.subplots(1, number, squeeze=False)[0]
     _draw_panel(panels[0], points, "AUC", lambda point: point.auc)
     panels[0].set_ylim(0.0, 1.02)
     if survives:
-        _draw_panel(
-            panels[1],
-            points,
-            "share of AUC that is kept",
-            lambda point: point.kept,
-        )
+        label = "share of AUC that is kept"
+        _draw_panel(panels[1], points, label, lambda point: point.kept)
         panels[1].set_ylim(bottom=0.0)
         panels[1].axhline(1.0, color="gray", linewidth=0.8)
-    _add_legend(panels[0], points)
+    _save(figure, points, stem)
+
+
+def _draw_failures(points: Sequence[TrendPoint], stem: Path) -> None:
+    """Draws what fails over both measures of change."""
+    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
+    panels = figure.subplots(1, len(_CHANGES), sharey=True)
+    for axes, change in zip(panels, _CHANGES, strict=True):
+        _draw_panel(axes, points, "1 - AUC", lambda one: one.failure, change)
+        axes.set_ylim(-0.02, 1.02)
+    _save(figure, points, stem)
+
+
+def _save(figure: Figure, points: Sequence[TrendPoint], stem: Path) -> None:
+    """Writes a figure with the methods in the legend of its first panel."""
+    handles = [
+        method_entry(method, with_line=True)
+        for method in tables.in_table_order(point.method for point in points)
+    ]
+    figure.axes[0].legend(handles=handles, fontsize=8, framealpha=0.8)
     save(figure, stem)
-
-
-def _add_legend(axes: Axes, points: Sequence[TrendPoint]) -> None:
-    axes.legend(
-        handles=[
-            method_entry(method, with_line=True)
-            for method in tables.in_table_order(
-                point.method for point in points
-            )
-        ],
-        fontsize=8,
-        framealpha=0.8,
-    )
 
 
 def _draw_panel(

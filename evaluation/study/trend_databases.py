@@ -36,9 +36,6 @@ from evaluation.study.surveys import (
     survey_recording,
 )
 
-# Expected seconds for a database.
-_COST = 30.0
-
 
 @dataclass(frozen=True)
 class TrendPoint:
@@ -189,7 +186,7 @@ def measure_drives(
     jobs = [Job(name=f"survey {query_name}", step=step)]
     sources = {name: one.source for name, one in databases.items()}
     sources |= controls
-    parts = {name: files.trend_points(name, query_name) for name in sources}
+    parts = {name: files.part("trend", name, query_name) for name in sources}
     jobs += [
         Job(
             name=f"measure {name}",
@@ -205,7 +202,6 @@ def measure_drives(
                 ),
             ),
             needs=(jobs[0].name,),
-            cost=_COST,
         )
         for name, part in parts.items()
     ]
