@@ -17,6 +17,7 @@ from cns_drake.command_line.simulating import (
     scan,
     simulate,
 )
+from evaluation.command_line.options import explained
 
 # Command -> its example, line by line.
 _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
@@ -88,7 +89,7 @@ for _command, (_first, *_rest) in _EXAMPLES.items():
         context_settings={
             "ignore_unknown_options": _command in (age, studying.years)
         },
-    )(_command)
+    )(explained(_command))
 
 
 def main() -> None:

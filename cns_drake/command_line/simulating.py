@@ -103,13 +103,7 @@ def choose_returns(
 
 
 def simulate(
-    scenario: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME|SCENARIO.yaml",
-            help="A shipped drive, or a scenario file of your own.",
-        ),
-    ],
+    scenario: Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")],
     output: options.Output,
     frames: options.Frames = None,
     lidar: options.LidarPreset = None,
@@ -118,44 +112,14 @@ def simulate(
     rain: Rain = 0.0,
     snowfall: Snowfall = 0.0,
     traffic: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=2000,
-            metavar="N",
-            help="Numbers of vehicles and of walkers, in place of the "
-            "scenario's.",
-        ),
+        int | None, typer.Option(min=0, max=2000, metavar="N")
     ] = None,
     transient: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SWITCH=VALUE,...",
-            help="A passing change and its strength: parked_cars, leaves, "
-            "snow, scaffolds, works, furniture, seed; may be repeated.",
-        ),
+        list[str] | None, typer.Option(metavar="SWITCH=VALUE,...")
     ] = None,
-    driver: Annotated[
-        Literal["real", "none"] | None,
-        typer.Option(
-            help="A driver like those of published drives, who wanders and "
-            "changes lanes, or one who keeps to the middle of his lane.",
-        ),
-    ] = None,
-    ride: Annotated[
-        Literal["A", "B", "C", "D", "E", "none"] | None,
-        typer.Option(
-            help="Put the car on springs, on a road of a class of ISO 8608 "
-            "from A (new) to E (very poor).",
-        ),
-    ] = None,
-    imu_rate: Annotated[
-        int | None,
-        typer.Option(
-            metavar="HZ",
-            help="Samples of the IMU a second, in place of the scenario's.",
-        ),
-    ] = None,
+    driver: Literal["real", "none"] | None = None,
+    ride: Literal["A", "B", "C", "D", "E", "none"] | None = None,
+    imu_rate: Annotated[int | None, typer.Option(metavar="HZ")] = None,
     recording: options.Recording = None,
     graphviz: options.Graphviz = None,
     overwrite: options.Overwrite = False,
@@ -163,6 +127,17 @@ def simulate(
     """Simulate a drive and record it.
 
     The recording is a rosbag2 folder of MCAP.
+
+    Args:
+        scenario: A shipped drive, or a scenario file of your own.
+        traffic: Numbers of vehicles and of walkers, in place of the scenario's.
+        transient: A passing change and its strength: parked_cars, leaves, snow,
+            scaffolds, works, furniture, seed; may be repeated.
+        driver: A driver like those of published drives, who wanders and changes
+            lanes, or one who keeps to the middle of his lane.
+        ride: Put the car on springs, on a road of a class of ISO 8608 from A
+            (new) to E (very poor).
+        imu_rate: Samples of the IMU a second, in place of the scenario's.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive
@@ -202,37 +177,32 @@ def _switches(texts: Iterable[str]) -> dict[str, str]:
 
 
 def scan(
-    world: Annotated[
-        Path, typer.Argument(metavar="WORLD.sdf", help="Any SDF world.")
-    ],
+    world: Annotated[Path, typer.Argument(metavar="WORLD.sdf")],
     pose: Annotated[
         tuple[float, float, float, float, float, float],
-        typer.Option(
-            metavar="X Y Z ROLL PITCH YAW",
-            help="The sensor's pose in the world [m, rad].",
-        ),
+        typer.Option(metavar="X Y Z ROLL PITCH YAW"),
     ],
-    output: Annotated[
-        Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
-    ],
+    output: Annotated[Path, typer.Option()],
     lidar: Annotated[str, options.LIDAR_OPTION] = "cns",
     returns: Returns = None,
-    seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Seed of noise and weather.")
-    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, metavar="N")] = 0,
     fog: Fog = None,
     rain: Rain = 0.0,
     snowfall: Snowfall = 0.0,
     model_path: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder to search for model://, before GZ_SIM_RESOURCE_PATH "
-            "and SDF_PATH; may be repeated.",
-        ),
+        list[Path] | None, typer.Option(metavar="DIR")
     ] = None,
 ) -> None:
-    """Take one scan of any SDF world."""
+    """Take one scan of any SDF world.
+
+    Args:
+        world: Any SDF world.
+        pose: The sensor's pose in the world [m, rad].
+        output: Where to save: .pcd, .bin or .npy.
+        seed: Seed of noise and weather.
+        model_path: Folder to search for model://, before GZ_SIM_RESOURCE_PATH
+            and SDF_PATH; may be repeated.
+    """
     with uninterrupted():
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
@@ -274,19 +244,16 @@ def generate(
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
-    vary: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FAMILY.yaml",
-            help="Record the members of a family besides the named drives. "
-            "Their scenario files go to <output>/scenarios, cities of "
-            "their own to <output>/cities.",
-        ),
-    ] = None,
+    vary: Annotated[Path | None, typer.Option(metavar="FAMILY.yaml")] = None,
 ) -> None:
     """Record many drives.
 
     Finished recordings are skipped; interrupted ones go on where they were.
+
+    Args:
+        vary: Record the members of a family besides the named drives. Their
+            scenario files go to <output>/scenarios, cities of their own to
+            <output>/cities.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -308,43 +275,24 @@ def generate(
 
 
 def export(
-    drive: Annotated[
-        Path,
-        typer.Argument(
-            metavar="DRIVE", help="A recorded folder, or its .mcap file."
-        ),
-    ],
-    layout: Annotated[
-        Literal["cns", "kitti", "tum"],
-        typer.Option(
-            "--format",
-            help="Layout: CNS data set, KITTI odometry, or TUM (the "
-            "trajectory alone).",
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            help="Folder of drives: new, empty, or of earlier exports."
-        ),
-    ],
-    sensor: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="Name of the LiDAR, if there are several."
-        ),
-    ] = None,
-    absent_in: Annotated[
-        str | None,
-        typer.Option(
-            metavar="STAGE",
-            help="Label points on structures that this stage of the map lacks "
-            "with SemanticKITTI's labels of moving objects (252 to 259); "
-            "with kitti.",
-        ),
-    ] = None,
+    drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
+    layout: Annotated[Literal["cns", "kitti", "tum"], typer.Option("--format")],
+    output: Annotated[Path, typer.Option()],
+    sensor: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
 ) -> None:
-    """Export a recording to a common layout."""
+    """Export a recording to a common layout.
+
+    Args:
+        drive: A recorded folder, or its .mcap file.
+        layout: Layout: CNS data set, KITTI odometry, or TUM (the trajectory
+            alone).
+        output: Folder of drives: new, empty, or of earlier exports.
+        sensor: Name of the LiDAR, if there are several.
+        absent_in: Label points on structures that this stage of the map lacks
+            with SemanticKITTI's labels of moving objects (252 to 259); with
+            kitti.
+    """
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
 
@@ -362,16 +310,15 @@ def export(
 
 
 def repair(
-    file: Annotated[
-        Path,
-        typer.Argument(metavar="FILE", help="Any MCAP file, whole or damaged."),
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(help="The new file; <name>_repaired.mcap by default."),
-    ] = None,
+    file: Annotated[Path, typer.Argument(metavar="FILE")],
+    output: Path | None = None,
 ) -> None:
-    """Save what is readable of an MCAP file."""
+    """Save what is readable of an MCAP file.
+
+    Args:
+        file: Any MCAP file, whole or damaged.
+        output: The new file; <name>_repaired.mcap by default.
+    """
     with uninterrupted():
         from cns_drake.recording.repair import repair_mcap
 

@@ -56,28 +56,20 @@ def reproduce(
     output: options.Output,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
-    pages: Annotated[
-        bool | None,
-        typer.Option(
-            "--pages/--no-pages",
-            help="Also make a web page of each drive; the default without "
-            "--quick.",
-        ),
-    ] = None,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Only the report: simulate without recording.",
-        ),
-    ] = False,
+    pages: Annotated[bool | None, typer.Option("--pages/--no-pages")] = None,
+    quick: Annotated[bool, typer.Option("--quick")] = False,
     method: options.MethodFiles = None,
     parameter: Settings = None,
     costs: Costs = True,
     task: options.TaskName = options.Task.PLACE,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Simulate a map, evaluate it and report."""
+    """Simulate a map, evaluate it and report.
+
+    Args:
+        pages: Also make a web page of each drive; the default without --quick.
+        quick: Only the report: simulate without recording.
+    """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies import reproduction
@@ -113,21 +105,10 @@ def reproduce(
 
 @with_named_protocol
 def fresh(
-    maps: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="MAP", help="Shipped maps; all of them by default."
-        ),
-    ] = None,
+    maps: Annotated[list[str] | None, typer.Argument(metavar="MAP")] = None,
     *,
     output: options.Results,
-    number: Annotated[
-        list[int] | None,
-        typer.Option(
-            metavar="N",
-            help="A version, from 1 to 5; may be repeated. All by default.",
-        ),
-    ] = None,
+    number: Annotated[list[int] | None, typer.Option(metavar="N")] = None,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
     method: options.MethodFiles = None,
@@ -139,6 +120,10 @@ def fresh(
     buildings, with real drivers; two are turned, so that their streets lie off
     the axes. Their seeds were drawn before any method ran on them. Nothing is
     recorded. After an interruption the same command goes on where it was.
+
+    Args:
+        maps: Shipped maps; all of them by default.
+        number: A version, from 1 to 5; may be repeated. All by default.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -165,51 +150,14 @@ def ladder(
     maps: options.Maps = None,
     *,
     output: options.Results,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Only the strongest level of each cause, and every other "
-            "query.",
-        ),
-    ] = False,
-    levels: Annotated[
-        bool,
-        typer.Option(
-            "--levels",
-            help="Only the frozen levels, with all causes together.",
-        ),
-    ] = False,
-    cause: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="A cause of change, such as traffic or all; may be repeated. "
-            "Every one by default.",
-        ),
-    ] = None,
+    quick: Annotated[bool, typer.Option("--quick")] = False,
+    levels: Annotated[bool, typer.Option("--levels")] = False,
+    cause: list[str] | None = None,
     viewpoint: Annotated[
-        str,
-        typer.Option(
-            metavar="near|lane|reversed",
-            help="Where the database is driven on all rungs: 0.5 m beside the "
-            "queries, 5 m, or 5 m and facing backwards.",
-        ),
+        str, typer.Option(metavar="near|lane|reversed")
     ] = "near",
-    pairs: Annotated[
-        bool,
-        typer.Option(
-            "--pairs",
-            help="Also cross the six causes that cost most two by two.",
-        ),
-    ] = False,
-    seeds: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            metavar="N",
-            help="Repeat all random draws N times, and give means.",
-        ),
-    ] = 1,
+    pairs: Annotated[bool, typer.Option("--pairs")] = False,
+    seeds: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
     task: options.TaskName = options.Task.PLACE,
     method: options.MethodFiles = None,
     jobs: options.Jobs = None,
@@ -221,6 +169,16 @@ def ladder(
     between the two at a time, and with all together. No drive is recorded.
     Writes ladder.csv, queries.csv and a figure. After an interruption the same
     command goes on where it was.
+
+    Args:
+        quick: Only the strongest level of each cause, and every other query.
+        levels: Only the frozen levels, with all causes together.
+        cause: A cause of change, such as traffic or all; may be repeated. Every
+            one by default.
+        viewpoint: Where the database is driven on all rungs: 0.5 m beside the
+            queries, 5 m, or 5 m and facing backwards.
+        pairs: Also cross the six causes that cost most two by two.
+        seeds: Repeat all random draws N times, and give means.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -291,16 +249,14 @@ def ladder(
 
 
 def levels(
-    results: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RESULTS.csv", help="Tables written by ladder --levels."
-        ),
-    ],
+    results: Annotated[list[Path], typer.Argument(metavar="RESULTS.csv")],
 ) -> None:
     """Check results on the frozen levels.
 
     Prints one table of all of them in Markdown.
+
+    Args:
+        results: Tables written by ladder --levels.
     """
     with uninterrupted():
         from cns_drake.studies.levels import (
@@ -314,20 +270,10 @@ def levels(
 
 
 def size(
-    map_name: Annotated[
-        str,
-        typer.Argument(metavar="MAP", help="The map that is asked about."),
-    ],
+    map_name: Annotated[str, typer.Argument(metavar="MAP")],
     *,
     output: options.Results,
-    places: Annotated[
-        list[int] | None,
-        typer.Option(
-            metavar="N",
-            help="Number of places of other cities, up to 100000; may be "
-            "repeated. By default 0, 1000, 10000 and 100000.",
-        ),
-    ] = None,
+    places: Annotated[list[int] | None, typer.Option(metavar="N")] = None,
     method: options.MethodFiles = None,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
@@ -338,6 +284,11 @@ def size(
     cities: the other shipped ones, twin blocks, redrawn ones. A method that
     would take over an hour for all queries has its time only. Writes size.csv.
     After an interruption the same command goes on where it was.
+
+    Args:
+        map_name: The map that is asked about.
+        places: Number of places of other cities, up to 100000; may be repeated.
+            By default 0, 1000, 10000 and 100000.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -356,48 +307,15 @@ def size(
 
 
 def years(
-    maps: Annotated[
-        list[str],
-        typer.Argument(metavar="MAP", help="Maps, by name or folder."),
-    ],
+    maps: Annotated[list[str], typer.Argument(metavar="MAP")],
     output: options.Results,
-    years: Annotated[
-        list[int] | None,
-        typer.Option(
-            metavar="YEAR ...",
-            help="Years between database and query, ascending; 1 2 5 10 20 40 "
-            "by default, 5 20 40 with --quick.",
-        ),
-    ] = None,
-    seeds: Annotated[
-        int,
-        typer.Option(
-            min=1, metavar="N", help="Number of histories of each city."
-        ),
-    ] = 1,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Fewer years, queries and places, and only old databases.",
-        ),
-    ] = False,
+    years: Annotated[list[int] | None, typer.Option(metavar="YEAR ...")] = None,
+    seeds: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
+    quick: Annotated[bool, typer.Option("--quick")] = False,
     rate: RateFactor = 1.0,
     rates: RatesFile = None,
-    localise: Annotated[
-        bool,
-        typer.Option(
-            "--localise",
-            help="Also localise the queries in the maps of the databases.",
-        ),
-    ] = False,
-    map_update: Annotated[
-        bool,
-        typer.Option(
-            "--map-update",
-            help="Also score what finds the changes of the maps.",
-        ),
-    ] = False,
+    localise: Annotated[bool, typer.Option("--localise")] = False,
+    map_update: Annotated[bool, typer.Option("--map-update")] = False,
     method: options.MethodFiles = None,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
@@ -407,6 +325,15 @@ def years(
     A drive queries a database of its own route that is some years older, and
     an older drive one of today. No drive is recorded. Writes years.csv,
     lifetimes.csv and a chart. After an interruption the same command goes on.
+
+    Args:
+        maps: Maps, by name or folder.
+        years: Years between database and query, ascending; 1 2 5 10 20 40 by
+            default, 5 20 40 with --quick.
+        seeds: Number of histories of each city.
+        quick: Fewer years, queries and places, and only old databases.
+        localise: Also localise the queries in the maps of the databases.
+        map_update: Also score what finds the changes of the maps.
     """
     named, wanted = maps_and_years(maps, years or [])
     with uninterrupted():
@@ -437,20 +364,8 @@ def years(
 @with_named_protocol
 def trend(
     *,
-    vary: Annotated[
-        Path,
-        typer.Option(
-            metavar="FAMILY.yaml",
-            help="The members of this family are the databases.",
-        ),
-    ],
-    query: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME|SCENARIO.yaml",
-            help="The query drive: a shipped drive or a scenario file.",
-        ),
-    ],
+    vary: Annotated[Path, typer.Option(metavar="FAMILY.yaml")],
+    query: Annotated[str, typer.Option(metavar="NAME|SCENARIO.yaml")],
     output: options.Results,
     method: options.MethodFiles = None,
     jobs: options.Jobs = None,
@@ -463,6 +378,10 @@ def trend(
     No drive is recorded. Writes trend.csv and a figure with 95 % bands: AUC,
     and the share of it that is kept against the same route without change.
     After an interruption the same command goes on where it was.
+
+    Args:
+        vary: The members of this family are the databases.
+        query: The query drive: a shipped drive or a scenario file.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

@@ -18,49 +18,20 @@ def localise(
     method: Annotated[
         str,
         typer.Option(
-            "--method",
-            metavar="icp|plane-icp|gicp|vgicp|kiss-matcher|FILE.py",
-            help="Estimator; a Python file holds one's own function.",
+            "--method", metavar="icp|plane-icp|gicp|vgicp|kiss-matcher|FILE.py"
         ),
     ],
-    start: Annotated[
-        float, typer.Option(help="Distance of a start from the truth [m].")
-    ] = 0.5,
-    start_turn: Annotated[
-        float, typer.Option(help="Angle of a start to the truth [deg].")
-    ] = 2.0,
-    seed: Annotated[int, typer.Option(help="Seed of the starts.")] = 0,
+    start: float = 0.5,
+    start_turn: float = 2.0,
+    seed: int = 0,
     parameter: options.Parameters = None,
-    query_spacing: Annotated[
-        float,
-        typer.Option(help="Distance between two queries along the path [m]."),
-    ] = 10.0,
-    follow: Annotated[
-        bool,
-        typer.Option(
-            "--track",
-            help="Follow the whole drive, each scan from the end of the last.",
-        ),
-    ] = False,
-    odometry_drift: Annotated[
-        float,
-        typer.Option(
-            metavar="PART",
-            help="Drift of the odometry of --track: part of the way, and as "
-            "many degrees for each metre.",
-        ),
-    ] = 0.01,
+    query_spacing: float = 10.0,
+    follow: Annotated[bool, typer.Option("--track")] = False,
+    odometry_drift: Annotated[float, typer.Option(metavar="PART")] = 0.01,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
     jobs: options.Jobs = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Write results by query, localisation.csv, and with --track a "
-            "picture.",
-        ),
-    ] = None,
+    output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     json: options.Json = False,
 ) -> None:
     """Localisation of scans in a map.
@@ -70,6 +41,18 @@ def localise(
     true poses. A cloud as QUERY is one scan at the origin of the map. Each scan
     is aligned from its true pose, moved by --start in a random direction and
     turned by --start-turn about a random axis.
+
+    Args:
+        method: Estimator; a Python file holds one's own function.
+        start: Distance of a start from the truth [m].
+        start_turn: Angle of a start to the truth [deg].
+        seed: Seed of the starts.
+        query_spacing: Distance between two queries along the path [m].
+        follow: Follow the whole drive, each scan from the end of the last.
+        odometry_drift: Drift of the odometry of --track: part of the way, and
+            as many degrees for each metre.
+        output: Write results by query, localisation.csv, and with --track a
+            picture.
     """
     import math
 

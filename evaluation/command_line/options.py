@@ -8,7 +8,8 @@ import functools
 import inspect
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+import textwrap
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
@@ -259,25 +260,77 @@ def _with_options(
 ) -> Callable[..., None]:
     """Returns a command with options instead of `protocol`."""
 
-    @functools.wraps(command)
-    def wrapper(**values: Any) -> None:
+    def run(**values: Any) -> None:
         chosen = {name: values.pop(name) for name in _OPTIONS}
         base = DEFAULT_PROTOCOL
         if "named_protocol" in options:
             base = PROTOCOLS[values.pop("named_protocol")]
         command(**values, protocol=replace(base, **chosen))
 
-    signature = inspect.signature(command, eval_str=True)
     keyword = inspect.Parameter.KEYWORD_ONLY
     parameters = [
         one.replace(kind=keyword)
-        for one in signature.parameters.values()
+        for one in _parameters(command)
         if one.name != "protocol"
     ]
     parameters += [
         inspect.Parameter(name, keyword, default=default, annotation=annotation)
         for name, (annotation, default) in options.items()
     ]
-    wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return _called(command, run, parameters)
+
+
+def explained(command: Callable[..., None]) -> Callable[..., None]:
+    """Returns a command whose docstring explains its options to the user.
+
+    Args:
+        command: the section `Args` of its docstring has the help of options
+            and arguments; those without an entry have one already.
+    """
+    text, _, entries = inspect.getdoc(command).partition("\n\nArgs:\n")  # type: ignore[union-attr]  # Each command has one.
+    helps: dict[str, str] = {}
+    for line in textwrap.dedent(entries).splitlines():
+        if not line.startswith(" "):
+            name, _, line = line.partition(": ")
+            helps[name] = line
+        else:
+            helps[name] += f" {line.strip()}"
+    parameters = []
+    for one in _parameters(command):
+        if one.name in helps:
+            is_required = one.default is inspect.Parameter.empty
+            info: Any = typer.Argument() if is_required else typer.Option()
+            kind = one.annotation
+            if hasattr(kind, "__metadata__"):
+                kind, info = get_args(kind)
+            info.help = helps[one.name]
+            one = one.replace(annotation=Annotated[kind, info])
+        parameters.append(one)
+    return _called(command, command, parameters, text)
+
+
+def _parameters(command: Callable[..., None]) -> list[inspect.Parameter]:
+    signature = inspect.signature(command, eval_str=True)
+    return list(signature.parameters.values())
+
+
+def _called(
+    command: Callable[..., None],
+    run: Callable[..., None],
+    parameters: Sequence[inspect.Parameter],
+    text: str | None = None,
+) -> Callable[..., None]:
+    """Returns a command as another function runs it, with its parameters.
+
+    Args:
+        text: the docstring; that of the command by default.
+    """
+
+    @functools.wraps(command)
+    def wrapper(**values: Any) -> None:
+        run(**values)
+
+    wrapper.__doc__ = text or command.__doc__
+    wrapper.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapper.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapper

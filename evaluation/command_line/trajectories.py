@@ -41,19 +41,8 @@ def drives(
 def trajectory(
     drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
     estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE.tum")],
-    frame: Annotated[
-        Literal["lidar", "base_link"],
-        typer.Option(
-            help="Frame whose poses are estimated: the LiDAR's or the "
-            "vehicle's."
-        ),
-    ] = "lidar",
-    time_offset: Annotated[
-        float,
-        typer.Option(
-            metavar="S", help="Time to add to that of the estimate [s]."
-        ),
-    ] = 0.0,
+    frame: Literal["lidar", "base_link"] = "lidar",
+    time_offset: Annotated[float, typer.Option(metavar="S")] = 0.0,
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
@@ -63,6 +52,10 @@ def trajectory(
     and a quaternion x y z w. Prints ATE, the root mean square of its distances
     from DRIVE after rigid alignment, and drift, the error of its motion over
     100 m of path.
+
+    Args:
+        frame: Frame whose poses are estimated: the LiDAR's or the vehicle's.
+        time_offset: Time to add to that of the estimate [s].
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
     from evaluation.drives.text_tables import read_tum
