@@ -402,12 +402,10 @@ def trend(
         query_drive.name,
         DriveSimulation(query_drive),
         {
-            member.name: trend_databases.TrendDatabase(
-                DriveSimulation(member), controls[member.name].name
-            )
-            for member in members
+            one.name: DriveSimulation(one)
+            for one in (*members, *controls.values())
         },
-        {one.name: DriveSimulation(one) for one in controls.values()},
+        {member: control.name for member, control in controls.items()},
         output,
         cluster,
         methods,

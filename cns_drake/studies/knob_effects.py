@@ -55,11 +55,8 @@ def knob_effects(
         points = trend_databases.measure_drives(
             later.name,
             DriveSimulation(later),
-            {
-                name: trend_databases.TrendDatabase(DriveSimulation(drive))
-                for name, drive in drives.items()
-            },
-            {},
+            {name: DriveSimulation(drive) for name, drive in drives.items()},
+            dict.fromkeys(drives),
             Path(scratch) / "study",
             cluster,
             choose_methods(),

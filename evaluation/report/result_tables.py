@@ -361,28 +361,27 @@ def audit_table(
 def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
     """Returns the metrics of other publications, as `metrics.csv` has them."""
     return Table.of(
-        [
-            _Metrics(one, one.outcome.outcomes, one.outcome.auc_over_radius())
-            for one in _by_pair_and_method(results)
-        ],
+        _by_pair_and_method(results),
         {
-            **_inner(_KEYS),
-            "auc_strict": lambda m: m.result.metrics["all"].auc_strict,
-            "recall_at_1": lambda m: m.outcomes.recall_at(1),
-            "recall_at_1_percent": lambda m: m.outcomes.recall_at(
-                m.outcomes.one_percent_rank
+            **_KEYS,
+            "auc_strict": lambda r: r.metrics["all"].auc_strict,
+            "recall_at_1": lambda r: r.outcome.outcomes.recall_at(1),
+            "recall_at_1_percent": lambda r: r.outcome.outcomes.recall_at(
+                r.outcome.outcomes.one_percent_rank
             ),
-            "mean_reciprocal_rank": lambda m: m.outcomes.mean_reciprocal_rank,
-            "recall_at_full_precision": lambda m: (
-                m.result.metrics["all"].curve.recall_at_full_precision
+            "mean_reciprocal_rank": lambda r: (
+                r.outcome.outcomes.mean_reciprocal_rank
             ),
-            "match_auroc": lambda m: m.outcomes.match_auroc,
-            "pose_success": lambda m: m.result.outcome.pose.success,
+            "recall_at_full_precision": lambda r: (
+                r.metrics["all"].curve.recall_at_full_precision
+            ),
+            "match_auroc": lambda r: r.outcome.outcomes.match_auroc,
+            "pose_success": lambda r: r.outcome.pose.success,
             **keyed(
                 {f"auc_within_{radius:g}_m": radius for radius in RADII},
-                lambda m, radius: m.areas[radius],
+                lambda r, radius: r.outcome.auc_over_radius()[radius],
             ),
-            **protocol_columns("result.outcome.protocol"),
+            **_PROTOCOL,
         },
     )
 
@@ -466,14 +465,6 @@ def difference_table(differences: Sequence[MethodDifference]) -> Table:
         },
         _DIFFERENCE_CAPTION,
     )
-
-
-class _Metrics(NamedTuple):
-    """A result, its outcomes, and radius of a match [m] -> AUC."""
-
-    result: RecognitionResult
-    outcomes: QueryOutcomes
-    areas: Mapping[float, float]
 
 
 # Name in files -> value.

@@ -77,19 +77,6 @@ class TrendPoint:
         return self.auc / self.auc_unchanged
 
 
-@dataclass(frozen=True)
-class TrendDatabase:
-    """A database drive and its control.
-
-    Attributes:
-        control: name of the drive on its route through the city of the
-            query; None if there is none.
-    """
-
-    source: DriveSource
-    control: str | None = None
-
-
 def measure_trend(
     query: Path,
     databases: Sequence[Path],
@@ -130,7 +117,7 @@ def measure_trend(
         names.add(drive.name)
         check_same_world(drive, query_drive)
         opened[path] = drive
-    searched = {}
+    serving: dict[str, str | None] = {}
     for path in databases:
         way = driven_way(opened[path].scenario)
         same = [
@@ -138,18 +125,18 @@ def measure_trend(
             for control in controls
             if way is not None and driven_way(opened[control].scenario) == way
         ]
-        searched[opened[path].name] = TrendDatabase(
-            _recorded(path, lidar), same[0] if same else None
-        )
-    used = {one.control for one in searched.values()}
+        serving[opened[path].name] = same[0] if same else None
     for path in controls:
-        if opened[path].name not in used:
+        if opened[path].name not in serving.values():
             raise InputError(f"--control: {path}: no database has its route")
     return measure_drives(
         query_drive.name,
-        _recorded(query, lidar),
-        searched,
-        {opened[path].name: _recorded(path, lidar) for path in controls},
+        RecordedDrive(query.absolute(), lidar),
+        {
+            drive.name: RecordedDrive(path.absolute(), lidar)
+            for path, drive in opened.items()
+        },
+        serving,
         output,
         cluster,
         methods,
@@ -160,8 +147,8 @@ def measure_trend(
 def measure_drives(
     query_name: str,
     query: DriveSource,
-    databases: Mapping[str, TrendDatabase],
-    controls: Mapping[str, DriveSource],
+    sources: Mapping[str, DriveSource],
+    controls: Mapping[str, str | None],
     output: Path,
     cluster: Cluster,
     methods: tuple[MethodChoice, ...],
@@ -169,48 +156,41 @@ def measure_drives(
 ) -> list[TrendPoint]:
     """Returns the points of drives that need not be recorded.
 
+    Args:
+        sources: name -> opens a drive: a database or a control.
+        controls: database -> the drive on its route through the city of the
+            query; None if there is none.
+
     Raises:
         InputError: see `measure_trend`.
     """
     files = StudyFiles(output.absolute())
     make_folder(output)
     survey = files.survey(query_name)
-    step = Survey(
-        query,
-        frozenset({"queries"}),
+    roles = frozenset({"queries"})
+    step = Survey(query, roles, methods, protocol, survey, with_scans=True)
+    jobs = [Job(f"survey {query_name}", step)]
+    parts = {name: files.part("trend", name, query_name) for name in sources}
+    shared = (
+        (survey.drive, survey.scans),
+        tuple(survey.described(one.name) for one in methods),
         methods,
         protocol,
-        survey,
-        with_scans=True,
     )
-    jobs = [Job(name=f"survey {query_name}", step=step)]
-    sources = {name: one.source for name, one in databases.items()}
-    sources |= controls
-    parts = {name: files.part("trend", name, query_name) for name in sources}
     jobs += [
         Job(
-            name=f"measure {name}",
-            step=MakePart(
-                part,
-                measure_database,
-                (
-                    sources[name],
-                    (survey.drive, survey.scans),
-                    tuple(survey.described(one.name) for one in methods),
-                    methods,
-                    protocol,
-                ),
-            ),
-            needs=(jobs[0].name,),
+            f"measure {name}",
+            MakePart(part, measure_database, (sources[name], *shared)),
+            (jobs[0].name,),
         )
         for name, part in parts.items()
     ]
     run_jobs(jobs, cluster)
     points: list[TrendPoint] = []
-    for name, one in databases.items():
+    for name, control in controls.items():
         unchanged = {}
-        if one.control is not None:
-            measured = parts[one.control].read()
+        if control is not None:
+            measured = parts[control].read()
             unchanged = {point.method: point.auc for point in measured}
         points += [
             replace(point, auc_unchanged=unchanged.get(point.method, math.nan))
@@ -314,7 +294,3 @@ def _visible_change(
         retrieval.matches,
     )
     return mean_visible_change(overlaps)[0]
-
-
-def _recorded(path: Path, lidar: str | None) -> RecordedDrive:
-    return RecordedDrive(path.absolute(), lidar)
