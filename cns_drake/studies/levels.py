@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
-from typing import Any
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
@@ -20,25 +19,11 @@ from cns_drake.studies import ladder_rungs
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.report.tables import Table, in_table_order, title
 
-# All causes together, at the ladder's strengths, would leave nothing to
-# measure: from level to level they grow by little.
-LEVEL_STRENGTHS: Mapping[str, Mapping[int, Any]] = {
-    "parked_cars": {1: 0.25, 2: 0.33, 3: 0.42, 4: 0.5},
-    "leaves": {1: 0.75, 2: 0.67, 3: 0.58, 4: 0.5},
-    "snow": {1: 0.05, 2: 0.06, 3: 0.07, 4: 0.08},
-    "scaffolds": {1: 0.1, 2: 0.13, 3: 0.17, 4: 0.2},
-    "works": {1: 0.05, 2: 0.067, 3: 0.083, 4: 0.1},
-    "furniture": {1: 0.25, 2: 0.33, 3: 0.42, 4: 0.5},
-    "traffic": {1: 15, 2: 20, 3: 25, 4: 30},
-    "weather": {1: 400.0, 2: 320.0, 3: 250.0, 4: 200.0},
-    "returns": ladder_rungs.STRENGTHS["returns"],
-    "ride": {1: "A", 4: "B"},
-    "viewpoint": {1: (2.0, 0), 2: (2.4, 0), 3: (2.7, 0), 4: (3.0, 0)},
-    "size": {1: 300},
-}
 # The seed was drawn before any method was run on it.
 LEVELS_EXTENT = ladder_rungs.Extent(
-    causes=(ladder_rungs.ALL,), seeds=(4708,), strengths=LEVEL_STRENGTHS
+    causes=(ladder_rungs.ALL,),
+    seeds=(4708,),
+    strengths=ladder_rungs.LEVEL_STRENGTHS,
 )
 LEVELS_PROTOCOL = replace(FAIR_PROTOCOL, query_spacing=20.0)
 # A level is solved when the interval of the best method begins above this.

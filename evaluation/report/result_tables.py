@@ -37,6 +37,7 @@ from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.report.tables import (
+    CAPTIONS,
     Columns,
     Table,
     in_table_order,
@@ -46,50 +47,6 @@ from evaluation.report.tables import (
     title,
 )
 
-_CHANGE_CAPTION = (
-    "Temporal change ratio: TCR_sym is 0 where nothing changed and 1 where"
-    " everything did. Same stage: TCR_sym of the two routes in one stage of the"
-    " city, where nothing changed. Where both drove: only voxels within 40 m of"
-    " both routes. Visible change: the part of a query's scan that the best of"
-    " its matches does not show, mean over the queries that have one."
-)
-_AUDIT_CAPTION = (
-    "All numbers with 95 % intervals (bootstrap over blocks of 100 m of the"
-    " route) and the counts they are made of: R@1 = TP / N,"
-    " F1max = 2 TP / (TP + T). AUC strict: the"
-    " area with recall = TP / N, which wrong accepted answers lower, too."
-)
-_DIFFERENCE_CAPTION = (
-    "Differences of AUC (mode all) between methods on the same queries, with"
-    " 95 % intervals, by paired bootstrap over blocks of 100 m of the route; p"
-    " is corrected for the number of rows (Holm)."
-)
-_FAULT_CAPTION = (
-    "Why best places are wrong: how many of the queries with a wrong best"
-    " place have none in the database (no place); got no candidate; were put"
-    " just too far away, within two radii; have a right place from which less"
-    " than half of their scan is seen, since something hides it (hidden) or"
-    " for another reason (no overlap); have a right place of whose standing"
-    " points a quarter or more has come or gone (changed, and the class of"
-    " most of it); were taken to a twin, which fits on them as well as the"
-    " right place does. All others are the method's own fault (elsewhere). A"
-    " query with several of these faults counts only under the one that is"
-    " named first here."
-)
-_POSE_CAPTION = (
-    "Poses that come with the places. Errors of the accepted matches: best"
-    " places that are right, with a score from that of the greatest F1 on."
-    " Success: queries with a match whose pose is wrong by at most 2 m and"
-    " 5 deg, whatever the score. Recall at full precision: the part of the"
-    " queries with a match that a method finds, best scores first, before its"
-    " first wrong place. Scan Context++ and SOLiD estimate"
-    " little more than the turn."
-)
-_COST_CAPTION = (
-    "What each method costs on one core of the machine that made this report:"
-    " time of the processor, medians over some scans. This table alone"
-    " differs from run to run (--no-costs leaves it out)."
-)
 # Name in Table II -> attribute of our metrics and of published numbers, which
 # may lack it.
 _MEASURES = {"AUC": "auc", "strict": "auc_strict", "R@1": "recall_at_1"}
@@ -154,7 +111,7 @@ def change_table(
             "visible change": lambda r: visible(r)[0],
             "queries": lambda r: visible(r)[1],
         },
-        _CHANGE_CAPTION,
+        CAPTIONS["change"],
     )
     names = {result.map_name for result in results}
     further = tuple(
@@ -354,7 +311,7 @@ def audit_table(
             "T of F1max": lambda c: c.at_f1_max(c.metrics.curve.counted),
             **protocol_columns("result.outcome.protocol"),
         },
-        _AUDIT_CAPTION,
+        CAPTIONS["audit"],
     )
 
 
@@ -463,7 +420,7 @@ def difference_table(differences: Sequence[MethodDifference]) -> Table:
             "high": lambda d: d.difference.interval.high,
             "p": lambda d: d.p_value,
         },
-        _DIFFERENCE_CAPTION,
+        CAPTIONS["differences"],
     )
 
 
@@ -491,7 +448,7 @@ def pose_table(results: Sequence[RecognitionResult]) -> Table:
     return Table.of(
         _by_pair_and_method(results),
         {**_SHOWN, **dict(zip(names, _POSE_ERRORS.values(), strict=True))},
-        _POSE_CAPTION,
+        CAPTIONS["poses"],
     )
 
 
@@ -542,7 +499,7 @@ def fault_table(
                 or None
             ),
         },
-        _FAULT_CAPTION,
+        CAPTIONS["faults"],
     )
 
 
@@ -602,7 +559,7 @@ def cost_table(costs: Sequence[Cost]) -> Table:
             "of places": lambda c: c.places,
             "bytes a place": lambda c: f"{c.place_bytes:.0f}",
         },
-        _COST_CAPTION,
+        CAPTIONS["costs"],
     )
 
 

@@ -14,19 +14,6 @@ from evaluation.report import tables
 from evaluation.report.drawing import method_style, plain, save
 
 NO_CONTROL = "no control"
-SURVIVAL_CAPTION = (
-    "What is left of AUC and R@1 where the city has changed. All queries count"
-    " (mode all), also those without a match. Without change: a control drive"
-    " takes the place of one drive of the pair. It follows the same route, but"
-    " in the stage of the other drive. Kept: the value with the change, divided"
-    " by the value without, and its 95 % interval (bootstrap over blocks of"
-    " 100 m of the route, the same ones with and without the change). AUC"
-    " strict has recall = TP / N, which wrong accepted answers lower, too."
-    " Recall at full precision: the"
-    " part of the queries with a match that a method finds, best scores first,"
-    " before its first wrong place. Where it is small, a user cannot rely on"
-    " single answers, even of a method that keeps its AUC."
-)
 # The width of a phone's screen, on which letters stay legible [inches].
 _WIDTH = 3.9
 _ROW = 0.17
@@ -106,7 +93,7 @@ def survival_table(survivals: Sequence[Survival]) -> tables.Table:
                 s.recall_at_full_precision
             ),
         },
-        SURVIVAL_CAPTION,
+        tables.CAPTIONS["survival"],
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from cns_drake.base.csv_files import csv_text
 from cns_drake.base.files import completing
+from cns_drake.base.yaml_files import read_yaml
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 
 _Item = TypeVar("_Item")
@@ -27,6 +28,8 @@ _Key = TypeVar("_Key")
 Columns = Mapping[str | tuple[str, str], Callable[[_Item], object]]
 
 MISSING = "–"
+# Table -> what it shows.
+CAPTIONS = read_yaml(Path(__file__).with_name("captions.yaml"))
 # The spelling of the methods' authors, in the order of tables; our methods come
 # last.
 _METHOD_TITLES = {
