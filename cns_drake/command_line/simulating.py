@@ -74,10 +74,7 @@ def family_members(
 
 
 def choose_returns(
-    returns: Kind | None,
-    fog: float | None,
-    rain: float,
-    snowfall: float,
+    returns: Kind | None, fog: float | None, rain: float, snowfall: float
 ) -> tuple[Kind | None, WeatherConfig | None]:
     """Returns the returns and the weather of the options; None if not given.
 
@@ -325,9 +322,7 @@ def repair(
     with show_progress() as progress:
         task = progress.add_task(file.name, total=None, note="")
         result = repair_mcap(
-            file,
-            output,
-            count_progress(progress, task, unit="bytes"),
+            file, output, count_progress(progress, task, unit="bytes")
         )
     typer.echo(
         f"{result.output}: {result.num_messages} messages over "

@@ -222,10 +222,7 @@ def ladder(
             "4), every other query, more than 300 places of other cities"
         )
     extent = replace(
-        extent,
-        causes=causes,
-        seeds=range(1, seeds + 1),
-        viewpoint=viewpoint,
+        extent, causes=causes, seeds=range(1, seeds + 1), viewpoint=viewpoint
     )
     if levels:
         extent, protocol = LEVELS_EXTENT, LEVELS_PROTOCOL

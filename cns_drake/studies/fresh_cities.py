@@ -93,10 +93,7 @@ def draw_fresh_cities(
         and (not numbers or one.number in numbers)
     ]
     make_folder(output)
-    run_jobs(
-        [Job(f"city {step.folder.name}", step) for step in steps],
-        cluster,
-    )
+    run_jobs([Job(f"city {step.folder.name}", step) for step in steps], cluster)
     return [step.folder for step in steps]
 
 
@@ -139,10 +136,7 @@ class DrawFreshCity(RedrawCity):
 
     def sources(self) -> dict[str, object]:
         stages = MapFolder(self.map_folder).stage_plan
-        return {
-            **super().sources(),
-            "stages": stages.read_text("utf-8"),
-        }
+        return {**super().sources(), "stages": stages.read_text("utf-8")}
 
 
 def turned(values: Any, turn_deg: float) -> Any:

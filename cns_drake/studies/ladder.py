@@ -29,10 +29,7 @@ from cns_drake.studies.redrawing import redraw_cities
 from cns_drake.studies.reproduction import recordable_map
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import (
-    DEFAULT_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.report import ladder
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.localisation import ComparedPair

@@ -106,11 +106,7 @@ def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
 def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
     numbers = {(one.level, one.is_gated): one.auc for one in others}
     return all(
-        math.isclose(
-            one.auc,
-            numbers[one.level, one.is_gated],
-            abs_tol=_EQUAL,
-        )
+        math.isclose(one.auc, numbers[one.level, one.is_gated], abs_tol=_EQUAL)
         for one in some
     )
 

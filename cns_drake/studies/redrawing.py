@@ -152,8 +152,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     return {
         roads.name: network,
         plan.name: to_yaml(
-            "the map's plan with another seed",
-            read_yaml(plan) | {"seed": seed},
+            "the map's plan with another seed", read_yaml(plan) | {"seed": seed}
         ),
         STAGES_NAME: to_yaml("its only stage", {"stages": stages}),
     }

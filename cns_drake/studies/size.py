@@ -18,10 +18,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.studies.ladder import describe_job, distracting_drives
 from cns_drake.studies.ladder_rungs import plain_drives
 from cns_drake.studies.reproduction import recordable_map
-from evaluation.recognition.protocol import (
-    DEFAULT_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.report.tables import Table, in_table_order
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import MakePart, Part, StudyFiles

@@ -17,11 +17,7 @@ import numpy as np
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.rates import check_years
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    make_folder,
-    user_errors,
-    write_text,
-)
+from cns_drake.base.files import make_folder, user_errors, write_text
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs

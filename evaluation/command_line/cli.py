@@ -401,7 +401,7 @@ app.command(
     epilog=example(
         "cns-eval map-sessions mulran/KAIST01 mulran/KAIST02 \\",
         "    --output kaist",
-    ),
+    )
 )(options.explained(map_sessions))
 
 

@@ -130,10 +130,7 @@ def _rows(values: dict) -> Iterator[tuple[str, str]]:
 
     yield "method", values["method"]
     yield "map <- query", f"{values['map']} <- {values['query']}"
-    yield (
-        "start",
-        f"{values['start']:g} m, {values['start_turn_deg']:g} deg",
-    )
+    yield ("start", f"{values['start']:g} m, {values['start_turn_deg']:g} deg")
     if "within_03m" in values:
         yield "way in the map", f"{values['way']:.0f} m"
         yield "  within 0.3 m", text("within_03m")

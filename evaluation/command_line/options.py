@@ -95,8 +95,7 @@ Scheduler = Annotated[
     ),
 ]
 Radius = Annotated[
-    float,
-    typer.Option(help="A place is a match within this distance [m]."),
+    float, typer.Option(help="A place is a match within this distance [m].")
 ]
 Gate = Annotated[
     bool,
@@ -108,20 +107,14 @@ Gate = Annotated[
     ),
 ]
 QuerySpacing = Annotated[
-    float,
-    typer.Option(help="Distance between two queries along the path [m]."),
+    float, typer.Option(help="Distance between two queries along the path [m].")
 ]
 PlaceSpacing = Annotated[
-    float,
-    typer.Option(
-        help="Distance between two places of the database [m].",
-    ),
+    float, typer.Option(help="Distance between two places of the database [m].")
 ]
 MaxRange = Annotated[
     float,
-    typer.Option(
-        help="Leave out points farther than this along an axis [m].",
-    ),
+    typer.Option(help="Leave out points farther than this along an axis [m]."),
 ]
 _OPTIONS: dict[str, tuple[object, object]] = {
     "radius": (Radius, DEFAULT_PROTOCOL.radius),
@@ -255,8 +248,7 @@ def with_named_protocol(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _with_options(
-    command: Callable[..., None],
-    options: Mapping[str, tuple[object, object]],
+    command: Callable[..., None], options: Mapping[str, tuple[object, object]]
 ) -> Callable[..., None]:
     """Returns a command with options instead of `protocol`."""
 

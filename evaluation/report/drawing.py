@@ -21,10 +21,7 @@ METHOD_STYLES = {
     "layered-overlap": ("#E69F00", "-", "v"),
     "learned": ("#56B4E9", "--", "P"),
 }
-_OTHER_STYLES = (
-    ("#000000", "-.", "X"),
-    ("#8C564B", ":", "p"),
-)
+_OTHER_STYLES = (("#000000", "-.", "X"), ("#8C564B", ":", "p"))
 
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]

@@ -630,10 +630,7 @@ def draw_cells(cells: Sequence[CauseCell], meaning: str, stem: Path) -> None:
         _draw_panel(axes, of_panel, methods, causes)
         axes.set_title(plain(", ".join(panel)), fontsize=_FONT_SIZE + 1)
     bar = figure.colorbar(
-        ScalarMappable(_SHARES, _COLOURS),
-        ax=grid[:, 1],
-        shrink=0.8,
-        aspect=30,
+        ScalarMappable(_SHARES, _COLOURS), ax=grid[:, 1], shrink=0.8, aspect=30
     )
     bar.set_label(meaning, fontsize=_FONT_SIZE)
     bar.ax.tick_params(labelsize=_FONT_SIZE)

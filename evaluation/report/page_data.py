@@ -93,10 +93,7 @@ def make_drive(
     positions = X_WS[:, :3, 3]
     stream = io.BytesIO()
     image.imsave(
-        stream,
-        view.image,
-        format="webp",
-        pil_kwargs={"quality": _WEBP_QUALITY},
+        stream, view.image, format="webp", pil_kwargs={"quality": _WEBP_QUALITY}
     )
     chosen = np.array(frames, dtype=np.int64)
     return PageDrive(
@@ -203,8 +200,7 @@ def _pair_data(
         "matches": [np.flatnonzero(row).tolist() for row in retrieval.matches],
         "methods": [
             _method_data(
-                by_method[method],
-                evidence.get((first.database, first.query)),
+                by_method[method], evidence.get((first.database, first.query))
             )
             for method in in_table_order(by_method)
         ],

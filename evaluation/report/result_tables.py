@@ -136,8 +136,7 @@ def _by_pair_and_method(
     pairs = list(dict.fromkeys(result.pair for result in results))
     methods = in_table_order(result.method for result in results)
     return sorted(
-        results,
-        key=lambda r: (pairs.index(r.pair), methods.index(r.method)),
+        results, key=lambda r: (pairs.index(r.pair), methods.index(r.method))
     )
 
 

@@ -104,10 +104,7 @@ class Table:
 
     @classmethod
     def of(
-        cls,
-        items: Iterable[_Item],
-        columns: Columns[_Item],
-        caption: str = "",
+        cls, items: Iterable[_Item], columns: Columns[_Item], caption: str = ""
     ) -> Table:
         """Returns a table with a row, or several, for each item."""
         names = [n if isinstance(n, tuple) else ("", n) for n in columns]

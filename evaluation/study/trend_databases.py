@@ -216,12 +216,7 @@ def measure_database(
     """
     running = [method.make() for method in methods]
     database = survey_recording(
-        source(),
-        {"places"},
-        running,
-        protocol,
-        reporter.track,
-        with_scans=True,
+        source(), {"places"}, running, protocol, reporter.track, with_scans=True
     )
     drive, scans = database.drive, database.scans
     assert drive is not None
