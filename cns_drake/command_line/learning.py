@@ -14,12 +14,7 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.options import Jobs, Scheduler
 from cns_drake.command_line.simulating import DriveNames, family_members
 from evaluation.command_line.map_updating import BaselineName
-from evaluation.command_line.options import (
-    MaxRange,
-    PlaceSpacing,
-    QuerySpacing,
-    SessionSpacing,
-)
+from evaluation.command_line.options import SessionSpacing
 from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 _Recorded = Annotated[
@@ -139,9 +134,9 @@ def overlap(
     query: _Simulated,
     *,
     output: Annotated[Path, typer.Option(metavar="FILE.csv")],
-    query_spacing: QuerySpacing = PAPER_PROTOCOL.query_spacing,
-    place_spacing: PlaceSpacing = PAPER_PROTOCOL.place_spacing,
-    max_range: MaxRange = PAPER_PROTOCOL.max_range,
+    query_spacing: float = PAPER_PROTOCOL.query_spacing,
+    place_spacing: float = PAPER_PROTOCOL.place_spacing,
+    max_range: float = PAPER_PROTOCOL.max_range,
 ) -> None:
     """Exact overlap of queries with places.
 
@@ -150,6 +145,9 @@ def overlap(
 
     Args:
         output: Table to write.
+        query_spacing: Distance between two queries along the path [m].
+        place_spacing: Distance between two places of the database [m].
+        max_range: Leave out points farther than this along an axis [m].
     """
     with uninterrupted():
         from cns_drake.base.files import make_folder

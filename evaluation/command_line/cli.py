@@ -215,8 +215,8 @@ def scores(
     output: Annotated[Path, typer.Option()],
     parameter: options.Parameters = None,
     sensor_height: options.SensorHeight = 1.6,
-    gate: options.Gate = False,
-    radius: options.Radius = DEFAULT_PROTOCOL.radius,
+    gate: Annotated[bool, typer.Option("--gate")] = False,
+    radius: float = DEFAULT_PROTOCOL.radius,
 ) -> None:
     """Scores of all pairs of scans of folders.
 
@@ -228,6 +228,10 @@ def scores(
         database: Folder of single scans.
         query: Folder of single scans.
         output: CSV file to write.
+        gate: Reject, among the best places of a query, those that are beyond
+            the radius by the method's own pose; for methods that estimate
+            poses.
+        radius: A place is a match within this distance [m].
     """
     from evaluation.recognition import scan_folders
 
