@@ -8,13 +8,7 @@ from collections.abc import Callable
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
-from cns_drake.command_line.learning import (
-    export_pairs,
-    map_pairs,
-    map_truth,
-    overlap,
-    train,
-)
+from cns_drake.command_line import learning, studying
 from cns_drake.command_line.maps import age, city, import_city, list_drives
 from cns_drake.command_line.simulating import (
     export,
@@ -23,15 +17,7 @@ from cns_drake.command_line.simulating import (
     scan,
     simulate,
 )
-from cns_drake.command_line.studying import (
-    fresh,
-    ladder,
-    levels,
-    reproduce,
-    size,
-    trend,
-    years,
-)
+from evaluation.command_line.options import explained
 
 # Command -> its example, line by line.
 _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
@@ -50,29 +36,29 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
         "    --output drives --jobs 2",
     ),
     repair: ("repair damaged.mcap --output whole.mcap",),
-    reproduce: ("reproduce metropolis --output study --quick",),
-    fresh: ("fresh suburbia --number 2 --output fresh",),
-    trend: (
+    studying.reproduce: ("reproduce metropolis --output study --quick",),
+    studying.fresh: ("fresh suburbia --number 2 --output fresh",),
+    studying.trend: (
         "trend --vary family.yaml \\",
         "    --query riverside_02 --output trend",
     ),
-    overlap: (
+    learning.overlap: (
         "overlap metropolis_01 metropolis_04 \\",
         "    --output overlaps.csv",
     ),
-    map_truth: (
+    learning.map_truth: (
         "map-truth metropolis_01 metropolis_04 \\",
         "    --output maps",
     ),
-    map_pairs: ("map-pairs suburbia_5 --output pairs",),
-    ladder: ("ladder metropolis --output ladder --quick",),
-    levels: ("levels ours.csv theirs.csv",),
-    train: ("train --output mine.npz --minutes 10",),
-    export_pairs: (
+    learning.map_pairs: ("map-pairs suburbia_5 --output pairs",),
+    studying.ladder: ("ladder metropolis --output ladder --quick",),
+    studying.levels: ("levels ours.csv theirs.csv",),
+    learning.train: ("train --output mine.npz --minutes 10",),
+    learning.export_pairs: (
         "export-pairs riverside_01 riverside_02 \\",
         "    --format pointnetvlad --output pairs",
     ),
-    size: ("size suburbia --places 0 --output size",),
+    studying.size: ("size suburbia --places 0 --output size",),
     import_city: (
         "import delft.city.jsonl \\",
         "    --years 1930 1970 2000 2020 --output delft",
@@ -81,7 +67,7 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
         "age suburbia \\",
         "    --years 1 5 20 --seed 1 --output old_suburbia",
     ),
-    years: (
+    studying.years: (
         "years suburbia \\",
         "    --years 5 20 --quick --output years",
     ),
@@ -100,8 +86,10 @@ for _command, (_first, *_rest) in _EXAMPLES.items():
         _NAMES.get(_command),
         epilog=example(f"cns-drake {_first}", *_rest),
         # Years before today look like options.
-        context_settings={"ignore_unknown_options": _command in (age, years)},
-    )(_command)
+        context_settings={
+            "ignore_unknown_options": _command in (age, studying.years)
+        },
+    )(explained(_command))
 
 
 def main() -> None:

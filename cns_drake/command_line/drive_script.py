@@ -6,21 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from cns_drake.base import terminal
+from cns_drake.base import progress_bars, terminal
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.progress_bars import (
-    count_progress,
-    print_note,
-    show_progress,
-)
-from cns_drake.command_line.options import (
-    Frames,
-    Graphviz,
-    LidarPreset,
-    Output,
-    Overwrite,
-    Recording,
-)
+from cns_drake.command_line import options
 
 if TYPE_CHECKING:
     from cns_drake.sensors.lidar.config import WeatherConfig
@@ -98,9 +86,9 @@ def run_drive(
         scenario = scenario.with_fields(change, "--imu-rate")
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
-    with show_progress() as progress:
+    with progress_bars.show_progress() as progress:
         task = progress.add_task(scenario.name, total=None, note="loading")
-        on_frame = count_progress(progress, task)
+        on_frame = progress_bars.count_progress(progress, task)
         run = simulate(
             scenario,
             output,
@@ -109,7 +97,7 @@ def run_drive(
             overwrite=overwrite,
             num_threads=num_cores(),
             on_frame=on_frame,
-            on_note=lambda text: print_note(progress, text),
+            on_note=lambda text: progress_bars.print_note(progress, text),
         )
     print(
         f"{run.folder}: {run.num_frames} frames, {run.simulated_s:.2f} s "
@@ -133,12 +121,12 @@ def run_script(name: str, description: str) -> None:
     """
 
     def script(
-        output: Output = Path("recordings"),
-        frames: Frames = None,
-        lidar: LidarPreset = None,
-        recording: Recording = None,
-        graphviz: Graphviz = None,
-        overwrite: Overwrite = False,
+        output: options.Output = Path("recordings"),
+        frames: options.Frames = None,
+        lidar: options.LidarPreset = None,
+        recording: options.Recording = None,
+        graphviz: options.Graphviz = None,
+        overwrite: options.Overwrite = False,
     ) -> None:
         run_drive(
             name,

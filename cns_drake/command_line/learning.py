@@ -14,12 +14,7 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.options import Jobs, Scheduler
 from cns_drake.command_line.simulating import DriveNames, family_members
 from evaluation.command_line.map_updating import BaselineName
-from evaluation.command_line.options import (
-    MaxRange,
-    PlaceSpacing,
-    QuerySpacing,
-    SessionSpacing,
-)
+from evaluation.command_line.options import SessionSpacing
 from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 _Recorded = Annotated[
@@ -38,43 +33,12 @@ class Part(str, Enum):
 
 def train(
     *,
-    output: Annotated[
-        Path,
-        typer.Option(
-            metavar="FILE.npz",
-            help="Weights to write; the curve goes to FILE.png, and "
-            "FILE.npz.training keeps what an interrupted training goes on "
-            "with.",
-        ),
-    ],
-    minutes: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            help="Sets the number of cities and steps, by about so many "
-            "minutes of one core. The clock does not matter.",
-        ),
-    ] = 60.0,
-    cities: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=1000, help="Number of cities, if not by --minutes."
-        ),
-    ] = None,
-    steps: Annotated[
-        int | None,
-        typer.Option(min=1, help="Number of steps, if not by --minutes."),
-    ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, max=10_000, help="Seed of everything.")
-    ] = 1,
-    without: Annotated[
-        list[Part] | None,
-        typer.Option(
-            help="Leave out change between drives, calibrated returns, or "
-            "drivers who wander; may be repeated.",
-        ),
-    ] = None,
+    output: Annotated[Path, typer.Option(metavar="FILE.npz")],
+    minutes: Annotated[float, typer.Option(min=0.0)] = 60.0,
+    cities: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
+    steps: Annotated[int | None, typer.Option(min=1)] = None,
+    seed: Annotated[int, typer.Option(min=0, max=10_000)] = 1,
+    without: list[Part] | None = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -84,6 +48,17 @@ def train(
     streets of Riverside, Suburbia and Downtown. Nothing is recorded. The same
     command gives the same weights on the same machine. It needs the extra
     `train` (JAX).
+
+    Args:
+        output: Weights to write; the curve goes to FILE.png, and
+            FILE.npz.training keeps what an interrupted training goes on with.
+        minutes: Sets the number of cities and steps, by about so many minutes
+            of one core. The clock does not matter.
+        cities: Number of cities, if not by --minutes.
+        steps: Number of steps, if not by --minutes.
+        seed: Seed of everything.
+        without: Leave out change between drives, calibrated returns, or drivers
+            who wander; may be repeated.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -106,51 +81,13 @@ def train(
 def export_pairs(
     names: DriveNames = None,
     *,
-    format: Annotated[
-        Literal["pointnetvlad", "overlap"],
-        typer.Option(
-            help="Clouds and pickles of PointNetVLAD, or scans with exact "
-            "overlaps.",
-        ),
-    ],
-    output: Annotated[
-        Path, typer.Option(help="Folder of the set; created if need be.")
-    ],
-    vary: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FAMILY.yaml", help="Export the members of a family, too."
-        ),
-    ] = None,
-    held_out: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="A drive for the evaluation alone; may be repeated.",
-        ),
-    ] = None,
-    spacing: Annotated[
-        float,
-        typer.Option(
-            min=0.1, metavar="METRES", help="Between two clouds of a drive."
-        ),
-    ] = 10.0,
-    scans: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            metavar="N",
-            help="Merge N consecutive scans into each cloud, a submap.",
-        ),
-    ] = 1,
-    max_range: Annotated[
-        float,
-        typer.Option(
-            min=1.0,
-            metavar="METRES",
-            help="Leave out points with a greater x, y or z.",
-        ),
-    ] = 50.0,
+    format: Annotated[Literal["pointnetvlad", "overlap"], typer.Option()],
+    output: Annotated[Path, typer.Option()],
+    vary: Annotated[Path | None, typer.Option(metavar="FAMILY.yaml")] = None,
+    held_out: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    spacing: Annotated[float, typer.Option(min=0.1, metavar="METRES")] = 10.0,
+    scans: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
+    max_range: Annotated[float, typer.Option(min=1.0, metavar="METRES")] = 50.0,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -158,6 +95,16 @@ def export_pairs(
 
     Drives are simulated without a recording; positives, negatives and overlaps
     are exact. After an interruption the same command goes on.
+
+    Args:
+        format: Clouds and pickles of PointNetVLAD, or scans with exact
+            overlaps.
+        output: Folder of the set; created if need be.
+        vary: Export the members of a family, too.
+        held_out: A drive for the evaluation alone; may be repeated.
+        spacing: Between two clouds of a drive.
+        scans: Merge N consecutive scans into each cloud, a submap.
+        max_range: Leave out points with a greater x, y or z.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -186,17 +133,21 @@ def overlap(
     database: _Simulated,
     query: _Simulated,
     *,
-    output: Annotated[
-        Path, typer.Option(metavar="FILE.csv", help="Table to write.")
-    ],
-    query_spacing: QuerySpacing = PAPER_PROTOCOL.query_spacing,
-    place_spacing: PlaceSpacing = PAPER_PROTOCOL.place_spacing,
-    max_range: MaxRange = PAPER_PROTOCOL.max_range,
+    output: Annotated[Path, typer.Option(metavar="FILE.csv")],
+    query_spacing: float = PAPER_PROTOCOL.query_spacing,
+    place_spacing: float = PAPER_PROTOCOL.place_spacing,
+    max_range: float = PAPER_PROTOCOL.max_range,
 ) -> None:
     """Exact overlap of queries with places.
 
     Rays are cast in the city of the first drive, its database, at the points of
     the second drive's scans. Nothing is recorded.
+
+    Args:
+        output: Table to write.
+        query_spacing: Distance between two queries along the path [m].
+        place_spacing: Distance between two places of the database [m].
+        max_range: Leave out points farther than this along an axis [m].
     """
     with uninterrupted():
         from cns_drake.base.files import make_folder
@@ -227,9 +178,7 @@ def map_truth(
     a: _Recorded,
     b: _Recorded,
     *,
-    output: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder to write.")
-    ],
+    output: Annotated[Path, typer.Option(metavar="DIR")],
     spacing: SessionSpacing = 1.0,
 ) -> None:
     """Maps of two drives, labelled by rays.
@@ -238,6 +187,9 @@ def map_truth(
     cns-drake, or scenarios, which are simulated. Each point of A's map is kept,
     gone or unobserved by B; each of B's kept, new or newly seen. The worlds of
     both drives decide. cns-eval map-update scores labels of others.
+
+    Args:
+        output: Folder to write.
     """
     with uninterrupted():
         from cns_drake.studies.map_truth import open_survey, write_truth
@@ -266,26 +218,11 @@ def map_truth(
 
 
 def map_pairs(
-    pairs: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="PAIR", help="Test pairs; all by default."),
-    ] = None,
+    pairs: Annotated[list[str] | None, typer.Argument(metavar="PAIR")] = None,
     *,
-    output: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder to write.")
-    ],
-    files: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Folder of the imported cities' files."
-        ),
-    ] = None,
-    baseline: Annotated[
-        list[BaselineName] | None,
-        typer.Option(
-            help="Baseline to score; free-space and distance by default."
-        ),
-    ] = None,
+    output: Annotated[Path, typer.Option(metavar="DIR")],
+    files: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
+    baseline: list[BaselineName] | None = None,
     spacing: SessionSpacing = 1.0,
 ) -> None:
     """Make and score the frozen test pairs.
@@ -293,6 +230,12 @@ def map_pairs(
     Twelve pairs of maps, four of them of imported cities, by seeds that were
     drawn before any method ran on them. Writes cities, labelled maps and
     map_pairs.csv. What is there already stays.
+
+    Args:
+        pairs: Test pairs; all by default.
+        output: Folder to write.
+        files: Folder of the imported cities' files.
+        baseline: Baseline to score; free-space and distance by default.
     """
     with uninterrupted():
         from cns_drake.studies.map_pairs import score_pairs

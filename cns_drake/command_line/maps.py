@@ -82,11 +82,7 @@ RatesFile = Annotated[
 
 def list_drives(
     folders: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="FOLDER",
-            help="Folders of your own maps; the shipped ones by default.",
-        ),
+        list[Path] | None, typer.Argument(metavar="FOLDER")
     ] = None,
 ) -> None:
     """List drives and their figures.
@@ -94,6 +90,9 @@ def list_drives(
     Shows length and time of each drive, its recorded frames, and the structures
     and triangles of its stage. A narrow terminal shows fewer columns; a file or
     pipe gets all of them.
+
+    Args:
+        folders: Folders of your own maps; the shipped ones by default.
     """
     with uninterrupted():
         from cns_drake.scenarios.drive_table import drive_rows
@@ -150,94 +149,45 @@ def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
 
 
 def import_city(
-    source: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="FILE",
-            help="CityJSON 1.0 to 2.0 (.json), CityJSONSeq (.jsonl), "
-            "OpenStreetMap (.osm, .pbf), or OpenDRIVE (.xodr).",
-        ),
-    ],
-    output: Annotated[
-        Path, typer.Option(help="Map folder to write; its name is the map's.")
-    ],
-    years: Annotated[
-        list[int] | None,
-        typer.Option(
-            metavar="YEAR ...",
-            help="A stage for each year, with the buildings built until then.",
-        ),
-    ] = None,
-    year_attribute: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Attribute that holds the year; a usual name by default.",
-        ),
-    ] = None,
-    undated: Annotated[
-        Undated,
-        typer.Option(help="First stage with the buildings that have no year."),
-    ] = "first",
-    lod: Annotated[
-        float | None,
-        typer.Option(
-            help="Level of detail; the highest of each object by default."
-        ),
-    ] = None,
-    seed: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            help="Seed of the draws of --grow, and of buildings drawn along "
-            "roads without any (OpenDRIVE).",
-        ),
-    ] = 0,
-    along: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="WAYPOINTS",
-            help="CSV file of your own drive, x and y in the map, in place of "
-            "the two proposed ones.",
-        ),
-    ] = None,
+    source: Annotated[list[str], typer.Argument(metavar="FILE")],
+    output: Annotated[Path, typer.Option()],
+    years: Annotated[list[int] | None, typer.Option(metavar="YEAR ...")] = None,
+    year_attribute: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    undated: Undated = "first",
+    lod: float | None = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    along: Annotated[Path | None, typer.Option(metavar="WAYPOINTS")] = None,
     within: Annotated[
-        float | None,
-        typer.Option(
-            min=1.0,
-            metavar="METRES",
-            help="Leave out structures farther from the drives, to save "
-            "memory.",
-        ),
+        float | None, typer.Option(min=1.0, metavar="METRES")
     ] = None,
-    drive_on: Annotated[
-        DriveOn | None,
-        typer.Option(
-            help="Side of the street on which cars drive; by default the "
-            "file's, or else the right.",
-        ),
-    ] = None,
+    drive_on: DriveOn | None = None,
     grow: Annotated[
-        float | None,
-        typer.Option(
-            min=0.01,
-            max=0.9,
-            metavar="PART",
-            help="Add a first stage that lacks this share of the buildings, "
-            "drawn at random, or has them lower; 0.3 without --years.",
-        ),
+        float | None, typer.Option(min=0.01, max=0.9, metavar="PART")
     ] = None,
-    plain: Annotated[
-        bool,
-        typer.Option(
-            "--plain",
-            help="Only the content of the file; draw nothing at random.",
-        ),
-    ] = False,
+    plain: Annotated[bool, typer.Option("--plain")] = False,
 ) -> None:
     """Make a map of a real city.
 
     Writes its stages, two drives along its streets and a picture from above.
+
+    Args:
+        source: CityJSON 1.0 to 2.0 (.json), CityJSONSeq (.jsonl), OpenStreetMap
+            (.osm, .pbf), or OpenDRIVE (.xodr).
+        output: Map folder to write; its name is the map's.
+        years: A stage for each year, with the buildings built until then.
+        year_attribute: Attribute that holds the year; a usual name by default.
+        undated: First stage with the buildings that have no year.
+        lod: Level of detail; the highest of each object by default.
+        seed: Seed of the draws of --grow, and of buildings drawn along roads
+            without any (OpenDRIVE).
+        along: CSV file of your own drive, x and y in the map, in place of the
+            two proposed ones.
+        within: Leave out structures farther from the drives, to save memory.
+        drive_on: Side of the street on which cars drive; by default the file's,
+            or else the right.
+        grow: Add a first stage that lacks this share of the buildings, drawn at
+            random, or has them lower; 0.3 without --years.
+        plain: Only the content of the file; draw nothing at random.
     """
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]
@@ -344,56 +294,31 @@ def _shortened(kinds: Sequence[str]) -> str:
 
 
 def city(
-    folder: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FOLDER",
-            help="Folder with roads.yaml, city.yaml and stages.yaml, and the "
-            "drives of the city, whose figures are brought up to date.",
-        ),
-    ],
-    start: Annotated[
-        bool,
-        typer.Option(
-            "--start",
-            help="First write the missing files besides roads.yaml: a plan "
-            "with a district for each block, two stages, a drive for "
-            "each.",
-        ),
-    ] = False,
-    seed: Annotated[
-        int,
-        typer.Option(min=0, metavar="N", help="Seed of --start's draws."),
-    ] = 0,
-    check: Annotated[
-        bool,
-        typer.Option(
-            "--check",
-            help="Write nothing; exit with 1 if a file would change.",
-        ),
-    ] = False,
-    repair_stages: Annotated[
-        bool,
-        typer.Option(
-            "--repair-stages",
-            help="Update stages.yaml after the plan has grown: structures "
-            "that have kept their place in structures.csv get their new "
-            "names.",
-        ),
-    ] = False,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER")],
+    start: Annotated[bool, typer.Option("--start")] = False,
+    seed: Annotated[int, typer.Option(min=0, metavar="N")] = 0,
+    check: Annotated[bool, typer.Option("--check")] = False,
+    repair_stages: Annotated[bool, typer.Option("--repair-stages")] = False,
     calibrate: Annotated[
-        tuple[str, str] | None,
-        typer.Option(
-            metavar="EARLIER LATER",
-            help="Generate nothing. Simulate the drives of two stages, "
-            "such as 01 04, and show TCR_sym and each method without the "
-            "offset of the routes, without absent structures, and "
-            "without lower ones.",
-        ),
+        tuple[str, str] | None, typer.Option(metavar="EARLIER LATER")
     ] = None,
     jobs: Jobs = None,
 ) -> None:
-    """Build a city from its roads and plan."""
+    """Build a city from its roads and plan.
+
+    Args:
+        folder: Folder with roads.yaml, city.yaml and stages.yaml, and the
+            drives of the city, whose figures are brought up to date.
+        start: First write the missing files besides roads.yaml: a plan with a
+            district for each block, two stages, a drive for each.
+        seed: Seed of --start's draws.
+        check: Write nothing; exit with 1 if a file would change.
+        repair_stages: Update stages.yaml after the plan has grown: structures
+            that have kept their place in structures.csv get their new names.
+        calibrate: Generate nothing. Simulate the drives of two stages, such as
+            01 04, and show TCR_sym and each method without the offset of the
+            routes, without absent structures, and without lower ones.
+    """
     if calibrate is not None:
         _calibrate(folder, *calibrate, jobs)
         return
@@ -458,28 +383,13 @@ def maps_and_years(
 
 
 def age(
-    source: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="MAP", help="A shipped map by name, or a map's folder."
-        ),
-    ],
-    output: Annotated[
-        Path, typer.Option(help="Map folder to write; its name is the map's.")
-    ],
+    source: Annotated[list[str], typer.Argument(metavar="MAP")],
+    output: Annotated[Path, typer.Option()],
     years: FirstYear,
-    seed: Annotated[
-        int, typer.Option(min=0, help="Seed of everything that happens.")
-    ] = 0,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
     rate: RateFactor = 1.0,
     rates: RatesFile = None,
-    pictures: Annotated[
-        bool,
-        typer.Option(
-            "--pictures/--no-pictures",
-            help="Draw the city from the air and from three streets.",
-        ),
-    ] = True,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures")] = True,
 ) -> None:
     """Let a city live for some years.
 
@@ -487,6 +397,12 @@ def age(
     torn down and replaced, trees die, lamps and signs move. Writes a map with
     a stage for today and for each year, its history, the rates that came about,
     and pictures.
+
+    Args:
+        source: A shipped map by name, or a map's folder.
+        output: Map folder to write; its name is the map's.
+        seed: Seed of everything that happens.
+        pictures: Draw the city from the air and from three streets.
     """
     maps, wanted = maps_and_years(source, years)
     if len(maps) != 1:

@@ -32,8 +32,7 @@ Recording = Annotated[
     typer.Option(help="Also save a web page of the drive, FILE.html."),
 ]
 Graphviz = Annotated[
-    Path | None,
-    typer.Option(help="Also save the Diagram as Graphviz text."),
+    Path | None, typer.Option(help="Also save the Diagram as Graphviz text.")
 ]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace an existing recording.")

@@ -12,17 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress_bars import count_progress, show_progress
 from cns_drake.base.terminal import note
-from cns_drake.command_line.options import (
-    LIDAR_OPTION,
-    Frames,
-    Graphviz,
-    Jobs,
-    LidarPreset,
-    Output,
-    Overwrite,
-    Recording,
-    Scheduler,
-)
+from cns_drake.command_line import options
 
 if TYPE_CHECKING:
     from cns_drake.base.jobs.cluster import Cluster
@@ -84,10 +74,7 @@ def family_members(
 
 
 def choose_returns(
-    returns: Kind | None,
-    fog: float | None,
-    rain: float,
-    snowfall: float,
+    returns: Kind | None, fog: float | None, rain: float, snowfall: float
 ) -> tuple[Kind | None, WeatherConfig | None]:
     """Returns the returns and the weather of the options; None if not given.
 
@@ -113,66 +100,41 @@ def choose_returns(
 
 
 def simulate(
-    scenario: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME|SCENARIO.yaml",
-            help="A shipped drive, or a scenario file of your own.",
-        ),
-    ],
-    output: Output,
-    frames: Frames = None,
-    lidar: LidarPreset = None,
+    scenario: Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")],
+    output: options.Output,
+    frames: options.Frames = None,
+    lidar: options.LidarPreset = None,
     returns: Returns = None,
     fog: Fog = None,
     rain: Rain = 0.0,
     snowfall: Snowfall = 0.0,
     traffic: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=2000,
-            metavar="N",
-            help="Numbers of vehicles and of walkers, in place of the "
-            "scenario's.",
-        ),
+        int | None, typer.Option(min=0, max=2000, metavar="N")
     ] = None,
     transient: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SWITCH=VALUE,...",
-            help="A passing change and its strength: parked_cars, leaves, "
-            "snow, scaffolds, works, furniture, seed; may be repeated.",
-        ),
+        list[str] | None, typer.Option(metavar="SWITCH=VALUE,...")
     ] = None,
-    driver: Annotated[
-        Literal["real", "none"] | None,
-        typer.Option(
-            help="A driver like those of published drives, who wanders and "
-            "changes lanes, or one who keeps to the middle of his lane.",
-        ),
-    ] = None,
-    ride: Annotated[
-        Literal["A", "B", "C", "D", "E", "none"] | None,
-        typer.Option(
-            help="Put the car on springs, on a road of a class of ISO 8608 "
-            "from A (new) to E (very poor).",
-        ),
-    ] = None,
-    imu_rate: Annotated[
-        int | None,
-        typer.Option(
-            metavar="HZ",
-            help="Samples of the IMU a second, in place of the scenario's.",
-        ),
-    ] = None,
-    recording: Recording = None,
-    graphviz: Graphviz = None,
-    overwrite: Overwrite = False,
+    driver: Literal["real", "none"] | None = None,
+    ride: Literal["A", "B", "C", "D", "E", "none"] | None = None,
+    imu_rate: Annotated[int | None, typer.Option(metavar="HZ")] = None,
+    recording: options.Recording = None,
+    graphviz: options.Graphviz = None,
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Simulate a drive and record it.
 
     The recording is a rosbag2 folder of MCAP.
+
+    Args:
+        scenario: A shipped drive, or a scenario file of your own.
+        traffic: Numbers of vehicles and of walkers, in place of the scenario's.
+        transient: A passing change and its strength: parked_cars, leaves, snow,
+            scaffolds, works, furniture, seed; may be repeated.
+        driver: A driver like those of published drives, who wanders and changes
+            lanes, or one who keeps to the middle of his lane.
+        ride: Put the car on springs, on a road of a class of ISO 8608 from A
+            (new) to E (very poor).
+        imu_rate: Samples of the IMU a second, in place of the scenario's.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive
@@ -212,37 +174,32 @@ def _switches(texts: Iterable[str]) -> dict[str, str]:
 
 
 def scan(
-    world: Annotated[
-        Path, typer.Argument(metavar="WORLD.sdf", help="Any SDF world.")
-    ],
+    world: Annotated[Path, typer.Argument(metavar="WORLD.sdf")],
     pose: Annotated[
         tuple[float, float, float, float, float, float],
-        typer.Option(
-            metavar="X Y Z ROLL PITCH YAW",
-            help="The sensor's pose in the world [m, rad].",
-        ),
+        typer.Option(metavar="X Y Z ROLL PITCH YAW"),
     ],
-    output: Annotated[
-        Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
-    ],
-    lidar: Annotated[str, LIDAR_OPTION] = "cns",
+    output: Annotated[Path, typer.Option()],
+    lidar: Annotated[str, options.LIDAR_OPTION] = "cns",
     returns: Returns = None,
-    seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Seed of noise and weather.")
-    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, metavar="N")] = 0,
     fog: Fog = None,
     rain: Rain = 0.0,
     snowfall: Snowfall = 0.0,
     model_path: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder to search for model://, before GZ_SIM_RESOURCE_PATH "
-            "and SDF_PATH; may be repeated.",
-        ),
+        list[Path] | None, typer.Option(metavar="DIR")
     ] = None,
 ) -> None:
-    """Take one scan of any SDF world."""
+    """Take one scan of any SDF world.
+
+    Args:
+        world: Any SDF world.
+        pose: The sensor's pose in the world [m, rad].
+        output: Where to save: .pcd, .bin or .npy.
+        seed: Seed of noise and weather.
+        model_path: Folder to search for model://, before GZ_SIM_RESOURCE_PATH
+            and SDF_PATH; may be repeated.
+    """
     with uninterrupted():
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
@@ -255,17 +212,13 @@ def scan(
             make_pattern,
             make_returns,
         )
-        from cns_drake.simulation.scanning import (
-            check_ending,
-            save_scan,
-            scan_world,
-        )
+        from cns_drake.simulation import scanning
 
     if not np.isfinite(pose).all():
         raise InputError("--pose: not finite")
     if max(map(abs, pose)) > LARGEST_SIZE:
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
-    check_ending(output)
+    scanning.check_ending(output)
     config = make_lidar_config(lidar)
     pattern = make_pattern(config)
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
@@ -275,32 +228,29 @@ def scan(
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
     config = config.replaced(returns=chosen or "ideal")
     model = make_returns(config, weather or WeatherConfig(), "lidar", seed)
-    points = scan_world(loaded, X_WS, pattern, model)
-    save_scan(points, output)
+    points = scanning.scan_world(loaded, X_WS, pattern, model)
+    scanning.save_scan(points, output)
     typer.echo(f"{output}: {len(points)} points")
 
 
 def generate(
     names: DriveNames = None,
     *,
-    output: Output,
-    frames: Frames = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    overwrite: Overwrite = False,
-    vary: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FAMILY.yaml",
-            help="Record the members of a family besides the named drives. "
-            "Their scenario files go to <output>/scenarios, cities of "
-            "their own to <output>/cities.",
-        ),
-    ] = None,
+    output: options.Output,
+    frames: options.Frames = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    overwrite: options.Overwrite = False,
+    vary: Annotated[Path | None, typer.Option(metavar="FAMILY.yaml")] = None,
 ) -> None:
     """Record many drives.
 
     Finished recordings are skipped; interrupted ones go on where they were.
+
+    Args:
+        vary: Record the members of a family besides the named drives. Their
+            scenario files go to <output>/scenarios, cities of their own to
+            <output>/cities.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -322,43 +272,24 @@ def generate(
 
 
 def export(
-    drive: Annotated[
-        Path,
-        typer.Argument(
-            metavar="DRIVE", help="A recorded folder, or its .mcap file."
-        ),
-    ],
-    layout: Annotated[
-        Literal["cns", "kitti", "tum"],
-        typer.Option(
-            "--format",
-            help="Layout: CNS data set, KITTI odometry, or TUM (the "
-            "trajectory alone).",
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            help="Folder of drives: new, empty, or of earlier exports."
-        ),
-    ],
-    sensor: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="Name of the LiDAR, if there are several."
-        ),
-    ] = None,
-    absent_in: Annotated[
-        str | None,
-        typer.Option(
-            metavar="STAGE",
-            help="Label points on structures that this stage of the map lacks "
-            "with SemanticKITTI's labels of moving objects (252 to 259); "
-            "with kitti.",
-        ),
-    ] = None,
+    drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
+    layout: Annotated[Literal["cns", "kitti", "tum"], typer.Option("--format")],
+    output: Annotated[Path, typer.Option()],
+    sensor: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
 ) -> None:
-    """Export a recording to a common layout."""
+    """Export a recording to a common layout.
+
+    Args:
+        drive: A recorded folder, or its .mcap file.
+        layout: Layout: CNS data set, KITTI odometry, or TUM (the trajectory
+            alone).
+        output: Folder of drives: new, empty, or of earlier exports.
+        sensor: Name of the LiDAR, if there are several.
+        absent_in: Label points on structures that this stage of the map lacks
+            with SemanticKITTI's labels of moving objects (252 to 259); with
+            kitti.
+    """
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
 
@@ -376,25 +307,22 @@ def export(
 
 
 def repair(
-    file: Annotated[
-        Path,
-        typer.Argument(metavar="FILE", help="Any MCAP file, whole or damaged."),
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(help="The new file; <name>_repaired.mcap by default."),
-    ] = None,
+    file: Annotated[Path, typer.Argument(metavar="FILE")],
+    output: Path | None = None,
 ) -> None:
-    """Save what is readable of an MCAP file."""
+    """Save what is readable of an MCAP file.
+
+    Args:
+        file: Any MCAP file, whole or damaged.
+        output: The new file; <name>_repaired.mcap by default.
+    """
     with uninterrupted():
         from cns_drake.recording.repair import repair_mcap
 
     with show_progress() as progress:
         task = progress.add_task(file.name, total=None, note="")
         result = repair_mcap(
-            file,
-            output,
-            count_progress(progress, task, unit="bytes"),
+            file, output, count_progress(progress, task, unit="bytes")
         )
     typer.echo(
         f"{result.output}: {result.num_messages} messages over "

@@ -13,17 +13,8 @@ from cns_drake.base.drives.drive import PlacedDrive, check_same_map
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
+from cns_drake.command_line import options
 from cns_drake.command_line.maps import RateFactor, RatesFile, maps_and_years
-from cns_drake.command_line.options import (
-    Jobs,
-    Maps,
-    MethodFiles,
-    Output,
-    Results,
-    Scheduler,
-    Task,
-    TaskName,
-)
 from cns_drake.command_line.simulating import family_members
 from evaluation.command_line.options import Costs, Settings, with_named_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -31,11 +22,11 @@ from evaluation.recognition.protocol import RetrievalProtocol
 if TYPE_CHECKING:
     from cns_drake.base.jobs.cluster import Cluster
     from cns_drake.scenarios.scenario import Scenario
-    from evaluation.report.compared import ComparedPair
+    from evaluation.study.localisation import ComparedPair
 
 
 def _run_task(
-    task: Task,
+    task: options.Task,
     pairs: Sequence[ComparedPair],
     output: Path,
     cluster: Cluster,
@@ -43,7 +34,7 @@ def _run_task(
     own_methods: Sequence[Path] | None,
 ) -> Path:
     """Runs a task other than `PLACE` on pairs of drives; returns its table."""
-    if task is Task.LOCALISE:
+    if task is options.Task.LOCALISE:
         from evaluation.study.localisation import SHIPPED, localise_pairs
 
         methods = (*SHIPPED, *map(str, own_methods or ()))
@@ -60,55 +51,44 @@ def _run_task(
 
 @with_named_protocol
 def reproduce(
-    maps: Maps = None,
+    maps: options.Maps = None,
     *,
-    output: Output,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    pages: Annotated[
-        bool | None,
-        typer.Option(
-            "--pages/--no-pages",
-            help="Also make a web page of each drive; the default without "
-            "--quick.",
-        ),
-    ] = None,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Only the report: simulate without recording.",
-        ),
-    ] = False,
-    method: MethodFiles = None,
+    output: options.Output,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    pages: Annotated[bool | None, typer.Option("--pages/--no-pages")] = None,
+    quick: Annotated[bool, typer.Option("--quick")] = False,
+    method: options.MethodFiles = None,
     parameter: Settings = None,
     costs: Costs = True,
-    task: TaskName = Task.PLACE,
+    task: options.TaskName = options.Task.PLACE,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Simulate a map, evaluate it and report."""
+    """Simulate a map, evaluate it and report.
+
+    Args:
+        pages: Also make a web page of each drive; the default without --quick.
+        quick: Only the report: simulate without recording.
+    """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.reproduction import (
-            reproduce_maps,
-            stage_pairs,
-        )
+        from cns_drake.studies import reproduction
 
     cluster = choose_cluster(jobs, scheduler)
     if quick and pages:
         raise InputError(
             "--quick and --pages exclude each other; give one of them"
         )
-    if task is not Task.PLACE:
+    if task is not options.Task.PLACE:
         if parameter or pages:
             raise InputError(
                 f"--task {task.value}: leave out --set and --pages"
             )
-        drives = stage_pairs(maps, output)
+        drives = reproduction.stage_pairs(maps, output)
         spacing = protocol.query_spacing
         typer.echo(_run_task(task, drives, output, cluster, spacing, method))
         return
-    report = reproduce_maps(
+    report = reproduction.reproduce_maps(
         maps,
         output,
         cluster,
@@ -125,24 +105,13 @@ def reproduce(
 
 @with_named_protocol
 def fresh(
-    maps: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="MAP", help="Shipped maps; all of them by default."
-        ),
-    ] = None,
+    maps: Annotated[list[str] | None, typer.Argument(metavar="MAP")] = None,
     *,
-    output: Results,
-    number: Annotated[
-        list[int] | None,
-        typer.Option(
-            metavar="N",
-            help="A version, from 1 to 5; may be repeated. All by default.",
-        ),
-    ] = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    method: MethodFiles = None,
+    output: options.Results,
+    number: Annotated[list[int] | None, typer.Option(metavar="N")] = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    method: options.MethodFiles = None,
     protocol: RetrievalProtocol,
 ) -> None:
     """Evaluate cities that no method has seen.
@@ -151,16 +120,25 @@ def fresh(
     buildings, with real drivers; two are turned, so that their streets lie off
     the axes. Their seeds were drawn before any method ran on them. Nothing is
     recorded. After an interruption the same command goes on where it was.
+
+    Args:
+        maps: Shipped maps; all of them by default.
+        number: A version, from 1 to 5; may be repeated. All by default.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.fresh_cities import evaluate_fresh_cities
+        from cns_drake.studies.fresh_cities import draw_fresh_cities
+        from cns_drake.studies.reproduction import reproduce_maps
 
-    report = evaluate_fresh_cities(
-        maps or (),
-        number or (),
+    cluster = choose_cluster(jobs, scheduler)
+    cities = draw_fresh_cities(
+        maps or (), number or (), output / "cities", cluster
+    )
+    report = reproduce_maps(
+        [str(folder) for folder in cities],
         output,
-        choose_cluster(jobs, scheduler),
+        cluster,
+        quick=True,
         protocol=protocol,
         own_methods=method or (),
         on_note=note,
@@ -169,58 +147,21 @@ def fresh(
 
 
 def ladder(
-    maps: Maps = None,
+    maps: options.Maps = None,
     *,
-    output: Results,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Only the strongest level of each cause, and every other "
-            "query.",
-        ),
-    ] = False,
-    levels: Annotated[
-        bool,
-        typer.Option(
-            "--levels",
-            help="Only the frozen levels, with all causes together.",
-        ),
-    ] = False,
-    cause: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="A cause of change, such as traffic or all; may be repeated. "
-            "Every one by default.",
-        ),
-    ] = None,
+    output: options.Results,
+    quick: Annotated[bool, typer.Option("--quick")] = False,
+    levels: Annotated[bool, typer.Option("--levels")] = False,
+    cause: list[str] | None = None,
     viewpoint: Annotated[
-        str,
-        typer.Option(
-            metavar="near|lane|reversed",
-            help="Where the database is driven on all rungs: 0.5 m beside the "
-            "queries, 5 m, or 5 m and facing backwards.",
-        ),
+        str, typer.Option(metavar="near|lane|reversed")
     ] = "near",
-    pairs: Annotated[
-        bool,
-        typer.Option(
-            "--pairs",
-            help="Also cross the six causes that cost most two by two.",
-        ),
-    ] = False,
-    seeds: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            metavar="N",
-            help="Repeat all random draws N times, and give means.",
-        ),
-    ] = 1,
-    task: TaskName = Task.PLACE,
-    method: MethodFiles = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    pairs: Annotated[bool, typer.Option("--pairs")] = False,
+    seeds: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
+    task: options.TaskName = options.Task.PLACE,
+    method: options.MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
 ) -> None:
     """What each change costs each method.
 
@@ -228,46 +169,52 @@ def ladder(
     between the two at a time, and with all together. No drive is recorded.
     Writes ladder.csv, queries.csv and a figure. After an interruption the same
     command goes on where it was.
+
+    Args:
+        quick: Only the strongest level of each cause, and every other query.
+        levels: Only the frozen levels, with all causes together.
+        cause: A cause of change, such as traffic or all; may be repeated. Every
+            one by default.
+        viewpoint: Where the database is driven on all rungs: 0.5 m beside the
+            queries, 5 m, or 5 m and facing backwards.
+        pairs: Also cross the six causes that cost most two by two.
+        seeds: Repeat all random draws N times, and give means.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.studies import ladder_rungs
         from cns_drake.studies.ladder import (
             QUICK_EXTENT,
             QUICK_PROTOCOL,
             climb_ladder,
             rung_pairs,
         )
-        from cns_drake.studies.ladder_rungs import (
-            CAUSES,
-            EXTRAS,
-            NEAR,
-            VIEWPOINTS,
-            Extent,
-        )
         from cns_drake.studies.levels import LEVELS_EXTENT, LEVELS_PROTOCOL
         from evaluation.recognition.protocol import DEFAULT_PROTOCOL
         from evaluation.study.chosen_methods import choose_methods
 
-    if viewpoint not in VIEWPOINTS:
-        known = ", ".join(VIEWPOINTS)
+    if viewpoint not in ladder_rungs.VIEWPOINTS:
+        known = ", ".join(ladder_rungs.VIEWPOINTS)
         raise InputError(
             f"--viewpoint: no viewpoint {viewpoint!r} (there are: {known})"
         )
-    is_own = quick or cause or seeds > 1 or pairs or viewpoint != NEAR
+    is_own = (
+        quick or cause or seeds > 1 or pairs or viewpoint != ladder_rungs.NEAR
+    )
     if levels and is_own:
         raise InputError(
             "--levels: the levels are frozen; leave out --quick, --cause, "
             "--seeds, --pairs and --viewpoint"
         )
-    if task is not Task.PLACE and (levels or pairs):
+    if task is not options.Task.PLACE and (levels or pairs):
         raise InputError(f"--task {task.value}: leave out --levels and --pairs")
     cluster = choose_cluster(jobs, scheduler)
-    causes = tuple(cause or CAUSES)
+    causes = tuple(cause or ladder_rungs.CAUSES)
     for name in causes:
-        if name not in (*CAUSES, *EXTRAS):
-            known = ", ".join((*CAUSES, *EXTRAS))
+        if name not in (*ladder_rungs.CAUSES, *ladder_rungs.EXTRAS):
+            known = ", ".join((*ladder_rungs.CAUSES, *ladder_rungs.EXTRAS))
             raise InputError(f"--cause: no cause {name!r} (there are: {known})")
-    extent, protocol = Extent(), DEFAULT_PROTOCOL
+    extent, protocol = ladder_rungs.Extent(), DEFAULT_PROTOCOL
     if quick:
         extent, protocol = QUICK_EXTENT, QUICK_PROTOCOL
         note(
@@ -275,14 +222,11 @@ def ladder(
             "4), every other query, more than 300 places of other cities"
         )
     extent = replace(
-        extent,
-        causes=causes,
-        seeds=range(1, seeds + 1),
-        viewpoint=viewpoint,
+        extent, causes=causes, seeds=range(1, seeds + 1), viewpoint=viewpoint
     )
     if levels:
         extent, protocol = LEVELS_EXTENT, LEVELS_PROTOCOL
-    if task is not Task.PLACE:
+    if task is not options.Task.PLACE:
         rungs = rung_pairs(maps, extent, note)
         spacing = protocol.query_spacing
         typer.echo(_run_task(task, rungs, output, cluster, spacing, method))
@@ -302,16 +246,14 @@ def ladder(
 
 
 def levels(
-    results: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RESULTS.csv", help="Tables written by ladder --levels."
-        ),
-    ],
+    results: Annotated[list[Path], typer.Argument(metavar="RESULTS.csv")],
 ) -> None:
     """Check results on the frozen levels.
 
     Prints one table of all of them in Markdown.
+
+    Args:
+        results: Tables written by ladder --levels.
     """
     with uninterrupted():
         from cns_drake.studies.levels import (
@@ -325,30 +267,14 @@ def levels(
 
 
 def size(
-    map_name: Annotated[
-        str,
-        typer.Argument(metavar="MAP", help="The map that is asked about."),
-    ],
+    map_name: Annotated[str, typer.Argument(metavar="MAP")],
     *,
-    output: Results,
-    places: Annotated[
-        list[int] | None,
-        typer.Option(
-            metavar="N",
-            help="Number of places of other cities, up to 100000; may be "
-            "repeated. By default 0, 1000, 10000 and 100000.",
-        ),
-    ] = None,
-    method: MethodFiles = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Measure only the method of this name; may be repeated.",
-        ),
-    ] = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    output: options.Results,
+    places: Annotated[list[int] | None, typer.Option(metavar="N")] = None,
+    method: options.MethodFiles = None,
+    only: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
 ) -> None:
     """AUC and time among many places.
 
@@ -356,6 +282,12 @@ def size(
     cities: the other shipped ones, twin blocks, redrawn ones. A method that
     would take over an hour for all queries has its time only. Writes size.csv.
     After an interruption the same command goes on where it was.
+
+    Args:
+        map_name: The map that is asked about.
+        places: Number of places of other cities, up to 100000; may be repeated.
+            By default 0, 1000, 10000 and 100000.
+        only: Measure only the method of this name; may be repeated.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -374,57 +306,33 @@ def size(
 
 
 def years(
-    maps: Annotated[
-        list[str],
-        typer.Argument(metavar="MAP", help="Maps, by name or folder."),
-    ],
-    output: Results,
-    years: Annotated[
-        list[int] | None,
-        typer.Option(
-            metavar="YEAR ...",
-            help="Years between database and query, ascending; 1 2 5 10 20 40 "
-            "by default, 5 20 40 with --quick.",
-        ),
-    ] = None,
-    seeds: Annotated[
-        int,
-        typer.Option(
-            min=1, metavar="N", help="Number of histories of each city."
-        ),
-    ] = 1,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Fewer years, queries and places, and only old databases.",
-        ),
-    ] = False,
+    maps: Annotated[list[str], typer.Argument(metavar="MAP")],
+    output: options.Results,
+    years: Annotated[list[int] | None, typer.Option(metavar="YEAR ...")] = None,
+    seeds: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
+    quick: Annotated[bool, typer.Option("--quick")] = False,
     rate: RateFactor = 1.0,
     rates: RatesFile = None,
-    localise: Annotated[
-        bool,
-        typer.Option(
-            "--localise",
-            help="Also localise the queries in the maps of the databases.",
-        ),
-    ] = False,
-    map_update: Annotated[
-        bool,
-        typer.Option(
-            "--map-update",
-            help="Also score what finds the changes of the maps.",
-        ),
-    ] = False,
-    method: MethodFiles = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    localise: Annotated[bool, typer.Option("--localise")] = False,
+    map_update: Annotated[bool, typer.Option("--map-update")] = False,
+    method: options.MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
 ) -> None:
     """How old a map may be for each method.
 
     A drive queries a database of its own route that is some years older, and
     an older drive one of today. No drive is recorded. Writes years.csv,
     lifetimes.csv and a chart. After an interruption the same command goes on.
+
+    Args:
+        maps: Maps, by name or folder.
+        years: Years between database and query, ascending; 1 2 5 10 20 40 by
+            default, 5 20 40 with --quick.
+        seeds: Number of histories of each city.
+        quick: Fewer years, queries and places, and only old databases.
+        localise: Also localise the queries in the maps of the databases.
+        map_update: Also score what finds the changes of the maps.
     """
     named, wanted = maps_and_years(maps, years or [])
     with uninterrupted():
@@ -455,24 +363,12 @@ def years(
 @with_named_protocol
 def trend(
     *,
-    vary: Annotated[
-        Path,
-        typer.Option(
-            metavar="FAMILY.yaml",
-            help="The members of this family are the databases.",
-        ),
-    ],
-    query: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME|SCENARIO.yaml",
-            help="The query drive: a shipped drive or a scenario file.",
-        ),
-    ],
-    output: Results,
-    method: MethodFiles = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    vary: Annotated[Path, typer.Option(metavar="FAMILY.yaml")],
+    query: Annotated[str, typer.Option(metavar="NAME|SCENARIO.yaml")],
+    output: options.Results,
+    method: options.MethodFiles = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
     parameter: Settings = None,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -481,17 +377,18 @@ def trend(
     No drive is recorded. Writes trend.csv and a figure with 95 % bands: AUC,
     and the share of it that is kept against the same route without change.
     After an interruption the same command goes on where it was.
+
+    Args:
+        vary: The members of this family are the databases.
+        query: The query drive: a shipped drive or a scenario file.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.simulated_drive import DriveSimulation
+        from evaluation.study import trend_databases
         from evaluation.study.chosen_methods import choose_methods
         from evaluation.study.trend import write_trend
-        from evaluation.study.trend_databases import (
-            TrendDatabase,
-            measure_drives,
-        )
 
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or (), parameter or ())
@@ -500,16 +397,14 @@ def trend(
     for member in members:
         check_same_map(*map(_placed, (member, query_drive)))
     controls = family_controls(members, query_drive)
-    points = measure_drives(
+    points = trend_databases.measure_drives(
         query_drive.name,
         DriveSimulation(query_drive),
         {
-            member.name: TrendDatabase(
-                DriveSimulation(member), controls[member.name].name
-            )
-            for member in members
+            one.name: DriveSimulation(one)
+            for one in (*members, *controls.values())
         },
-        {one.name: DriveSimulation(one) for one in controls.values()},
+        {member: control.name for member, control in controls.items()},
         output,
         cluster,
         methods,

@@ -33,10 +33,6 @@ class VisibleSurfaces:
     """The surfaces that a LiDAR sees from a place of a simulated drive.
 
     Attributes:
-        scene: the world as it was then.
-        X_WS: pose of the sensor.
-        pattern: the pattern of its beams.
-        coverage: what their directions cover.
         max_range: greatest coordinate of a point in the sensor's frame [m].
     """
 
@@ -82,9 +78,6 @@ def exact_overlaps(
     """Returns the exact overlap of every query with every place, (Q, D).
 
     NaN for a query without a point.
-
-    Args:
-        query: the drive of the queries, through the same map.
 
     Raises:
         InputError: the two are of different maps.

@@ -6,7 +6,7 @@ turned as a whole, so that their streets lie off the axes of the world.
 `worlds/fresh.csv` holds the seeds and turns, drawn before any method ran.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 import math
@@ -23,11 +23,7 @@ from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.studies.redrawing import RedrawCity, redrawn_inputs, to_yaml
-from cns_drake.studies.reproduction import reproduce_maps
-from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 
-# Expected time to draw a city with its stages [s].
-_COST = 15.0
 # Fields of inputs that hold a place, and lists of places.
 _PLACES = frozenset({"position", "at", "block", "start", "end"})
 _LISTS_OF_PLACES = frozenset({"via", "area", "line", "within", "points"})
@@ -41,9 +37,7 @@ class Version:
     """A version of a shipped map.
 
     Attributes:
-        map_name: the map.
         number: from 1 on.
-        seed: seed of the city.
         turn_deg: turn of the whole city about the world's origin [deg].
     """
 
@@ -67,52 +61,10 @@ def fresh_versions() -> list[Version]:
     ]
 
 
-def evaluate_fresh_cities(
-    maps: Sequence[str],
-    numbers: Sequence[int],
-    output: Path,
-    cluster: Cluster,
-    *,
-    protocol: RetrievalProtocol = FAIR_PROTOCOL,
-    own_methods: Sequence[Path] = (),
-    on_note: Callable[[str], None] = lambda text: None,
-) -> Path:
-    """Draws fresh cities, drives through them and reports.
-
-    `<output>/cities` gets the map folders, `<output>/report` the tables and
-    figures of all of them. Nothing is recorded, finished work is not repeated.
-
-    Args:
-        numbers: of the versions; all if empty.
-        own_methods: Python files with one method each, to run besides those
-            of this package.
-
-    Returns:
-        The path of the report's page.
-
-    Raises:
-        InputError: there is no such version, or a step failed.
-    """
-    folders = draw_fresh_cities(maps, numbers, output / "cities", cluster)
-    return reproduce_maps(
-        [str(folder) for folder in folders],
-        output,
-        cluster,
-        quick=True,
-        protocol=protocol,
-        own_methods=own_methods,
-        on_note=on_note,
-    )
-
-
 def draw_fresh_cities(
     maps: Sequence[str], numbers: Sequence[int], output: Path, cluster: Cluster
 ) -> list[Path]:
     """Draws fresh cities; returns their map folders, `<output>/<map>_fNN`.
-
-    Args:
-        maps, numbers: see `evaluate_fresh_cities`.
-        output: the folder of cities; created if need be.
 
     Raises:
         InputError: there is no such version, or it could not be drawn.
@@ -141,10 +93,7 @@ def draw_fresh_cities(
         and (not numbers or one.number in numbers)
     ]
     make_folder(output)
-    run_jobs(
-        [Job(f"city {step.folder.name}", step, cost=_COST) for step in steps],
-        cluster,
-    )
+    run_jobs([Job(f"city {step.folder.name}", step) for step in steps], cluster)
     return [step.folder for step in steps]
 
 
@@ -187,10 +136,7 @@ class DrawFreshCity(RedrawCity):
 
     def sources(self) -> dict[str, object]:
         stages = MapFolder(self.map_folder).stage_plan
-        return {
-            **super().sources(),
-            "stages": stages.read_text("utf-8"),
-        }
+        return {**super().sources(), "stages": stages.read_text("utf-8")}
 
 
 def turned(values: Any, turn_deg: float) -> Any:

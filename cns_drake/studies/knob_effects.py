@@ -5,8 +5,7 @@ are absent at the earlier stage, and those that are lower there. Each is taken
 back in turn, and the drives are simulated anew.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 import shutil
 import tempfile
@@ -21,12 +20,8 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.study import trend_databases
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.trend_databases import (
-    TrendDatabase,
-    TrendPoint,
-    measure_drives,
-)
 
 _AS_IT_IS = "as_it_is"
 # Variant of the earlier stage -> its title.
@@ -39,23 +34,13 @@ _TITLES = {
 }
 
 
-@dataclass(frozen=True)
-class Effect:
-    """A pair of drives with one of the knobs taken back.
-
-    Attributes:
-        title: the title of the variant.
-        points: a point for each method.
-    """
-
-    title: str
-    points: tuple[TrendPoint, ...]
-
-
 def knob_effects(
     earlier: Scenario, later: Scenario, cluster: Cluster
-) -> list[Effect]:
+) -> dict[str, list[trend_databases.TrendPoint]]:
     """Simulates the pair as it is and with each knob taken back.
+
+    Returns:
+        Title -> a point for each method.
 
     Args:
         earlier: a drive; the database.
@@ -67,27 +52,21 @@ def knob_effects(
     with tempfile.TemporaryDirectory(prefix="calibration_") as scratch:
         folder = Path(scratch) / "map"
         drives = _variants(earlier, later, folder)
-        points = measure_drives(
+        points = trend_databases.measure_drives(
             later.name,
             DriveSimulation(later),
-            {
-                name: TrendDatabase(DriveSimulation(drive))
-                for name, drive in drives.items()
-            },
-            {},
+            {name: DriveSimulation(drive) for name, drive in drives.items()},
+            dict.fromkeys(drives),
             Path(scratch) / "study",
             cluster,
             choose_methods(),
             # Cities were fitted to the paper's numbers.
             PAPER_PROTOCOL,
         )
-    return [
-        Effect(
-            _TITLES[name],
-            tuple(point for point in points if point.database == name),
-        )
+    return {
+        _TITLES[name]: [one for one in points if one.database == name]
         for name in drives
-    ]
+    }
 
 
 def _variants(
@@ -133,13 +112,15 @@ def _variants(
     }
 
 
-def effect_lines(effects: Sequence[Effect]) -> Iterator[str]:
+def effect_lines(
+    effects: Mapping[str, Sequence[trend_databases.TrendPoint]],
+) -> Iterator[str]:
     """Yields a table of TCR_sym, and of AUC and R@1 of each method."""
-    methods = [point.method for point in effects[0].points]
+    methods = [point.method for point in next(iter(effects.values()))]
     yield "  ".join(
         [f"{'AUC/R@1':<44} TCR_sym", *(f"{m:>15}" for m in methods)]
     )
-    for effect in effects:
-        numbers = [f"{p.auc:>10.3f}/{p.recall_at_1:.2f}" for p in effect.points]
-        change = effect.points[0].tcr_sym
-        yield "  ".join([f"{effect.title:<44}  {change:.4f}", *numbers])
+    for title, points in effects.items():
+        numbers = [f"{p.auc:>10.3f}/{p.recall_at_1:.2f}" for p in points]
+        change = points[0].tcr_sym
+        yield "  ".join([f"{title:<44}  {change:.4f}", *numbers])

@@ -24,47 +24,22 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario, map_folder
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies.ladder_rungs import (
-    ALL,
-    APART,
-    NEAR,
-    NONE,
-    Extent,
-    Rung,
-    plain_drives,
-    plan_pairs,
-    plan_rungs,
-)
+from cns_drake.studies import ladder_rungs
 from cns_drake.studies.redrawing import redraw_cities
 from cns_drake.studies.reproduction import recordable_map
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import (
-    DEFAULT_PROTOCOL,
-    RetrievalProtocol,
-)
-from evaluation.report.compared import ComparedPair
-from evaluation.report.ladder import (
-    LadderRow,
-    LadderRung,
-    MeasuredRung,
-    draw_ladder,
-    ladder_query_table,
-    ladder_rows,
-    ladder_table,
-    ladder_text,
-    pair_table,
-    pair_text,
-    strongest_causes,
-)
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.report import ladder
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.localisation import ComparedPair
 from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
 from evaluation.study.rungs import DescribedSource, measure_rung
-from evaluation.study.surveys import DescribeDrive
+from evaluation.study.surveys import Survey
 
 # With --quick only the strongest level of each cause is measured, on every
 # other query.
-QUICK_EXTENT = Extent(levels=(4,), most_places=300)
+QUICK_EXTENT = ladder_rungs.Extent(levels=(4,), most_places=300)
 QUICK_PROTOCOL = replace(DEFAULT_PROTOCOL, query_spacing=20.0)
 # Number of causes that are crossed two by two.
 _CROSSED = 6
@@ -84,7 +59,7 @@ def climb_ladder(
     output: Path,
     cluster: Cluster,
     methods: tuple[MethodChoice, ...],
-    extent: Extent,
+    extent: ladder_rungs.Extent,
     protocol: RetrievalProtocol = DEFAULT_PROTOCOL,
     *,
     with_pairs: bool = False,
@@ -111,15 +86,15 @@ def climb_ladder(
     make_folder(output)
     files = StudyFiles(output.absolute())
     plans: dict[str, RungPlan] = {}
-    planned: list[tuple[Scenario, Rung]] = []
+    planned: list[tuple[Scenario, ladder_rungs.Rung]] = []
     for drive in asked:
-        rungs, notes = plan_rungs(drive, extent)
+        rungs, notes = ladder_rungs.plan_rungs(drive, extent)
         for text in notes:
             on_note(f"{drive.source}: {text}")
         plan = RungPlan(drive, extent.viewpoint, methods, protocol, files)
         most = max(rung.drives.num_distractors for rung in rungs)
         plan.distractors = distracting_drives(
-            plain_drives(drive).database,
+            ladder_rungs.plain_drives(drive).database,
             most,
             protocol.place_spacing,
             output / "cities",
@@ -129,26 +104,28 @@ def climb_ladder(
         plans[drive.name] = plan
         planned += [(drive, rung) for rung in rungs]
     measured = _measure(planned, plans, cluster, protocol)
-    rows = ladder_rows(measured)
-    pairs: list[LadderRow] = []
+    rows = ladder.ladder_rows(measured)
+    pairs: list[ladder.LadderRow] = []
     if with_pairs:
-        apart = {NONE, ALL, *APART}
-        causes = [one for one in strongest_causes(rows) if one not in apart]
+        apart = {ladder_rungs.NONE, ladder_rungs.ALL, *ladder_rungs.APART}
+        causes = [
+            one for one in ladder.strongest_causes(rows) if one not in apart
+        ]
         crossed = causes[:_CROSSED]
         on_note(f"crossing two by two: {', '.join(crossed)}")
         planned = [
             (drive, rung)
             for drive in asked
-            for rung in plan_pairs(drive, crossed, extent)
+            for rung in ladder_rungs.plan_pairs(drive, crossed, extent)
         ]
         measured += _measure(planned, plans, cluster, protocol)
-        pairs = ladder_rows(measured)[len(rows) :]
+        pairs = ladder.ladder_rows(measured)[len(rows) :]
     return _write(measured, rows, pairs, output, protocol, extent)
 
 
 def rung_pairs(
     maps: Sequence[str] | None,
-    extent: Extent,
+    extent: ladder_rungs.Extent,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> list[ComparedPair]:
     """Returns the drives of all rungs of maps, for tasks with a map.
@@ -161,7 +138,7 @@ def rung_pairs(
     """
     pairs = []
     for drive in query_drives(maps or shipped_maps()):
-        rungs, notes = plan_rungs(drive, extent)
+        rungs, notes = ladder_rungs.plan_rungs(drive, extent)
         for text in notes:
             on_note(f"{drive.source}: {text}")
         pairs += [
@@ -180,11 +157,11 @@ def rung_pairs(
 
 
 def _measure(
-    planned: Sequence[tuple[Scenario, Rung]],
+    planned: Sequence[tuple[Scenario, ladder_rungs.Rung]],
     plans: Mapping[str, RungPlan],
     cluster: Cluster,
     protocol: RetrievalProtocol,
-) -> list[MeasuredRung]:
+) -> list[ladder.MeasuredRung]:
     """Measures rungs, each with the drive of its queries."""
     parts = [plans[drive.name].add_rung(rung) for drive, rung in planned]
     jobs: dict[str, Job] = {}
@@ -192,7 +169,7 @@ def _measure(
         jobs |= plan.jobs
     run_jobs(jobs.values(), cluster)
     return [
-        MeasuredRung(
+        ladder.MeasuredRung(
             _labelled(drive, rung, protocol.radius),
             rung.seed,
             rung.fingerprint(),
@@ -237,80 +214,84 @@ class RungPlan:
     distractors: Sequence[Scenario] = ()
 
     def __post_init__(self) -> None:
-        self._plain = plain_drives(self._query, self._viewpoint)
+        self._plain = ladder_rungs.plain_drives(self._query, self._viewpoint)
 
-    def add_rung(self, rung: Rung) -> Part:
+    def add_rung(self, rung: ladder_rungs.Rung) -> Part:
         """Adds the jobs of a rung; returns the part that they write."""
         needs: list[str] = []
-        others = self.distractors if rung.drives.num_distractors else ()
-        name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
-        if self._viewpoint != NEAR:
-            name += f" {self._viewpoint}"
-        part = self._files.rung(name)
-        step = MakePart(
-            part,
-            measure_rung,
-            (
-                self._drive(rung, "database", "places", needs),
-                self._drive(rung, "query", "queries", needs),
-                tuple(
-                    self._descriptions(
-                        self._describe(drive, "places", needs, with_scans=False)
-                    )
-                    for drive in others
-                ),
-                rung.drives.num_distractors,
+
+        def described(
+            drive: Scenario, role: Role, *, with_scans: bool
+        ) -> tuple[Part, ...]:
+            job, files = describe_job(
+                drive,
+                role,
                 self._methods,
-                rung.drives.protocol(self._protocol),
-            ),
+                self._protocol,
+                self._files,
+                with_scans=with_scans,
+            )
+            self.jobs[job.name] = job
+            needs.append(job.name)
+            parts = (files.described(one.name) for one in self._methods)
+            return (files.scans, *parts) if with_scans else tuple(parts)
+
+        def source(side: str, role: Role) -> DescribedSource:
+            drive = getattr(rung.drives, side)
+            # Only drives without a change serve several rungs.
+            is_changed = side == "query" and rung.drives.query_changes
+            if is_changed or drive != getattr(self._plain, side):
+                return DriveSimulation(drive)
+            return described(drive, role, with_scans=True)
+
+        name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
+        if self._viewpoint != ladder_rungs.NEAR:
+            name += f" {self._viewpoint}"
+        part = self._files.part("rungs", name)
+        others = self.distractors if rung.drives.num_distractors else ()
+        arguments = (
+            source("database", "places"),
+            source("query", "queries"),
+            tuple(described(one, "places", with_scans=False) for one in others),
+            rung.drives.num_distractors,
+            self._methods,
+            rung.drives.protocol(self._protocol),
         )
+        step = MakePart(part, measure_rung, arguments)
         self.jobs[name] = Job(name, step, tuple(needs), _RUNG_COST)
         return part
 
-    def _drive(
-        self, rung: Rung, side: str, role: Role, needs: list[str]
-    ) -> DescribedSource:
-        drive = getattr(rung.drives, side)
-        # Only drives without a change serve several rungs.
-        is_changed = side == "query" and rung.drives.query_changes
-        if is_changed or drive != getattr(self._plain, side):
-            return DriveSimulation(drive)
-        files = self._describe(drive, role, needs)
-        return files.scans, *self._descriptions(files)
 
-    def _descriptions(self, files: SurveyFiles) -> tuple[Part, ...]:
-        return tuple(files.described(one.name) for one in self._methods)
-
-    def _describe(
-        self,
-        drive: Scenario,
-        role: Role,
-        needs: list[str],
-        *,
-        with_scans: bool = True,
-    ) -> SurveyFiles:
-        """Adds the job that describes a drive for several rungs."""
-        files = self._files.survey(f"{drive.name} {role}")
-        name = f"describe {drive.name}"
-        step = DescribeDrive(
-            DriveSimulation(drive),
-            role,
-            self._methods,
-            self._protocol,
-            files,
-            with_scans,
-        )
-        self.jobs[name] = Job(name, step, cost=_DESCRIPTION_COST)
-        needs.append(name)
-        return files
+def describe_job(
+    drive: Scenario,
+    role: Role,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    files: StudyFiles,
+    *,
+    with_scans: bool = False,
+) -> tuple[Job, SurveyFiles]:
+    """Returns the job that describes a drive, and the files that it writes."""
+    written = files.survey(f"{drive.name} {role}")
+    step = Survey(
+        DriveSimulation(drive),
+        frozenset({role}),
+        methods,
+        protocol,
+        written,
+        with_scans=with_scans,
+        with_map=False,
+    )
+    job = Job(f"describe {drive.name}", step, cost=_DESCRIPTION_COST)
+    return job, written
 
 
 def _labelled(
-    query_scenario: Scenario, rung: Rung, radius: float = math.nan
-) -> LadderRung:
+    query_scenario: Scenario, rung: ladder_rungs.Rung, radius: float = math.nan
+) -> ladder.LadderRung:
     # The database has the route of the query, at any stage.
     route = str(query_scenario.stage)
-    return LadderRung(
+    return ladder.LadderRung(
         map_folder(query_scenario).name,
         route,
         route,
@@ -322,23 +303,25 @@ def _labelled(
 
 
 def _write(
-    measured: Sequence[MeasuredRung],
-    rows: Sequence[LadderRow],
-    pairs: Sequence[LadderRow],
+    measured: Sequence[ladder.MeasuredRung],
+    rows: Sequence[ladder.LadderRow],
+    pairs: Sequence[ladder.LadderRow],
     output: Path,
     protocol: RetrievalProtocol,
-    extent: Extent,
+    extent: ladder_rungs.Extent,
 ) -> tuple[Path, str]:
-    text = ladder_text(rows)
-    queries = ladder_query_table(measured, protocol).to_csv()
+    text = ladder.ladder_text(rows)
+    queries = ladder.ladder_query_table(measured, protocol).to_csv()
     write_text(output / "queries.csv", queries)
-    draw_ladder(rows, output / "ladder")
+    ladder.draw_ladder(rows, output / "ladder")
     if pairs:
-        write_text(output / "pairs.csv", pair_table(rows, pairs).to_csv())
-        text += f"\n\n{pair_text(rows, pairs)}"
+        write_text(
+            output / "pairs.csv", ladder.pair_table(rows, pairs).to_csv()
+        )
+        text += f"\n\n{ladder.pair_text(rows, pairs)}"
     write_text(output / "findings.txt", text + "\n")
     table = output / "ladder.csv"
-    found = ladder_table([*rows, *pairs], protocol, extent.viewpoint)
+    found = ladder.ladder_table([*rows, *pairs], protocol, extent.viewpoint)
     write_text(table, found.to_csv())
     return table, text
 

@@ -10,9 +10,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import itertools
 import math
+from pathlib import Path
 from typing import Any
 
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import (
     REAL_DRIVER,
     DriverConfig,
@@ -99,60 +101,17 @@ QUEUES = "queues"
 # Vehicles in the streets of a driver who follows others.
 _FOLLOWED = 24
 
+_CAUSES = read_yaml(Path(__file__).with_name("causes.yaml"))
 # Cause -> level -> strength. The levels of construction are the map's stages.
 STRENGTHS: Mapping[str, Mapping[int, Any]] = {
-    # Shares, or a depth [m]; see the scenario's `transient`.
-    "parked_cars": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
-    "leaves": {1: 0.75, 2: 0.5, 3: 0.25, 4: 0.0},
-    "snow": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
-    "scaffolds": {1: 0.1, 2: 0.2, 3: 0.4, 4: 0.8},
-    "works": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
-    "furniture": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
-    # Number of vehicles, and of walkers.
-    "traffic": {1: 15, 2: 30, 3: 60, 4: QUEUES},
-    # Visibility in fog [m].
-    "weather": {1: 200.0, 2: 100.0, 3: 50.0, 4: 25.0},
-    "returns": {1: "calibrated"},
-    # Class of the road of ISO 8608.
-    "ride": {1: "A", 2: "B", 3: "C", 4: "D"},
-    # Preset.
-    "sensor": {1: "os1-64", 2: "hdl-64e", 3: "vlp-16", 4: "mid-360"},
-    "narrow_sensor": {1: "avia"},
-    # Sector [deg].
-    "hidden": {1: 30.0, 2: 60.0, 3: 90.0, 4: 120.0},
-    "turn": {1: True},
-    # Greatest roll, and greatest pitch [deg].
-    "tilt": {1: 0.5, 2: 1.0, 3: 1.5, 4: 3.0},
-    "driver": {1: "wander", 2: "lanes", 3: "all", 4: "reversed"},
-    # Offset to the left [m], and heading [deg].
-    "viewpoint": {1: (2.0, 0), 2: (4.0, 0), 3: (6.0, 0), 4: (6.0, 180)},
-    # Offset to the left [m].
-    "lateral": {1: 5.0, 2: 10.0, 3: 15.0},
-    # Number of places of other cities.
-    "size": {1: 300, 2: 1000, 3: 3000, 4: 10000},
+    cause: one["strengths"]
+    for cause, one in _CAUSES.items()
+    if "strengths" in one
 }
-
-_WORDS = {
-    "construction": "mapped in stage {}",
-    "parked_cars": "{:.0%} of the parked cars are others",
-    "leaves": "{:.0%} of the leaves are left",
-    "snow": "{:g} m of snow",
-    "scaffolds": "{:.0%} of the fronts behind scaffolds",
-    "works": "works beside {:.0%} of the kerbs",
-    "furniture": "{:.0%} of the furniture replaced",
-    "traffic": "{} vehicles and as many walkers",
-    "weather": "fog, {:g} m of visibility",
-    "returns": "{} returns",
-    "ride": "mapped on a road of class {}",
-    "sensor": "the query measures with {}",
-    "narrow_sensor": "the query measures with {}",
-    "hidden": "{:g} deg hidden from each query",
-    "turn": "each query turned by a random yaw",
-    "tilt": "each query tilted by up to {:g} deg",
-    "driver": "mapped by another driver: {}",
-    "viewpoint": "mapped {0[0]:g} m to the left, heading {0[1]} deg",
-    "lateral": "mapped {:g} m to the left",
-    "size": "{} more places",
+# Likewise of all causes together: at the strengths above nothing would be left
+# to measure. From level to level they grow by little.
+LEVEL_STRENGTHS: Mapping[str, Mapping[int, Any]] = {
+    cause: one["levels"] for cause, one in _CAUSES.items() if "levels" in one
 }
 
 
@@ -161,8 +120,6 @@ class RungDrives:
     """The drives of a rung of a ladder.
 
     Attributes:
-        database: drive of the mapped places.
-        query: drive of the queries.
         num_distractors: places of other cities in the database.
         lateral: distance between the two ways that a match has to bridge [m].
         query_changes: option of the protocol -> what it does to the sensor of
@@ -218,7 +175,7 @@ def in_words(cause: str, strength: Any) -> str:
     """Returns a strength as text."""
     if strength == QUEUES:
         return "queues in all lanes"
-    return _WORDS[cause].format(strength)
+    return _CAUSES[cause]["words"].format(strength)
 
 
 def _changed(
@@ -319,9 +276,6 @@ class Rung:
     Attributes:
         cause: one of `CAUSES`.
         level: from 1 to 4; 0 for `none`.
-        seed: the seed of random draws.
-        strength: in words.
-        drives: to simulate.
     """
 
     cause: str
@@ -350,8 +304,6 @@ class Extent:
         causes: some of `CAUSES`, without `none`, which is always there.
         levels: from 1 to 4. A cause that lacks one gets its nearest lower
             level.
-        seeds: the seeds of random draws.
-        most_places: most places of other cities.
         strengths: cause -> level -> strength; construction's are the map's
             stages.
         viewpoint: one of `VIEWPOINTS`; of the database on all rungs.
@@ -370,11 +322,7 @@ class Extent:
 def plan_pairs(
     scenario: Scenario, causes: Sequence[str], extent: Extent
 ) -> list[Rung]:
-    """Returns the rungs with two causes at once, each at its strongest level.
-
-    Args:
-        causes: to be crossed two by two.
-    """
+    """Returns the rungs of each two causes at once, at their strongest."""
     plain = plain_drives(scenario, extent.viewpoint)
     known, _ = _known_strengths(scenario, extent)
     rungs = []

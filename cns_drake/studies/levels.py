@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
-from typing import Any
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
@@ -16,34 +15,16 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
-from cns_drake.studies.ladder_rungs import (
-    ALL,
-    NONE,
-    STRENGTHS,
-    Extent,
-    plan_rungs,
-)
+from cns_drake.studies import ladder_rungs
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.report.tables import Table, in_table_order, title
 
-# All causes together, at the ladder's strengths, would leave nothing to
-# measure: from level to level they grow by little.
-LEVEL_STRENGTHS: Mapping[str, Mapping[int, Any]] = {
-    "parked_cars": {1: 0.25, 2: 0.33, 3: 0.42, 4: 0.5},
-    "leaves": {1: 0.75, 2: 0.67, 3: 0.58, 4: 0.5},
-    "snow": {1: 0.05, 2: 0.06, 3: 0.07, 4: 0.08},
-    "scaffolds": {1: 0.1, 2: 0.13, 3: 0.17, 4: 0.2},
-    "works": {1: 0.05, 2: 0.067, 3: 0.083, 4: 0.1},
-    "furniture": {1: 0.25, 2: 0.33, 3: 0.42, 4: 0.5},
-    "traffic": {1: 15, 2: 20, 3: 25, 4: 30},
-    "weather": {1: 400.0, 2: 320.0, 3: 250.0, 4: 200.0},
-    "returns": STRENGTHS["returns"],
-    "ride": {1: "A", 4: "B"},
-    "viewpoint": {1: (2.0, 0), 2: (2.4, 0), 3: (2.7, 0), 4: (3.0, 0)},
-    "size": {1: 300},
-}
 # The seed was drawn before any method was run on it.
-LEVELS_EXTENT = Extent(causes=(ALL,), seeds=(4708,), strengths=LEVEL_STRENGTHS)
+LEVELS_EXTENT = ladder_rungs.Extent(
+    causes=(ladder_rungs.ALL,),
+    seeds=(4708,),
+    strengths=ladder_rungs.LEVEL_STRENGTHS,
+)
 LEVELS_PROTOCOL = replace(FAIR_PROTOCOL, query_spacing=20.0)
 # A level is solved when the interval of the best method begins above this.
 _SOLVED = 0.98
@@ -61,9 +42,7 @@ class LevelResult:
     """A method on a level of a map.
 
     Attributes:
-        map_name: the name of the city.
         level: from 0 to 4.
-        method: its name.
         is_gated: whether the gate was used (the method had the radius).
         auc, low, high: with its 95 % interval.
     """
@@ -83,7 +62,7 @@ def planned_levels() -> dict[tuple[str, int], str]:
     for name, folder in shipped_maps().items():
         query = load_scenario(MapFolder(folder).recordable_drives()[-1])
         drives: dict[int, list[str]] = {}
-        for rung in plan_rungs(query, LEVELS_EXTENT)[0]:
+        for rung in ladder_rungs.plan_rungs(query, LEVELS_EXTENT)[0]:
             drives.setdefault(rung.level, []).append(rung.fingerprint())
         for level, prints in drives.items():
             found[name, level] = fingerprint({"drives": prints})
@@ -127,11 +106,7 @@ def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
 def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
     numbers = {(one.level, one.is_gated): one.auc for one in others}
     return all(
-        math.isclose(
-            one.auc,
-            numbers[one.level, one.is_gated],
-            abs_tol=_EQUAL,
-        )
+        math.isclose(one.auc, numbers[one.level, one.is_gated], abs_tol=_EQUAL)
         for one in some
     )
 
@@ -139,7 +114,7 @@ def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
 def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
     columns = ("map", "cause", "level", "method", "gate", "drives")
     for line, row in read_records(file, (*columns, *_NUMBERS)):
-        if row["cause"] not in (NONE, ALL):
+        if row["cause"] not in (ladder_rungs.NONE, ladder_rungs.ALL):
             continue
         where = f"{file}: line {line}"
         try:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import hashlib
 from importlib.util import find_spec
+import math
 from pathlib import Path
 import tempfile
 
@@ -35,15 +36,9 @@ from cns_drake.studies.map_truth import (
 from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import Label, read_pair, read_truth
-from evaluation.report.compared import (
-    ComparedPair,
-    MapRow,
-    draw_maps,
-    write_compared,
-)
-from evaluation.report.tables import Columns, keyed
-from evaluation.study.localisation import measure_pairs
-from evaluation.study.parts import StudyFiles
+from evaluation.report.ladder import CauseCell, draw_cells
+from evaluation.report.tables import Table
+from evaluation.study.localisation import ComparedPair, measure_pairs
 from evaluation.study.surveys import RecordedDrive
 
 # Share of an imported city's buildings that its first stage lacks.
@@ -60,6 +55,14 @@ _SCORES = (
     "called_structures",
     "right_structures",
 )
+# Title of a panel -> the scores that are its colours and its numbers.
+_DRAWN = {
+    "mean IoU of points [%]": ("miou", "miou"),
+    "structures called gone or new [%]": (
+        "right_structures",
+        "called_structures",
+    ),
+}
 # The true labels, as those of a method.
 TRUTH = "truth"
 # Way between two scans of a pair that is one of many [m].
@@ -71,10 +74,8 @@ class MapPair:
     """A test pair.
 
     Attributes:
-        name: of the pair.
         source: a shipped map, or the name of a city's file.
         years: that a shipped map lives; None for an import.
-        seed: of what happens.
         sha256: digest of the file.
     """
 
@@ -227,8 +228,6 @@ def measure_maps(
     """Maps two drives, and scores methods by exact labels.
 
     Args:
-        database: the older drive, simulated or recorded.
-        query: the newer one.
         methods: see `score_methods`.
         spacing: way between two scans [m].
 
@@ -258,9 +257,6 @@ def update_pairs(
     Writes `map_update.csv`, a row for each pair and method, and a figure.
     Finished pairs are not repeated.
 
-    Args:
-        pairs: the pairs.
-
     Returns:
         The path of the table.
 
@@ -273,21 +269,35 @@ def update_pairs(
         cluster,
         measure_maps,
         (study_methods(on_note), STUDY_SPACING),
-        StudyFiles.map_scores,
+        "maps",
     )
-    rows = [
-        MapRow(pair, method, scores)
-        for pair, of_pair in zip(pairs, found, strict=True)
-        for method, scores in of_pair.items()
-    ]
-    scores: Columns[MapRow] = keyed(
-        {name: name for name in rows[0].scores},
-        lambda row, name: row.scores[name],
-    )
+    rows, cells = [], []
+    for pair, of_pair in zip(pairs, found, strict=True):
+        for method, scores in of_pair.items():
+            rows.append(
+                {
+                    **pair.keys,
+                    "method": method,
+                    **scores,
+                    "strength": pair.rung.strength,
+                }
+            )
+            for title, (colour, number) in _DRAWN.items():
+                share, part = scores[colour], scores[number]
+                cells.append(
+                    CauseCell(
+                        pair.rung.map_name,
+                        title,
+                        method,
+                        pair.rung.cause,
+                        pair.rung.level,
+                        math.nan if share is None else share,
+                        "–" if part is None else f"{100.0 * part:.0f}",
+                    )
+                )
     table = output / "map_update.csv"
-    strength: Columns[MapRow] = {"strength": lambda row: row.rung.strength}
-    write_compared(table, rows, {**scores, **strength})
-    draw_maps(rows, output / "map_update")
+    Table.of_rows(rows).write_csv(table)
+    draw_cells(cells, "mean IoU; right structures", output / "map_update")
     return table
 
 

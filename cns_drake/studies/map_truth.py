@@ -25,11 +25,11 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from html import escape
 import io
 import itertools
 from pathlib import Path
 
+import jinja2
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -306,14 +306,7 @@ def observed(
 
 @dataclass(frozen=True)
 class _Look:
-    """What a LiDAR observes from a place.
-
-    Attributes:
-        scene: the world as it was then.
-        X_WS: pose of the LiDAR.
-        pattern: the pattern of its beams.
-        coverage: what their directions cover.
-    """
+    """What a LiDAR observes from a place."""
 
     scene: RayCastingScene
     X_WS: RigidTransform
@@ -451,61 +444,31 @@ def write_page(
 ) -> None:
     """Writes the page: both maps from above, and the changed structures."""
     low, step, shape = _frame(pair)
-    figures = []
+    maps = []
     for session, labels, name in zip(pair, truth, names, strict=True):
-        image = _draw(session.points, labels, low, step, shape)
         counts = ", ".join(
             f"{(labels == label).sum():,} "
             f"{label.name.lower().replace('_', ' ')}"
             for label in _RGB
             if (labels == label).any()
         )
-        figures.append(
-            f"<h2>{session.side}: {escape(name)}</h2><p>{counts}</p>"
-            f'<img alt="Map of {escape(name)} from above, in the colours of '
-            f'the labels" src="data:image/png;base64,{_png(image)}">'
-        )
-    legend = "".join(
-        f'<li><span style="background:rgb{_RGB[label]}"></span>{words}</li>'
-        for label, words in _WORDS.items()
-    )
+        image = _draw(session.points, labels, low, step, shape)
+        maps.append((session.side, name, counts, _png(image)))
     rows = sorted(
         (row for row in table if row.verdict in ("gone", "new")),
         key=lambda row: -row.changed,
     )[:_MOST_ROWS]
-    body = "".join(
-        f"<tr><td>{row.side}</td><td>{escape(row.structure)}</td>"
-        f"<td>{escape(row.semantic_class)}</td><td>{row.verdict}</td>"
-        f"<td>{row.points:,}</td><td>{row.observed:,}</td>"
-        f"<td>{row.changed:,}</td></tr>"
-        for row in rows
+    template = Path(__file__).with_name("map_truth.html").read_text("utf-8")
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined
     )
-    title = f"{escape(names[0])} and {escape(names[1])}: what changed"
-    text = f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
-<style>
-body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto;
-  max-width: 70rem; padding: 0 1rem; color: #1d2129; background: #fff }}
-img {{ max-width: 100%; background: #f7f8fa; border: 1px solid #dde0e5 }}
-ul {{ list-style: none; padding: 0 }}
-li span {{ display: inline-block; width: 1em; height: 1em;
-  margin-right: .5em; vertical-align: -.1em }}
-table {{ border-collapse: collapse }}
-td, th {{ padding: .15rem .6rem; text-align: left;
-  border-bottom: 1px solid #e3e6ea }}
-td:nth-child(n+5) {{ text-align: right }}
-</style></head><body>
-<h1>{title}</h1>
-<p>Both maps from above. The label of each point is exact: rays decide it in the
-worlds of both drives.</p>
-<ul>{legend}</ul>
-{"".join(figures)}
-<h2>Structures that are gone or new</h2>
-<table><tr><th>map</th><th>structure</th><th>class</th><th>verdict</th>
-<th>points</th><th>observed</th><th>changed</th></tr>{body}</table>
-</body></html>
-"""
-    write_text(path, text)
+    text = environment.from_string(template).render(
+        names=names,
+        legend=[(_RGB[label], words) for label, words in _WORDS.items()],
+        maps=maps,
+        rows=rows,
+    )
+    write_text(path, f"{text}\n")
 
 
 def _frame(pair: Pair) -> tuple[np.ndarray, float, tuple[int, int]]:

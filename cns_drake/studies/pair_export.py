@@ -76,7 +76,6 @@ def export_pairs(
     """Writes a set for a trainer; finished drives are not simulated again.
 
     Args:
-        scenarios: drives to learn from.
         held_out: drives for the evaluation alone; without any, that is of the
             others.
 

@@ -118,9 +118,6 @@ class Record(Step):
     """Records a scenario, and saves a web page of the drive.
 
     Attributes:
-        scenario: to record.
-        folder: the folder of recordings.
-        overwrite: replace another recording of that name.
         page: file of the page, if any.
         survey: surveys the recording, made during the simulation. After an
             interruption, the step that needs the survey makes it.

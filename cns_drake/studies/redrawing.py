@@ -11,12 +11,8 @@ from pathlib import Path
 
 import yaml
 
+from cns_drake.base import files
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    draft_folder,
-    make_folder,
-    user_errors,
-)
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -32,8 +28,6 @@ from evaluation.study.parts import Part
 _MARK = b"# Of a city drawn anew by cns-drake"
 # The file in its folder with the fingerprint of a city.
 _PART = "drawn.data"
-# Expected time to draw a city [s].
-_COST = 7.0
 
 
 def redraw_cities(
@@ -49,8 +43,6 @@ def redraw_cities(
 
     Args:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
-        stage: name of the only stage, the whole city.
-        output: the folder of cities; created if need be.
 
     Returns:
         Seed -> map folder of that city, `<output>/<map>_c<seed>`, absolute.
@@ -65,12 +57,11 @@ def redraw_cities(
     load_plan(MapFolder(map_folder).plan)
     for folder in folders.values():
         _is_replaced(folder)
-    make_folder(output)
+    files.make_folder(output)
     jobs = [
         Job(
             name=f"city {folder.name}",
             step=RedrawCity(map_folder, stage, seed, folder),
-            cost=_COST,
         )
         for seed, folder in folders.items()
     ]
@@ -83,9 +74,7 @@ class RedrawCity(Step):
     """Draws the city of a map anew.
 
     Attributes:
-        map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city.
-        seed: the seed of the city.
         folder: the map folder to write; an older redrawn city of this name is
             replaced, anything else is refused.
     """
@@ -105,7 +94,7 @@ class RedrawCity(Step):
 
     def run(self, reporter: Reporter) -> None:
         folder, made_of = self.folder, self.sources()
-        with draft_folder(folder, replaces=True) as draft:
+        with files.draft_folder(folder, replaces=True) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)
             try:
@@ -127,11 +116,7 @@ class RedrawCity(Step):
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
-        """Writes inputs that depend on the city itself.
-
-        Args:
-            draft: the folder with all others.
-        """
+        """Writes inputs that depend on the city itself."""
 
     def sources(self) -> dict[str, object]:
         """Returns all that the city depends on, ready for JSON."""
@@ -148,7 +133,6 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     """Returns the inputs of a map's city drawn anew.
 
     Args:
-        map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: name of the only stage, the whole city. The map's own
             stages name structures that another draw need not have.
 
@@ -162,14 +146,13 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     source = MapFolder(map_folder)
     roads, plan = source.roads, source.plan
     load_plan(plan)
-    with user_errors(roads):
+    with files.user_errors(roads):
         network = roads.read_bytes()
     stages = {stage: {"story": f"The whole city, as seed {seed} draws it."}}
     return {
         roads.name: network,
         plan.name: to_yaml(
-            "the map's plan with another seed",
-            read_yaml(plan) | {"seed": seed},
+            "the map's plan with another seed", read_yaml(plan) | {"seed": seed}
         ),
         STAGES_NAME: to_yaml("its only stage", {"stages": stages}),
     }
@@ -190,7 +173,7 @@ def to_yaml(title: str, values: dict) -> bytes:
 def _is_replaced(folder: Path) -> bool:
     """Returns whether an older redrawn city has this name."""
     plan = MapFolder(folder).plan
-    with user_errors(folder):
+    with files.user_errors(folder):
         if not os.path.lexists(folder):
             return False
         if not (plan.is_file() and plan.read_bytes().startswith(_MARK)):

@@ -10,24 +10,19 @@ from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    describe_scenario,
-    load_scenario,
-    map_folder,
-)
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.report.compared import ComparedPair
 from evaluation.report.ladder import LadderRung
-from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
-from evaluation.study.plan import plan_study
+from evaluation.study.localisation import ComparedPair
+from evaluation.study.plan import Study
 from evaluation.study.surveys import DriveSource, RecordedDrive, Survey
 
 
@@ -89,32 +84,23 @@ def reproduce_maps(
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
     make_folder(output)
-    reference = reference_for(folder.name for folder in folders)
-    study = plan_study(
+    study = Study(
         recordings,
         report,
         methods,
         protocol,
-        with_costs=with_costs,
-        reference=reference,
+        with_costs,
+        reference_for(folder.name for folder in folders),
     )
-    jobs = [_surveyed(job, study) for job in jobs]
-    run_jobs([*jobs, *study, *pictures], cluster)
+    measuring = study.jobs()
+    jobs = [_surveyed(job, measuring) for job in jobs]
+    run_jobs([*jobs, *measuring, *pictures], cluster)
     addresses = {
         name: f"../pages/{page.name}"
         for name, page in pages.items()
         if page.is_file()
     }
-    return assemble(
-        recordings,
-        report,
-        methods,
-        pages=addresses,
-        protocol=protocol,
-        with_costs=with_costs,
-        reference=reference,
-        on_note=on_note,
-    )
+    return study.assemble(addresses, on_note)
 
 
 def stage_pairs(maps: Sequence[str] | None, output: Path) -> list[ComparedPair]:
@@ -171,7 +157,8 @@ def _surveyed(recording: Job, study: Sequence[Job]) -> Job:
 
 def _drives(folder: Path) -> list[Scenario]:
     drives = [
-        load_scenario(path) for path in MapFolder(folder).recordable_drives()
+        scenario_files.load_scenario(path)
+        for path in MapFolder(folder).recordable_drives()
     ]
     for drive in drives:
         if drive.map is None:
@@ -209,18 +196,14 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
 def recording_info(
     scenario: Scenario, output: Path, is_waiting: bool
 ) -> RecordingInfo:
-    """Returns the description of a recording before it is made.
-
-    Args:
-        is_waiting: whether the recording's job has to be done first.
-    """
+    """Returns the description of a recording before it is made."""
     assert scenario.stage is not None  # It has a map.
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
-        map_name=map_folder(scenario).name,
+        map_name=scenario_files.map_folder(scenario).name,
         stage=scenario.stage,
-        way=driven_way(describe_scenario(scenario)),
+        way=driven_way(scenario_files.describe_scenario(scenario)),
         needs=(scenario.name,) if is_waiting else (),
     )
 

@@ -5,6 +5,7 @@ cities. Each method has its AUC and the time of a query at each size.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
 import math
 from pathlib import Path
 
@@ -13,27 +14,19 @@ from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies.ladder import distracting_drives
+from cns_drake.studies.ladder import describe_job, distracting_drives
 from cns_drake.studies.ladder_rungs import plain_drives
 from cns_drake.studies.reproduction import recordable_map
-from evaluation.recognition.description import Role
-from evaluation.recognition.protocol import (
-    DEFAULT_PROTOCOL,
-    RetrievalProtocol,
-)
-from evaluation.report.tables import Table, in_table_order, keyed
+from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.report.tables import Table, in_table_order
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import MakePart, Part, StudyFiles, SurveyFiles
+from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.rungs import SizePoint, measure_size
-from evaluation.study.surveys import DescribeDrive
 
 # More would not be drawn within days.
 MOST_PLACES = 100_000
-# Expected seconds: to describe a drive, and to measure a method at a size.
-_DESCRIPTION_COST = 30.0
+# Expected seconds to measure a method at a size.
 _SIZE_COST = 60.0
 
 
@@ -52,7 +45,6 @@ def measure_sizes(
 
     Args:
         map_name: name or folder of the map whose last drive asks.
-        sizes: numbers of places of other cities.
 
     Returns:
         The path of `size.csv`.
@@ -80,24 +72,22 @@ def measure_sizes(
         cluster,
         on_note,
     )
-    jobs: list[Job] = []
-
-    def describe(one: Scenario, role: Role) -> SurveyFiles:
-        found = files.survey(f"{one.name} {role}")
-        step = DescribeDrive(
-            DriveSimulation(one), role, methods, protocol, found
+    described = [
+        describe_job(one, role, methods, protocol, files)
+        for one, role in (
+            (plain.database, "places"),
+            *((other, "places") for other in others),
+            (plain.query, "queries"),
         )
-        jobs.append(Job(f"describe {one.name}", step, cost=_DESCRIPTION_COST))
-        return found
-
-    places = [describe(one, "places") for one in (plain.database, *others)]
-    asking = describe(plain.query, "queries")
+    ]
+    jobs = [job for job, _ in described]
+    *places, asking = (written for _, written in described)
     needs = tuple(job.name for job in jobs)
     parts: list[Part] = []
     for number in numbers:
         for method in methods:
             name = f"size {number} {method.name}"
-            part = files.rung(name)
+            part = files.part("rungs", name)
             first, *rest = (one.described(method.name) for one in places)
             step = MakePart(
                 part,
@@ -138,22 +128,6 @@ def size_table(map_name: str, points: Sequence[SizePoint]) -> Table:
                 growth = math.log(one.query_ms / before.query_ms) / math.log(
                     one.places / before.places
                 )
-            rows.append((one, growth))
+            rows.append({"map": map_name, **asdict(one), "growth": growth})
             before = one
-    return Table.of(
-        rows,
-        {
-            "map": lambda _: map_name,
-            **keyed(
-                {
-                    name: name
-                    for name in (
-                        *("method", "others", "places", "queries"),
-                        *("auc", "r1", "query_ms", "build_ms"),
-                    )
-                },
-                lambda row, name: getattr(row[0], name),
-            ),
-            "growth": lambda row: row[1],
-        },
-    )
+    return Table.of_rows(rows)

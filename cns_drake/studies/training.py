@@ -280,8 +280,6 @@ def train(
     """Trains a network.
 
     Args:
-        steps: number of batches.
-        seed: seed of the first weights and of all batches.
         state: file that keeps the state; a training that was interrupted goes
             on from there.
 
@@ -419,7 +417,6 @@ def write_weights(
 
     Args:
         seen: least and greatest part of the sectors with a point in training.
-        made_by: what made them, ready for JSON.
     """
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
@@ -435,8 +432,6 @@ def write_weights(
 MAPS = ("riverside", "suburbia", "downtown")
 # Cities and batches for each minute of one core.
 _CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
-# Expected time for a city [s].
-_CITY_COST = 60.0
 
 
 @dataclass(frozen=True)
@@ -444,9 +439,6 @@ class TrainingPlan:
     """What a training sees, and for how long.
 
     Attributes:
-        cities: number of drawn cities.
-        steps: number of batches.
-        seed: seed of everything.
         change: whether drives see different stages, and passing changes.
         returns: whether some have calibrated returns and weather.
         driver: whether drivers wander and change lanes.
@@ -510,7 +502,6 @@ def make_weights(
         Job(
             f"city {one.number} ({one.map_name})",
             MakePart(part, scan_city, (one, work / f"city_{one.number:03d}")),
-            cost=_CITY_COST,
         )
         for one, part in zip(drawn, parts, strict=True)
     ]

@@ -45,17 +45,7 @@ _PRESETS = ("os1-64", "hdl-64e", "os1-32", "vlp-16", "os1-128")
 
 @dataclass(frozen=True)
 class DrawnCity:
-    """A city with its drives, as a seed draws them.
-
-    Attributes:
-        map_name: the map with the streets.
-        seed: the seed of a training.
-        number: which of its cities.
-        num_drives: drives along one route.
-        change: whether drives see different stages, and passing changes.
-        returns: whether some have calibrated returns and weather.
-        driver: whether drivers wander and change lanes.
-    """
+    """A city with its drives, as a seed draws them."""
 
     map_name: str
     seed: int

@@ -17,11 +17,7 @@ import numpy as np
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.rates import check_years
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    make_folder,
-    user_errors,
-    write_text,
-)
+from cns_drake.base.files import make_folder, user_errors, write_text
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -79,21 +75,13 @@ QUICK_PROTOCOL = replace(YEARS_PROTOCOL, query_spacing=30.0, place_spacing=10.0)
 _MAP_SPACING = 5.0
 # The file in its folder with the fingerprint of an aged map.
 _PART = "aged.data"
-# Expected seconds: to age a city, and to map it.
-_AGE_COST, _MAP_COST = 40.0, 20.0
+# Expected seconds to map a city.
+_MAP_COST = 20.0
 
 
 @dataclass(frozen=True)
 class AgeCity(Step):
-    """Lets a city live.
-
-    Attributes:
-        source: the folder of the map.
-        years: of the stages.
-        seed: of its history.
-        rates: event -> rate a year.
-        folder: the map folder to write.
-    """
+    """Lets a city live."""
 
     source: Path
     years: tuple[int, ...]
@@ -161,8 +149,6 @@ def measure_years(
         rates: event -> rate a year.
         directions: whether the database is of today, the query, or both in
             turn.
-        localises: also localise the queries in the maps of the databases.
-        updates: also score baselines that find the changes of the maps.
 
     Returns:
         The path of `years.csv`, and the findings.
@@ -190,10 +176,7 @@ def measure_years(
     }
     on_note(f"{len(cities)} cities age")
     run_jobs(
-        [
-            Job(f"age {step.folder.name}", step, cost=_AGE_COST)
-            for step in cities.values()
-        ],
+        [Job(f"age {step.folder.name}", step) for step in cities.values()],
         cluster,
     )
     files = StudyFiles(output)
@@ -204,21 +187,22 @@ def measure_years(
     tasks: dict[str, tuple] = {}
     if localises:
         tasks["localise"] = (
-            files.localised,
+            "localised",
             measure_localisation,
             (SHIPPED, ("",) * len(SHIPPED), FAR_STARTS, protocol.query_spacing),
         )
     if updates:
         tasks[MAP_TASK] = (
-            files.map_scores,
+            "maps",
             measure_maps,
             (study_methods(on_note), STUDY_SPACING),
         )
 
     def add_tasks(name: str, drives: RungDrives) -> None:
         both = DriveSimulation(drives.database), DriveSimulation(drives.query)
-        for task, (file, function, arguments) in tasks.items():
-            step = MakePart(file(name), function, (*both, *arguments))
+        for task, (kind, function, arguments) in tasks.items():
+            part = files.part(kind, name)
+            step = MakePart(part, function, (*both, *arguments))
             jobs.append(Job(f"{task} task of {name}", step, cost=_MAP_COST))
             further.setdefault(task, []).append(step.part)
 
@@ -298,7 +282,7 @@ def _values(task: str, found: Any) -> dict[tuple[str, str], tuple[float, int]]:
 
 def _map_job(drive: Scenario, files: StudyFiles, jobs: list[Job]) -> Part:
     """Adds the job that maps a city along a drive; returns its part."""
-    part = files.trend_points("map", drive.name)
+    part = files.part("trend", "map", drive.name)
     step = MakePart(part, map_city, (DriveSimulation(drive), _MAP_SPACING))
     jobs.append(Job(f"map {drive.name}", step, cost=_MAP_COST))
     return part

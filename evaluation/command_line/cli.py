@@ -15,29 +15,9 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example, number
+from evaluation.command_line import options
 from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
-from evaluation.command_line.options import (
-    Align,
-    Costs,
-    Gate,
-    Jobs,
-    Json,
-    LidarName,
-    MethodName,
-    OwnMethods,
-    Parameters,
-    Radius,
-    Scheduler,
-    SensorHeight,
-    Settings,
-    aligned,
-    open_noted,
-    overlap_of,
-    show,
-    with_named_protocol,
-    with_protocol,
-)
 from evaluation.command_line.trajectories import drives, trajectory
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 
@@ -57,26 +37,24 @@ app = terminal.make_program(
 @app.command(
     epilog=example("cns-eval tcr drives/metropolis_01 drives/metropolis_04")
 )
+@options.explained
 def tcr(
     source: Annotated[Path, typer.Argument(metavar="A")],
     target: Annotated[Path, typer.Argument(metavar="B")],
-    control: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="C",
-            help="A recording of A's route in B's stage, or of B's route in "
-            "A's stage. It gives the TCR_sym that the routes alone cause.",
-        ),
-    ] = None,
-    align: Align = "auto",
-    lidar: LidarName = None,
-    json: Json = False,
+    control: Annotated[Path | None, typer.Option(metavar="C")] = None,
+    align: options.Align = "auto",
+    lidar: options.LidarName = None,
+    json: options.Json = False,
 ) -> None:
     """Structural change of two drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
     the directed ratios. Drives in different world frames are aligned.
+
+    Args:
+        control: A recording of A's route in B's stage, or of B's route in A's
+            stage. It gives the TCR_sym that the routes alone cause.
     """
     from evaluation.change import drive_change as change
     from evaluation.drives import Drive
@@ -102,10 +80,12 @@ def tcr(
             )
     for alignment in alignments:
         terminal.note(alignment.to_text())
-    show(report.to_json(), _change_rows(report), json=json)
+    options.show(report.to_json(), _change_rows(report), json=json)
 
 
-app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(drives)
+app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(
+    options.explained(drives)
+)
 
 
 @app.command(
@@ -114,73 +94,30 @@ app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(drives)
         "    --method scan-context++",
     )
 )
-@with_protocol
+@options.explained
+@options.with_protocol
 def pr(
     database: Annotated[Path, typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
-    method: MethodName,
-    mode: Annotated[
-        Literal["all", "filtered"],
-        typer.Option(help="Count all queries, or those that have a match."),
-    ] = "all",
-    parameter: Parameters = None,
-    sensor_height: SensorHeight = 1.6,
-    align: Align = "auto",
-    lidar: LidarName = None,
-    across_maps: Annotated[
-        bool,
-        typer.Option(
-            "--across-maps",
-            help="Allow drives of maps with different names, such as another "
-            "draw of a city along the same streets.",
-        ),
-    ] = False,
+    method: options.MethodName,
+    mode: Literal["all", "filtered"] = "all",
+    parameter: options.Parameters = None,
+    sensor_height: options.SensorHeight = 1.6,
+    align: options.Align = "auto",
+    lidar: options.LidarName = None,
+    across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
-        str,
-        typer.Option(
-            metavar="radius|overlap:PART",
-            help="Definition of a match: a place within the radius, or one "
-            "whose scan shows at least this part of the query's scan.",
-        ),
+        str, typer.Option(metavar="radius|overlap:PART")
     ] = "radius",
-    overlaps: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.csv",
-            help="Write the overlap of each query with each place.",
-        ),
-    ] = None,
+    overlaps: Annotated[Path | None, typer.Option(metavar="FILE.csv")] = None,
     exact_overlaps: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.csv",
-            help="Read these overlaps from a table of cns-drake overlap; by "
-            "default they are found from the scans.",
-        ),
+        Path | None, typer.Option(metavar="FILE.csv")
     ] = None,
-    turn_queries: Annotated[
-        bool,
-        typer.Option("--turn-queries", help="Turn each query by a random yaw."),
-    ] = False,
-    tilt_queries: Annotated[
-        float,
-        typer.Option(
-            metavar="DEG",
-            help="Tilt each query by a random roll and pitch of up to this.",
-        ),
-    ] = 0.0,
-    hide_sector: Annotated[
-        float,
-        typer.Option(
-            metavar="DEG",
-            help="Hide a random sector of this angle from each query, as a "
-            "truck beside it would.",
-        ),
-    ] = 0.0,
-    seed: Annotated[
-        int, typer.Option(help="Seed of the changes of queries.")
-    ] = 0,
-    json: Json = False,
+    turn_queries: Annotated[bool, typer.Option("--turn-queries")] = False,
+    tilt_queries: Annotated[float, typer.Option(metavar="DEG")] = 0.0,
+    hide_sector: Annotated[float, typer.Option(metavar="DEG")] = 0.0,
+    seed: int = 0,
+    json: options.Json = False,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -189,18 +126,28 @@ def pr(
     Measures how well the scans of QUERY find their place in DATABASE. Both are
     recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in
     different world frames are aligned.
+
+    Args:
+        mode: Count all queries, or those that have a match.
+        across_maps: Allow drives of maps with different names, such as another
+            draw of a city along the same streets.
+        truth: Definition of a match: a place within the radius, or one whose
+            scan shows at least this part of the query's scan.
+        overlaps: Write the overlap of each query with each place.
+        exact_overlaps: Read these overlaps from a table of cns-drake overlap;
+            by default they are found from the scans.
+        turn_queries: Turn each query by a random yaw.
+        tilt_queries: Tilt each query by a random roll and pitch of up to this.
+        hide_sector: Hide a random sector of this angle from each query, as a
+            truck beside it would.
+        seed: Seed of the changes of queries.
     """
     from cns_drake.base.errors import InputError
-    from evaluation.recognition import place_recognition
-    from evaluation.recognition.overlap_truth import (
-        compared_frames,
-        read_overlaps,
-        write_overlaps,
-    )
+    from evaluation.recognition import overlap_truth, place_recognition
 
     protocol = replace(
         protocol,
-        overlap=overlap_of(truth),
+        overlap=options.overlap_of(truth),
         turn_queries=turn_queries,
         tilt_queries=tilt_queries,
         hide_sector=hide_sector,
@@ -219,15 +166,15 @@ def pr(
             f"is not {database}"
         )
     chosen = _chosen_method(method, parameter, sensor_height)
-    places, query_drive = aligned(
-        open_noted(database, query, lidar=lidar),
+    places, query_drive = options.aligned(
+        options.open_noted(database, query, lidar=lidar),
         align,
         across_maps=across_maps,
     )
     exact = None
     if exact_overlaps is not None:
-        frames = compared_frames(places, query_drive, protocol)
-        exact = read_overlaps(exact_overlaps, *frames)
+        frames = overlap_truth.compared_frames(places, query_drive, protocol)
+        exact = overlap_truth.read_overlaps(exact_overlaps, *frames)
     result = place_recognition.run(
         places,
         query_drive,
@@ -241,7 +188,7 @@ def pr(
     if overlaps is not None:
         found = result.retrieval
         assert found.overlaps is not None
-        write_overlaps(
+        overlap_truth.write_overlaps(
             overlaps, found.query_frames, found.database_frames, found.overlaps
         )
         terminal.note(f"wrote {overlaps}")
@@ -250,7 +197,7 @@ def pr(
             f"{query}: every scan finds itself (--exclude-recent leaves out "
             "recent places)"
         )
-    show(result.to_json(), _recognition_rows(result), json=json)
+    options.show(result.to_json(), _recognition_rows(result), json=json)
 
 
 @app.command(
@@ -260,21 +207,31 @@ def pr(
         "    --query kitti/sequences/04/velodyne",
     )
 )
+@options.explained
 def scores(
-    method: MethodName,
-    database: Annotated[Path, typer.Option(help="Folder of single scans.")],
-    query: Annotated[Path, typer.Option(help="Folder of single scans.")],
-    output: Annotated[Path, typer.Option(help="CSV file to write.")],
-    parameter: Parameters = None,
-    sensor_height: SensorHeight = 1.6,
-    gate: Gate = False,
-    radius: Radius = DEFAULT_PROTOCOL.radius,
+    method: options.MethodName,
+    database: Annotated[Path, typer.Option()],
+    query: Annotated[Path, typer.Option()],
+    output: Annotated[Path, typer.Option()],
+    parameter: options.Parameters = None,
+    sensor_height: options.SensorHeight = 1.6,
+    gate: Annotated[bool, typer.Option("--gate")] = False,
+    radius: float = DEFAULT_PROTOCOL.radius,
 ) -> None:
     """Scores of all pairs of scans of folders.
 
     Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
     place; searches that only save time are left out. An empty score means that
     the place is no candidate.
+
+    Args:
+        database: Folder of single scans.
+        query: Folder of single scans.
+        output: CSV file to write.
+        gate: Reject, among the best places of a query, those that are beyond
+            the radius by the method's own pose; for methods that estimate
+            poses.
+        radius: A place is a match within this distance [m].
     """
     from evaluation.recognition import scan_folders
 
@@ -298,20 +255,21 @@ app.command(
         "cns-eval localise drives/metropolis_01 \\",
         "    drives/metropolis_04 --method gicp --start 1",
     )
-)(localise)
+)(options.explained(localise))
 
 
 @app.command(epilog=example("cns-eval report drives --output report"))
-@with_named_protocol
+@options.explained
+@options.with_named_protocol
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
-    output: Annotated[Path, typer.Option(help="Folder to write.")],
-    method: OwnMethods = None,
-    parameter: Settings = None,
-    lidar: LidarName = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    costs: Costs = True,
+    output: Annotated[Path, typer.Option()],
+    method: options.OwnMethods = None,
+    parameter: options.Settings = None,
+    lidar: options.LidarName = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    costs: options.Costs = True,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -319,6 +277,9 @@ def report(
 
     Writes tables, figures and report.html. After an interruption the same
     command goes on where it was.
+
+    Args:
+        output: Folder to write.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.paper import reference_for
@@ -346,24 +307,18 @@ def report(
         "    --query family/riverside_02 --output trend",
     )
 )
-@with_named_protocol
+@options.explained
+@options.with_named_protocol
 def trend(
     databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
-    query: Annotated[Path, typer.Option(help="The query drive.")],
-    output: Annotated[Path, typer.Option(help="Folder to write.")],
-    control: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="A drive on the route of the databases, but in the stage of "
-            "the query. It adds the kept share of AUC to the figure. May be "
-            "repeated."
-        ),
-    ] = None,
-    method: OwnMethods = None,
-    lidar: LidarName = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    parameter: Settings = None,
+    query: Annotated[Path, typer.Option()],
+    output: Annotated[Path, typer.Option()],
+    control: list[Path] | None = None,
+    method: options.OwnMethods = None,
+    lidar: options.LidarName = None,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    parameter: options.Settings = None,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -372,6 +327,12 @@ def trend(
     One drive queries them all, by every method. Writes trend.csv and a figure
     with 95 % bands. After an interruption the same command goes on where it
     was.
+
+    Args:
+        query: The query drive.
+        output: Folder to write.
+        control: A drive on the route of the databases, but in the stage of the
+            query. It adds the kept share of AUC to the figure. May be repeated.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.study.trend import write_trend
@@ -393,24 +354,24 @@ def trend(
 
 
 @app.command(epilog=example("cns-eval ranking simulated/report real/report"))
+@options.explained
 def ranking(
     first: Annotated[Path, typer.Argument(metavar="REPORT")],
     second: Annotated[Path, typer.Argument(metavar="REPORT")],
     protocol: Annotated[
-        str | None,
-        typer.Option(
-            metavar="fair|paper|recorded",
-            help="Protocol of the queries that count; by default fair, or the "
-            "only one there is.",
-        ),
+        str | None, typer.Option(metavar="fair|paper|recorded")
     ] = None,
-    json: Json = False,
+    json: options.Json = False,
 ) -> None:
     """Whether two reports rank methods alike.
 
     The reports may be of simulated and of real drives. Prints the mean AUC of
     each method in both, and Kendall's tau, with their 95 % intervals. A report
     is a folder with a queries.csv, or that file.
+
+    Args:
+        protocol: Protocol of the queries that count; by default fair, or the
+            only one there is.
     """
     from evaluation.recognition.rank_agreement import rank_agreement
 
@@ -427,7 +388,7 @@ def ranking(
     low, high = map(number, (found.interval.low, found.interval.high))
     tau = f"{number(found.tau)}  (95 %: {low} to {high})"
     rows = [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
-    show(found.to_json(), rows, json=json)
+    options.show(found.to_json(), rows, json=json)
 
 
 app.command(
@@ -435,17 +396,17 @@ app.command(
         "cns-eval trajectory drives/metropolis_04 \\",
         "    results/latest/metropolis_04_poses_tum.txt",
     )
-)(trajectory)
+)(options.explained(trajectory))
 
 app.command(epilog=example("cns-eval map-update maps --baseline distance"))(
-    map_update
+    options.explained(map_update)
 )
 app.command(
     epilog=example(
         "cns-eval map-sessions mulran/KAIST01 mulran/KAIST02 \\",
         "    --output kaist",
-    ),
-)(map_sessions)
+    )
+)(options.explained(map_sessions))
 
 
 def main() -> None:

@@ -9,15 +9,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
-from evaluation.command_line.options import (
-    Align,
-    Jobs,
-    Json,
-    LidarName,
-    Parameters,
-    aligned,
-    show,
-)
+from evaluation.command_line import options
 
 
 def localise(
@@ -26,50 +18,21 @@ def localise(
     method: Annotated[
         str,
         typer.Option(
-            "--method",
-            metavar="icp|plane-icp|gicp|vgicp|kiss-matcher|FILE.py",
-            help="Estimator; a Python file holds one's own function.",
+            "--method", metavar="icp|plane-icp|gicp|vgicp|kiss-matcher|FILE.py"
         ),
     ],
-    start: Annotated[
-        float, typer.Option(help="Distance of a start from the truth [m].")
-    ] = 0.5,
-    start_turn: Annotated[
-        float, typer.Option(help="Angle of a start to the truth [deg].")
-    ] = 2.0,
-    seed: Annotated[int, typer.Option(help="Seed of the starts.")] = 0,
-    parameter: Parameters = None,
-    query_spacing: Annotated[
-        float,
-        typer.Option(help="Distance between two queries along the path [m]."),
-    ] = 10.0,
-    follow: Annotated[
-        bool,
-        typer.Option(
-            "--track",
-            help="Follow the whole drive, each scan from the end of the last.",
-        ),
-    ] = False,
-    odometry_drift: Annotated[
-        float,
-        typer.Option(
-            metavar="PART",
-            help="Drift of the odometry of --track: part of the way, and as "
-            "many degrees for each metre.",
-        ),
-    ] = 0.01,
-    align: Align = "auto",
-    lidar: LidarName = None,
-    jobs: Jobs = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Write results by query, localisation.csv, and with --track a "
-            "picture.",
-        ),
-    ] = None,
-    json: Json = False,
+    start: float = 0.5,
+    start_turn: float = 2.0,
+    seed: int = 0,
+    parameter: options.Parameters = None,
+    query_spacing: float = 10.0,
+    follow: Annotated[bool, typer.Option("--track")] = False,
+    odometry_drift: Annotated[float, typer.Option(metavar="PART")] = 0.01,
+    align: options.Align = "auto",
+    lidar: options.LidarName = None,
+    jobs: options.Jobs = None,
+    output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    json: options.Json = False,
 ) -> None:
     """Localisation of scans in a map.
 
@@ -78,6 +41,18 @@ def localise(
     true poses. A cloud as QUERY is one scan at the origin of the map. Each scan
     is aligned from its true pose, moved by --start in a random direction and
     turned by --start-turn about a random axis.
+
+    Args:
+        method: Estimator; a Python file holds one's own function.
+        start: Distance of a start from the truth [m].
+        start_turn: Angle of a start to the truth [deg].
+        seed: Seed of the starts.
+        query_spacing: Distance between two queries along the path [m].
+        follow: Follow the whole drive, each scan from the end of the last.
+        odometry_drift: Drift of the odometry of --track: part of the way, and
+            as many degrees for each metre.
+        output: Write results by query, localisation.csv, and with --track a
+            picture.
     """
     import math
 
@@ -86,32 +61,27 @@ def localise(
     from cns_drake.base.process import num_cores
     from evaluation.change.drive_change import open_source
     from evaluation.drives import Drive, check_same_world
+    from evaluation.localisation import estimators, tracking
     from evaluation.localisation import localise as queries
-    from evaluation.localisation import tracking
-    from evaluation.localisation.estimators import (
-        default_settings,
-        make_estimator,
-        make_map,
-    )
     from evaluation.study.chosen_methods import parse_setting
 
     starts = queries.Starts(start, start_turn, seed)
     if not (math.isfinite(query_spacing) and query_spacing > 0.0):
         raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
     tracking.check_drift(odometry_drift)
-    settings = default_settings(method).with_values(
+    settings = estimators.default_settings(method).with_values(
         map(parse_setting, parameter or [])
     )
-    estimator = make_estimator(method, settings)
+    estimator = estimators.make_estimator(method, settings)
     source = open_source(place, lidar)
     drive = queries.as_query(open_source(query, lidar))
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)
     if isinstance(source, Drive):
-        source, drive = aligned((source, drive), align)
+        source, drive = options.aligned((source, drive), align)
         check_same_world(source, drive)
-    surroundings = make_map(source, settings, terminal.track)
+    surroundings = estimators.make_map(source, settings, terminal.track)
     is_mapped = queries.mapped_frames(source, surroundings, drive)
     localiser = queries.Localiser(surroundings, estimator, settings)
     if output is not None:
@@ -131,7 +101,7 @@ def localise(
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.TrackSummary(rows).to_json()
         if output is not None:
-            from evaluation.report.localisation import draw_track
+            from evaluation.report.curve_figures import draw_track
 
             draw_track(rows, output / "track")
     else:
@@ -148,7 +118,7 @@ def localise(
     if output is not None:
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
-    show(values, _rows(values), json=json)
+    options.show(values, _rows(values), json=json)
 
 
 def _rows(values: dict) -> Iterator[tuple[str, str]]:
@@ -160,10 +130,7 @@ def _rows(values: dict) -> Iterator[tuple[str, str]]:
 
     yield "method", values["method"]
     yield "map <- query", f"{values['map']} <- {values['query']}"
-    yield (
-        "start",
-        f"{values['start']:g} m, {values['start_turn_deg']:g} deg",
-    )
+    yield ("start", f"{values['start']:g} m, {values['start_turn_deg']:g} deg")
     if "within_03m" in values:
         yield "way in the map", f"{values['way']:.0f} m"
         yield "  within 0.3 m", text("within_03m")

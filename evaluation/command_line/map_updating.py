@@ -19,31 +19,10 @@ class BaselineName(str, Enum):
 
 def map_update(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
-    baseline: Annotated[
-        BaselineName | None,
-        typer.Option(help="Score this one; free-space without labels."),
-    ] = None,
-    labels_a: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Labels of A's map: 0 unobserved, 1 kept, 2 gone (.npy, or "
-            ".ply with a property prediction).",
-        ),
-    ] = None,
-    labels_b: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Labels of B's map: 1 kept, 3 new, 4 newly seen.",
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Write the baseline's labels, A and B."
-        ),
-    ] = None,
+    baseline: BaselineName | None = None,
+    labels_a: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
+    labels_b: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
+    output: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
     json: Json = False,
 ) -> None:
     """Score what a map must forget and learn.
@@ -52,17 +31,19 @@ def map_update(
     drives: A/map.ply, A/truth.npy, B/map.ply, B/truth.npy, and scans and poses
     for a baseline; 255 in a truth leaves a point out. Scores the labels of a
     file, or those of a baseline.
+
+    Args:
+        baseline: Score this one; free-space without labels.
+        labels_a: Labels of A's map: 0 unobserved, 1 kept, 2 gone (.npy, or .ply
+            with a property prediction).
+        labels_b: Labels of B's map: 1 kept, 3 new, 4 newly seen.
+        output: Write the baseline's labels, A and B.
     """
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
+    from evaluation.map_update import sessions
     from evaluation.map_update.baselines import run_baseline
     from evaluation.map_update.scores import Labels, score
-    from evaluation.map_update.sessions import (
-        read_labels,
-        read_pair,
-        read_truth,
-        write_labels,
-    )
     from evaluation.map_update.structures import class_names
 
     if (labels_a is None) != (labels_b is None):
@@ -71,20 +52,20 @@ def map_update(
         raise InputError("--baseline: not together with --labels-a")
     if output is not None:
         make_folder(output)
-    pair = read_pair(folder)
-    truth = Labels(*read_truth(pair))
+    pair = sessions.read_pair(folder)
+    truth = Labels(*sessions.read_truth(pair))
     name = "labels"
     if labels_a is not None and labels_b is not None:
         found = Labels(
-            read_labels(labels_a, pair.A, truth=False),
-            read_labels(labels_b, pair.B, truth=False),
+            sessions.read_labels(labels_a, pair.A, truth=False),
+            sessions.read_labels(labels_b, pair.B, truth=False),
         )
     else:
         name = (baseline or BaselineName.FREE_SPACE).value
         found = run_baseline(name, pair, terminal.track)
     if output is not None:
         for session, labels in zip(pair, found, strict=True):
-            write_labels(output / f"{session.side}.npy", labels)
+            sessions.write_labels(output / f"{session.side}.npy", labels)
     scores = score(pair, truth, found, class_names(folder))
     if json:
         terminal.print_json({"method": name, **scores})
@@ -96,9 +77,7 @@ def map_sessions(
     a: Annotated[Path, typer.Argument(metavar="A")],
     b: Annotated[Path, typer.Argument(metavar="B")],
     *,
-    output: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder to write.")
-    ],
+    output: Annotated[Path, typer.Option(metavar="DIR")],
     spacing: SessionSpacing = 1.0,
     lidar: LidarName = None,
 ) -> None:
@@ -106,6 +85,9 @@ def map_sessions(
 
     Writes maps, scans and poses as cns-drake map-truth does, but no labels: for
     drives whose world is not known, such as real ones. Both are in one world.
+
+    Args:
+        output: Folder to write.
     """
     from cns_drake.base.drives.drive import check_same_world
     from cns_drake.base.errors import InputError

@@ -8,7 +8,8 @@ import functools
 import inspect
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+import textwrap
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
@@ -22,13 +23,6 @@ if TYPE_CHECKING:
 
 # When drives are aligned to one world.
 When = Literal["auto", "always", "never"]
-NamedProtocol = Annotated[
-    Literal["fair", "paper"],
-    typer.Option(
-        "--protocol",
-        help="Queries turned and tilted at random, or as the paper asked.",
-    ),
-]
 Align = Annotated[
     When,
     typer.Option(
@@ -93,66 +87,6 @@ Scheduler = Annotated[
         "tcp://10.0.0.1:8786; by default DASK_SCHEDULER_ADDRESS, if set.",
     ),
 ]
-Radius = Annotated[
-    float,
-    typer.Option(help="A place is a match within this distance [m]."),
-]
-Gate = Annotated[
-    bool,
-    typer.Option(
-        "--gate",
-        help="Reject, among the best places of a query, those that are beyond "
-        "the radius by the method's own pose; for methods that estimate "
-        "poses.",
-    ),
-]
-QuerySpacing = Annotated[
-    float,
-    typer.Option(help="Distance between two queries along the path [m]."),
-]
-PlaceSpacing = Annotated[
-    float,
-    typer.Option(
-        help="Distance between two places of the database [m].",
-    ),
-]
-MaxRange = Annotated[
-    float,
-    typer.Option(
-        help="Leave out points farther than this along an axis [m].",
-    ),
-]
-_OPTIONS: dict[str, tuple[object, object]] = {
-    "radius": (Radius, DEFAULT_PROTOCOL.radius),
-    "query_spacing": (QuerySpacing, DEFAULT_PROTOCOL.query_spacing),
-    "place_spacing": (PlaceSpacing, DEFAULT_PROTOCOL.place_spacing),
-    "max_range": (MaxRange, DEFAULT_PROTOCOL.max_range),
-    "scans_per_place": (
-        Annotated[
-            int | None,
-            typer.Option(
-                metavar="N",
-                help="Merge N scans for every method; by default each method "
-                "has its own number.",
-            ),
-        ],
-        None,
-    ),
-    "exclude_recent": (
-        Annotated[
-            float | None,
-            typer.Option(
-                metavar="S",
-                help="Loop closure: each drive is also its own database, with "
-                "places it passed at least S seconds before.",
-            ),
-        ],
-        None,
-    ),
-    "gate": (Gate, DEFAULT_PROTOCOL.gate),
-}
-
-
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -233,51 +167,121 @@ def overlap_of(truth: str) -> float | None:
     return least
 
 
-def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
+def _protocol(
+    named_protocol: Annotated[
+        Literal["fair", "paper"], typer.Option("--protocol")
+    ] = "fair",
+    radius: float = DEFAULT_PROTOCOL.radius,
+    query_spacing: float = DEFAULT_PROTOCOL.query_spacing,
+    place_spacing: float = DEFAULT_PROTOCOL.place_spacing,
+    max_range: float = DEFAULT_PROTOCOL.max_range,
+    scans_per_place: Annotated[int | None, typer.Option(metavar="N")] = None,
+    exclude_recent: Annotated[float | None, typer.Option(metavar="S")] = None,
+    gate: Annotated[bool, typer.Option("--gate")] = False,
+) -> None:
+    """The options of the protocol, see `with_protocol`.
+
+    Args:
+        named_protocol: Queries turned and tilted at random, or as the paper
+            asked.
+        radius: A place is a match within this distance [m].
+        query_spacing: Distance between two queries along the path [m].
+        place_spacing: Distance between two places of the database [m].
+        max_range: Leave out points farther than this along an axis [m].
+        scans_per_place: Merge N scans for every method; by default each method
+            has its own number.
+        exclude_recent: Loop closure: each drive is also its own database, with
+            places it passed at least S seconds before.
+        gate: Reject, among the best places of a query, those that are beyond
+            the radius by the method's own pose; for methods that estimate
+            poses.
+    """
+
+
+def with_protocol(
+    command: Callable[..., None], *, named: bool = False
+) -> Callable[..., None]:
     """Gives a command the options of the protocol.
 
     Args:
         command: has a keyword `protocol`, a `RetrievalProtocol`, which the
-            options replace on the command line; the rest is the default.
+            options replace on the command line.
+        named: whether `--protocol` says what the rest is; else it is the
+            default.
     """
-    return _with_options(command, _OPTIONS)
+    _, *options = shown = _parameters(explained(_protocol))
+    if named:
+        options = shown
+
+    def run(**values: Any) -> None:
+        chosen = {one.name: values.pop(one.name) for one in options}
+        base = DEFAULT_PROTOCOL
+        if named:
+            base = PROTOCOLS[chosen.pop("named_protocol")]
+        command(**values, protocol=replace(base, **chosen))
+
+    parameters = [
+        one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+        for one in (*_parameters(command), *options)
+        if one.name != "protocol"
+    ]
+    return _called(command, run, parameters)
 
 
-def with_named_protocol(command: Callable[..., None]) -> Callable[..., None]:
-    """Gives a command the options of the protocol, and `--protocol`.
+with_named_protocol = functools.partial(with_protocol, named=True)
+
+
+def explained(command: Callable[..., None]) -> Callable[..., None]:
+    """Returns a command whose docstring explains its options to the user.
 
     Args:
-        command: likewise; the rest is that of the named protocol.
+        command: the section `Args` of its docstring has the help of options
+            and arguments; those without an entry have one already.
     """
-    named = {"named_protocol": (NamedProtocol, "fair")}
-    return _with_options(command, {**named, **_OPTIONS})
+    text, _, entries = inspect.getdoc(command).partition("\n\nArgs:\n")  # type: ignore[union-attr]  # Each command has one.
+    helps: dict[str, str] = {}
+    for line in textwrap.dedent(entries).splitlines():
+        if not line.startswith(" "):
+            name, _, line = line.partition(": ")
+            helps[name] = line
+        else:
+            helps[name] += f" {line.strip()}"
+    parameters = []
+    for one in _parameters(command):
+        if one.name in helps:
+            is_required = one.default is inspect.Parameter.empty
+            info: Any = typer.Argument() if is_required else typer.Option()
+            kind = one.annotation
+            if hasattr(kind, "__metadata__"):
+                kind, info = get_args(kind)
+            info.help = helps[one.name]
+            one = one.replace(annotation=Annotated[kind, info])
+        parameters.append(one)
+    return _called(command, command, parameters, text)
 
 
-def _with_options(
+def _parameters(command: Callable[..., None]) -> list[inspect.Parameter]:
+    signature = inspect.signature(command, eval_str=True)
+    return list(signature.parameters.values())
+
+
+def _called(
     command: Callable[..., None],
-    options: Mapping[str, tuple[object, object]],
+    run: Callable[..., None],
+    parameters: Sequence[inspect.Parameter],
+    text: str | None = None,
 ) -> Callable[..., None]:
-    """Returns a command with options instead of `protocol`."""
+    """Returns a command as another function runs it, with its parameters.
+
+    Args:
+        text: the docstring; that of the command by default.
+    """
 
     @functools.wraps(command)
     def wrapper(**values: Any) -> None:
-        chosen = {name: values.pop(name) for name in _OPTIONS}
-        base = DEFAULT_PROTOCOL
-        if "named_protocol" in options:
-            base = PROTOCOLS[values.pop("named_protocol")]
-        command(**values, protocol=replace(base, **chosen))
+        run(**values)
 
-    signature = inspect.signature(command, eval_str=True)
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    parameters = [
-        one.replace(kind=keyword)
-        for one in signature.parameters.values()
-        if one.name != "protocol"
-    ]
-    parameters += [
-        inspect.Parameter(name, keyword, default=default, annotation=annotation)
-        for name, (annotation, default) in options.items()
-    ]
-    wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapper.__doc__ = text or command.__doc__
+    wrapper.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapper.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapper

@@ -132,8 +132,6 @@ class Trend:
         rho: Spearman's rank correlation; NaN if either does not vary.
         p_value: two-sided, of no correlation.
         slope: slope of the least-squares line, AUC for 0.1 of TCR_sym.
-        spread: greatest less least AUC.
-        num_pairs: how many.
     """
 
     rho: float
@@ -166,9 +164,15 @@ def findings(
         found.append(_ring_is_best(results))
     known = [r for r in results if not np.isnan(tcr.get(r.pair, np.nan))]
     if known:
-        found.append(_falls(known, tcr, methods))
+        trends = _trends(known, tcr, methods)
+        number = len({result.pair for result in known})
+        too_few = (
+            f"{number} pair{'s' if number > 1 else ''} of drives;"
+            f" a trend needs {_FEWEST_PAIRS} or more."
+        )
+        found.append(_falls(trends, too_few))
         if "btc" in methods and len(methods) > 1:
-            found.append(_btc_is_flat(known, tcr, methods))
+            found.append(_btc_is_flat(trends, too_few))
     return found
 
 
@@ -194,6 +198,24 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 def paper_trend(method: str) -> Trend:
     """Returns the trend in the paper's own Table II."""
     return trend(*zip(*paper().auc_over_change(method), strict=True))
+
+
+def _trends(
+    results: Sequence[RecognitionResult],
+    tcr: Mapping[tuple[str, str, str], float],
+    methods: Sequence[str],
+) -> dict[str, Trend]:
+    """Returns method -> its trend in mode all, where pairs suffice."""
+    trends = {}
+    for method in methods:
+        points = [
+            (tcr[r.pair], r.metrics["all"].auc)
+            for r in results
+            if r.method == method
+        ]
+        if len(points) >= _FEWEST_PAIRS:
+            trends[method] = trend(*zip(*points, strict=True))
+    return trends
 
 
 def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
@@ -275,68 +297,15 @@ def _listed(best: Iterable[Iterable[str]]) -> str:
     return ", ".join(f"{method} on {number}" for method, number in counts)
 
 
-def _falls(
-    results: Sequence[RecognitionResult],
-    tcr: Mapping[tuple[str, str, str], float],
-    methods: Sequence[str],
-) -> Finding:
+def _falls(trends: Mapping[str, Trend], too_few: str) -> Finding:
     claim = (
         "Place recognition gets worse as TCR_sym grows (for BTC the paper"
         " says it does not)."
     )
-    trends = _trends(results, tcr, methods)
     # One wording for all; the paper itself makes an exception of BTC.
-    judged = {m: t for m, t in trends.items() if m != "btc"}
-    if not judged:
-        return Finding(claim, UNDECIDED, _too_few(results))
-    falling = sum(t.falls for t in judged.values())
-    return Finding(claim, _part(falling, len(judged)), _describe_trends(trends))
-
-
-def _btc_is_flat(
-    results: Sequence[RecognitionResult],
-    tcr: Mapping[tuple[str, str, str], float],
-    methods: Sequence[str],
-) -> Finding:
-    claim = "BTC hardly depends on TCR_sym."
-    trends = _trends(results, tcr, methods)
-    if "btc" not in trends:
-        return Finding(claim, UNDECIDED, _too_few(results))
-    btc = trends["btc"]
-    flattest = min(trends, key=lambda m: abs(trends[m].slope))
-    if btc.falls:
-        verdict = FAILS
-    else:
-        verdict = HOLDS if flattest == "btc" else IN_PART
-    spreads = ", ".join(f"{title(m)} {t.spread:.3f}" for m, t in trends.items())
-    return Finding(
-        claim,
-        verdict,
-        f"Slope {btc.slope:+.3f} AUC for 0.1 of TCR_sym (rank correlation"
-        f" {btc.rho:+.2f}, p = {btc.p_value:.2f}); the flattest is"
-        f" {title(flattest)}. Greatest less least AUC: {spreads}.",
-    )
-
-
-def _trends(
-    results: Sequence[RecognitionResult],
-    tcr: Mapping[tuple[str, str, str], float],
-    methods: Sequence[str],
-) -> dict[str, Trend]:
-    """Returns method -> its trend in mode all, where pairs suffice."""
-    trends = {}
-    for method in methods:
-        points = [
-            (tcr[r.pair], r.metrics["all"].auc)
-            for r in results
-            if r.method == method
-        ]
-        if len(points) >= _FEWEST_PAIRS:
-            trends[method] = trend(*zip(*points, strict=True))
-    return trends
-
-
-def _describe_trends(trends: dict[str, Trend]) -> str:
+    falls = [one.falls for name, one in trends.items() if name != "btc"]
+    if not falls:
+        return Finding(claim, UNDECIDED, too_few)
     known = {key[3] for key in paper().recognitions}
     parts = []
     for method, ours in trends.items():
@@ -351,19 +320,29 @@ def _describe_trends(trends: dict[str, Trend]) -> str:
                 f" (p = {theirs.p_value:.2f}, {theirs.slope:+.3f})"
             )
         parts.append(text)
-    return (
+    evidence = (
         "Rank correlation of AUC (mode all) with TCR_sym over"
-        f" {next(iter(trends.values())).num_pairs} pairs: "
-        + "; ".join(parts)
-        + "."
+        f" {next(iter(trends.values())).num_pairs} pairs: {'; '.join(parts)}."
     )
+    return Finding(claim, _part(sum(falls), len(falls)), evidence)
 
 
-def _too_few(results: Sequence[RecognitionResult]) -> str:
-    number = len({result.pair for result in results})
-    return (
-        f"{number} pair{'s' if number > 1 else ''} of drives;"
-        f" a trend needs {_FEWEST_PAIRS} or more."
+def _btc_is_flat(trends: Mapping[str, Trend], too_few: str) -> Finding:
+    claim = "BTC hardly depends on TCR_sym."
+    if "btc" not in trends:
+        return Finding(claim, UNDECIDED, too_few)
+    btc = trends["btc"]
+    flattest = min(trends, key=lambda m: abs(trends[m].slope))
+    verdict = FAILS
+    if not btc.falls:
+        verdict = HOLDS if flattest == "btc" else IN_PART
+    spreads = ", ".join(f"{title(m)} {t.spread:.3f}" for m, t in trends.items())
+    return Finding(
+        claim,
+        verdict,
+        f"Slope {btc.slope:+.3f} AUC for 0.1 of TCR_sym (rank correlation"
+        f" {btc.rho:+.2f}, p = {btc.p_value:.2f}); the flattest is"
+        f" {title(flattest)}. Greatest less least AUC: {spreads}.",
     )
 
 
@@ -424,16 +403,14 @@ def aims(
     means = {method: abs(off).mean() for method, off in of_methods.items()}
     mean = float(np.abs(list(differences.values())).mean())
     farthest = max(means, key=lambda method: means[method])
-    found.append(
-        Finding(
-            f"Mean difference of all {len(differences)} AUCs at most"
-            f" {_MEAN_DIFFERENCE:g}.",
-            MET if mean <= _MEAN_DIFFERENCE else MISSED,
-            f"It is {mean:.3f}. The greatest is that of {title(farthest)},"
-            f" {means[farthest]:.3f}.",
-        )
+    last = Finding(
+        f"Mean difference of all {len(differences)} AUCs at most"
+        f" {_MEAN_DIFFERENCE:g}.",
+        MET if mean <= _MEAN_DIFFERENCE else MISSED,
+        f"It is {mean:.3f}. The greatest is that of {title(farthest)},"
+        f" {means[farthest]:.3f}.",
     )
-    return found
+    return [*found, last]
 
 
 def _differences(

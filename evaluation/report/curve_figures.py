@@ -1,4 +1,4 @@
-"""Figures of numbers: precision over recall, AUC over change."""
+"""Figures of numbers: precision and recall, AUC over change, a track."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,6 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
+from evaluation.localisation.localise import RIGHT_TRANSLATION
+from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.drawing import method_entry, method_style, plain, save
@@ -20,13 +22,7 @@ _LEAST_POINTS = 5
 def draw_pr_curves(
     map_name: str, results: Sequence[RecognitionResult], stem: Path
 ) -> None:
-    """Draws precision over recall: a column for each pair, a row for each mode.
-
-    Args:
-        map_name: name of the city.
-        results: one for each of its pairs and methods.
-        stem: path to write, without ending.
-    """
+    """Draws precision over recall, a column a pair and a row a mode."""
     pairs = list(dict.fromkeys(result.pair for result in results))
     figure = Figure(figsize=(0.4 + 2.7 * len(pairs), 5.4), layout="constrained")
     grid = figure.subplots(
@@ -64,9 +60,6 @@ def draw_auc_over_change(
     them are the reference's values, if there are any.
 
     Args:
-        results: one for each pair and method.
-        changes: each pair's TCR_sym.
-        stem: path to write, without ending.
         reference: published values to draw beside ours.
     """
     methods = in_table_order(result.method for result in results)
@@ -186,3 +179,32 @@ def _draw_line(
         ends, slope * ends + offset, color=colour, linestyle=style, alpha=0.7
     )
     return True
+
+
+def draw_track(rows: np.ndarray, stem: Path) -> None:
+    """Draws the error over the way, and below it the share without a map.
+
+    Args:
+        rows: (K,) of `TRACKED`.
+    """
+    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    for stretch in np.unique(rows["stretch"]):
+        some = rows[rows["stretch"] == stretch]
+        error = np.maximum(some["translation_error"], 1e-4)
+        top.plot(some["way"], error, "-", color="#0072B2", linewidth=1.0)
+        bottom.fill_between(
+            some["way"], some["unmapped"], color="#E69F00", linewidth=0.0
+        )
+    for level, style in ((RIGHT_TRANSLATION, "--"), (LOST, ":")):
+        top.axhline(level, color="0.4", linestyle=style, linewidth=0.8)
+    top.set(yscale="log", ylabel="error of position [m]")
+    bottom.set(
+        xlabel="way [m]",
+        ylabel="scan\nwithout map",
+        ylim=(0.0, max(0.1, 1.05 * float(rows["unmapped"].max()))),
+    )
+    for axes in (top, bottom):
+        axes.grid(alpha=0.3)
+        axes.margins(x=0.01)
+    save(figure, stem, ("png",))

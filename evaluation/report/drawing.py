@@ -21,10 +21,7 @@ METHOD_STYLES = {
     "layered-overlap": ("#E69F00", "-", "v"),
     "learned": ("#56B4E9", "--", "P"),
 }
-_OTHER_STYLES = (
-    ("#000000", "-.", "X"),
-    ("#8C564B", ":", "p"),
-)
+_OTHER_STYLES = (("#000000", "-.", "X"), ("#8C564B", ":", "p"))
 
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]
@@ -79,7 +76,6 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
     letters that can be read on a phone.
 
     Args:
-        figure: to write.
         stem: path without ending.
         kinds: the formats, `LINES` or `PIXELS`.
 

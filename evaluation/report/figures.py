@@ -67,7 +67,6 @@ class View:
             [deg].
         elevation_deg: height of the camera above the horizon, up to 90
             [deg].
-        pixels_per_metre: scale.
     """
 
     azimuth_deg: float = -60.0
@@ -94,7 +93,6 @@ class Picture:
     Attributes:
         image: (height, width, 3) uint8; white where there is no point.
         origin: coordinates along right and up of the lower left corner [m].
-        view: how it was taken.
     """
 
     image: np.ndarray
@@ -170,11 +168,8 @@ def draw_routes(
     """Draws the routes of a city over their maps, red to blue, from above.
 
     Args:
-        map_name: name of the city.
-        stages: N names, such as `04`.
         views: N surroundings of the routes from above.
         routes: N arrays (M, 3) of where the sensor was [m].
-        stem: path to write, without ending.
     """
     _draw_panels(
         [f"{map_name} {stage}" for stage in stages],
@@ -202,11 +197,9 @@ def draw_change(
     orders and united; a point has the colour of its voxel.
 
     Args:
-        result: the change.
         clouds: (K, 3) for pictures, of the earlier and the later stage, in W
             [m].
         maps: their maps on the grid of the TCR.
-        stems: paths to write, without endings.
     """
     titles, pictures = [], []
     for one, other in ((0, 1), (1, 0)):
@@ -368,7 +361,6 @@ def render(
     Args:
         points: (N, 3) in W [m], N > 0.
         rgb: (N, 3) uint8 colour of each.
-        view: the camera.
         size_px: side of the square that a point covers.
     """
     seen = points @ view.axes().T
@@ -418,13 +410,7 @@ def colour_by_height(
     lowest: tuple[int, int, int],
     highest: tuple[int, int, int],
 ) -> np.ndarray:
-    """Returns colours (N, 3) uint8 between two by height.
-
-    Args:
-        heights: (N,) [m].
-        lowest: colour of the lowest point.
-        highest: colour of the highest.
-    """
+    """Returns colours (N, 3) uint8 between two by height."""
     part = _height_parts(heights)[:, None]
     return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
 

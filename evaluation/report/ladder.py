@@ -1,7 +1,8 @@
 """The results of a ladder: their numbers, tables, words and figure."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+import itertools
 import math
 from operator import attrgetter
 from pathlib import Path
@@ -16,14 +17,7 @@ from matplotlib.patches import Rectangle
 import numpy as np
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.recognition.metrics import (
-    UNKNOWN,
-    Interval,
-    percentile_interval,
-    pr_curve,
-    resampled_metrics,
-    resampled_weights,
-)
+from evaluation.recognition import metrics
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.rung_outcome import FAULTS, RungOutcome
@@ -61,9 +55,7 @@ class LadderRung:
     """The change between two drives.
 
     Attributes:
-        map_name: name of the city.
         database: name of the drive along the database's route.
-        query: name of the query drive.
         cause: what changes; `none` without a change.
         level: its strength, from 1 to 4; 0 without a change.
         strength: in words.
@@ -84,8 +76,6 @@ class MeasuredRung:
     """The outcomes of all methods on a rung, with one random draw.
 
     Attributes:
-        rung: the rung.
-        seed: number of the draw.
         drives: fingerprint of the drives.
         outcomes: one for each method, without and with the gate.
     """
@@ -101,7 +91,6 @@ class LadderRow:
     """A method on a rung: means over the draws.
 
     Attributes:
-        rung: the rung.
         drives: fingerprint of the drives of all draws.
         draws: outcome of each draw.
         unchanged: those on the rung `none` of the same map.
@@ -114,7 +103,7 @@ class LadderRow:
     drives: str
     draws: Sequence[RungOutcome]
     unchanged: Sequence[RungOutcome]
-    auc_interval: Interval
+    auc_interval: metrics.Interval
     kept: Kept
 
     @property
@@ -182,14 +171,16 @@ def _row(
     draws: Sequence[RungOutcome],
 ) -> LadderRow:
     num_queries = len(draws[0].outcomes)
-    weights = resampled_weights(num_queries, blocks=draws[0].outcomes.blocks)
+    weights = metrics.resampled_weights(
+        num_queries, blocks=draws[0].outcomes.blocks
+    )
     samples = _sampled_auc(draws, weights)
-    share = UNKNOWN
+    share = metrics.UNKNOWN
     if len(unchanged[0].outcomes) == num_queries:
         before = _sampled_auc(unchanged, weights)
-        share = percentile_interval(kept_share(samples, before))
+        share = metrics.percentile_interval(kept_share(samples, before))
     none, changed = (
-        float(np.mean([pr_curve(one.outcomes).auc for one in outcomes]))
+        float(np.mean([metrics.pr_curve(one.outcomes).auc for one in outcomes]))
         for outcomes in (unchanged, draws)
     )
     return LadderRow(
@@ -197,7 +188,7 @@ def _row(
         drives,
         draws,
         unchanged,
-        percentile_interval(samples),
+        metrics.percentile_interval(samples),
         Kept(none, changed, share),
     )
 
@@ -207,7 +198,8 @@ def _sampled_auc(
 ) -> np.ndarray:
     """Returns the mean AUC over draws, of samples of the queries."""
     return np.mean(
-        [resampled_metrics(one.outcomes, weights)[0] for one in draws], axis=0
+        [metrics.resampled_metrics(one.outcomes, weights)[0] for one in draws],
+        axis=0,
     )
 
 
@@ -302,8 +294,6 @@ def ladder_table(
     """Returns one row for each rung, method and gate.
 
     Args:
-        rows: rows for all maps.
-        protocol: that all rungs share.
         viewpoint: name of the database's place beside the queries.
     """
     options: Columns[LadderRow] = keyed(
@@ -321,7 +311,7 @@ def ladder_table(
 
 def _strict_auc(one: RungOutcome) -> float:
     number = int(one.outcomes.has_match.sum())
-    return pr_curve(one.outcomes).strict_auc(number)
+    return metrics.pr_curve(one.outcomes).strict_auc(number)
 
 
 def strongest_causes(rows: Sequence[LadderRow]) -> list[str]:
@@ -353,7 +343,7 @@ class CrossedRow:
     pair: LadderRow
     alone: tuple[LadderRow, LadderRow]
     excess: float
-    interval: Interval
+    interval: metrics.Interval
 
     @property
     def is_more(self) -> bool:
@@ -367,7 +357,6 @@ def crossed_rows(
     """Compares pairs of causes with each cause alone.
 
     Args:
-        rows: rows for all maps, with single causes.
         pairs: rows with two, whose names are joined by "+".
     """
     strongest = _strongest(rows)
@@ -378,14 +367,14 @@ def crossed_rows(
             strongest[(*drive, cause)] for cause in pair.rung.cause.split("+")
         )
         draws = (pair.unchanged, one.draws, other.draws, pair.draws)
-        weights = resampled_weights(
+        weights = metrics.resampled_weights(
             len(pair.outcomes), blocks=pair.outcomes.blocks
         )
-        interval = UNKNOWN
+        interval = metrics.UNKNOWN
         if len({len(part[0].outcomes) for part in draws}) == 1:
             none, *kept = (_sampled_auc(part, weights) for part in draws)
             first, second, both = (kept_share(part, none) for part in kept)
-            interval = percentile_interval(first * second - both)
+            interval = metrics.percentile_interval(first * second - both)
         excess = one.kept.share * other.kept.share - pair.kept.share
         found.append(CrossedRow(pair, (one, other), excess, interval))
     return found
@@ -580,13 +569,14 @@ class CauseCell(NamedTuple):
     """One level of a cell of a figure of methods over causes.
 
     Attributes:
-        method: its column.
-        cause: its line.
-        level: strength of the cause.
+        map_name: its line of panels.
+        title: which of the two panels there.
         share: the colour, from 0 to 1; NaN for none.
         label: the number of the strongest level.
     """
 
+    map_name: str
+    title: str
     method: str
     cause: str
     level: int
@@ -597,46 +587,35 @@ class CauseCell(NamedTuple):
 def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
     """Draws the share of the AUC without a change that each cause leaves.
 
-    A cell has a strip for each level, the weakest at its left; the number is
-    that of the strongest level [%]. Without a change it is AUC itself.
-
-    Args:
-        rows: rows for all maps.
-        stem: path to write, without ending.
+    The numbers are in per cent. Without a change they are AUC itself.
     """
-    maps = list(dict.fromkeys(row.rung.map_name for row in rows))
-    panels = {
-        (name, f"{name}, {words}"): [
-            CauseCell(
-                row.method,
-                row.rung.cause,
-                row.rung.level,
-                row.kept.share,
-                _label(row),
-            )
-            for row in rows
-            if row.rung.map_name == name and row.is_gated == is_gated
-        ]
-        for name in maps
-        for is_gated, words in _TITLES.items()
-    }
-    draw_cells(panels, "part of AUC that is kept", stem)
+    cells = [
+        CauseCell(
+            row.rung.map_name,
+            _TITLES[row.is_gated],
+            row.method,
+            row.rung.cause,
+            row.rung.level,
+            row.kept.share,
+            _label(row),
+        )
+        for row in rows
+    ]
+    draw_cells(cells, "part of AUC that is kept", stem)
 
 
-def draw_cells(
-    panels: Mapping[tuple[str, str], Sequence[CauseCell]],
-    meaning: str,
-    stem: Path,
-) -> None:
-    """Draws methods over causes, a strip for each level.
+def draw_cells(cells: Sequence[CauseCell], meaning: str, stem: Path) -> None:
+    """Draws methods over causes, two panels for each map.
+
+    A cell has a strip for each level, the weakest at its left; the number is
+    that of the strongest level.
 
     Args:
-        panels: map and title -> cells; those of a map are side by side.
         meaning: of the colours.
         stem: path to write, without ending.
     """
-    cells = [cell for panel in panels.values() for cell in panel]
-    maps = list(dict.fromkeys(name for name, _ in panels))
+    maps = list(dict.fromkeys(cell.map_name for cell in cells))
+    titles = dict.fromkeys(cell.title for cell in cells)
     methods = in_table_order(cell.method for cell in cells)
     causes = list(dict.fromkeys(cell.cause for cell in cells))
     size = (
@@ -645,16 +624,13 @@ def draw_cells(
     )
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(len(maps), 2, squeeze=False, sharey=True)
-    for axes, ((_, words), panel) in zip(
-        grid.flat, panels.items(), strict=True
-    ):
-        _draw_panel(axes, panel, methods, causes)
-        axes.set_title(plain(words), fontsize=_FONT_SIZE + 1)
+    panels = itertools.product(maps, titles)
+    for axes, panel in zip(grid.flat, panels, strict=True):
+        of_panel = [one for one in cells if (one.map_name, one.title) == panel]
+        _draw_panel(axes, of_panel, methods, causes)
+        axes.set_title(plain(", ".join(panel)), fontsize=_FONT_SIZE + 1)
     bar = figure.colorbar(
-        ScalarMappable(_SHARES, _COLOURS),
-        ax=grid[:, 1],
-        shrink=0.8,
-        aspect=30,
+        ScalarMappable(_SHARES, _COLOURS), ax=grid[:, 1], shrink=0.8, aspect=30
     )
     bar.set_label(meaning, fontsize=_FONT_SIZE)
     bar.ax.tick_params(labelsize=_FONT_SIZE)

@@ -32,35 +32,10 @@ from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.survival import Survival
+from evaluation.report import result_tables, survival
 from evaluation.report.figures import ROUTE_COLOURS
 from evaluation.report.page_data import Illustration, PageDrive, browser_data
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.result_tables import (
-    DriveTrack,
-    MethodDifference,
-    audit_table,
-    change_table,
-    cost_numbers,
-    cost_table,
-    difference_numbers,
-    difference_table,
-    fault_numbers,
-    fault_table,
-    metric_numbers,
-    pose_numbers,
-    pose_table,
-    query_table,
-    recognition_tables,
-)
-from evaluation.report.survival import (
-    NO_CONTROL,
-    by_pair,
-    interval_text,
-    percent,
-    survival_numbers,
-    survival_summary,
-    survival_table,
-)
 from evaluation.report.tables import MISSING, Table, escape_markdown, title
 
 _TEMPLATES = "page_template"
@@ -94,16 +69,12 @@ class Report:
         survivals: place recognition of all pairs, with their controls.
         recognitions: the same results without controls, and those of drives
             compared with themselves.
-        differences: AUC of each two methods, compared.
         evidence: (database, query) -> evidence why best places are wrong.
         tracks: drive -> its track, also for the controls.
         drives: name -> drive, for all drives of a pair.
         illustrations: figures, already written.
-        costs: costs of the methods; empty if they were not measured.
-        notes: cities without a pair to compare.
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
-        reference: published numbers and claims.
         repeated: results by the protocol of the published numbers, if that is
             another one.
     """
@@ -111,9 +82,9 @@ class Report:
     changes: list[ChangeResult] = field(default_factory=list)
     survivals: list[Survival] = field(default_factory=list)
     recognitions: list[RecognitionResult] = field(default_factory=list)
-    differences: Sequence[MethodDifference] = ()
+    differences: Sequence[result_tables.MethodDifference] = ()
     evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
-    tracks: dict[str, DriveTrack] = field(default_factory=dict)
+    tracks: dict[str, result_tables.DriveTrack] = field(default_factory=dict)
     drives: dict[str, PageDrive] = field(default_factory=dict)
     illustrations: list[Illustration] = field(default_factory=list)
     costs: Sequence[Cost] = ()
@@ -139,29 +110,32 @@ def write_report(report: Report, folder: Path) -> Path:
     tables = _shown_tables(report)
     every = [*results, *report.repeated]
     asked = [(one.pair, one) for one in results]
-    queries = query_table(asked, report.tracks, report.evidence)
+    queries = result_tables.query_table(asked, report.tracks, report.evidence)
     # Evidence is of the queries that the other results got wrong.
     again = [(one.pair, one) for one in report.repeated]
     numbers = {
-        "survival": survival_numbers(report.survivals),
-        "tcr": change_table(report.changes, report.reference, report.evidence),
-        "place_recognition": audit_table(every, report.reference),
-        "poses": pose_numbers(results),
-        "metrics": metric_numbers(every),
-        "differences": difference_numbers(report.differences),
-        "why": fault_numbers(results, report.evidence),
+        "survival": survival.survival_numbers(report.survivals),
+        "tcr": result_tables.change_table(
+            report.changes, report.reference, report.evidence
+        ),
+        "place_recognition": result_tables.audit_table(every, report.reference),
+        "poses": result_tables.pose_numbers(results),
+        "metrics": result_tables.metric_numbers(every),
+        "differences": result_tables.difference_numbers(report.differences),
+        "why": result_tables.fault_numbers(results, report.evidence),
         "queries": replace(
             queries,
-            rows=queries.rows + query_table(again, report.tracks, {}).rows,
+            rows=queries.rows
+            + result_tables.query_table(again, report.tracks, {}).rows,
         ),
-        "queries_unchanged": query_table(
+        "queries_unchanged": result_tables.query_table(
             [(one.pair, one.unchanged) for one in controls if one.unchanged],
             report.tracks,
             {},
         ),
     }
     if report.costs:
-        numbers["costs"] = cost_numbers(report.costs)
+        numbers["costs"] = result_tables.cost_numbers(report.costs)
     for name, table in numbers.items():
         table.write_csv(folder / f"{name}.csv")
         if name not in ("why", "differences") and name in tables:
@@ -220,7 +194,7 @@ def write_page(path: Path, report: Report) -> None:
             if has_section.get(name, True)
         },
         illustrations=illustrations,
-        survivals_by_pair=by_pair(report.survivals),
+        survivals_by_pair=survival.by_pair(report.survivals),
         facts=_facts(report),
         drives_of_maps=drives_of_maps,
         other_forms=list(forms_of_table)[1:],
@@ -235,22 +209,28 @@ def write_page(path: Path, report: Report) -> None:
 def _shown_tables(report: Report) -> dict[str, list[Table]]:
     """Returns name of a file -> its tables for print."""
     results = report.recognitions
-    changes = change_table(report.changes, report.reference, report.evidence)
+    changes = result_tables.change_table(
+        report.changes, report.reference, report.evidence
+    )
     return {
-        "survival": [survival_table(report.survivals)],
+        "survival": [survival.survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
-        "place_recognition": recognition_tables(
+        "place_recognition": result_tables.recognition_tables(
             results,
             report.changes,
             report.reference,
             report.compared,
             report.evidence,
         ),
-        "differences": [difference_table(report.differences)],
-        "why": [fault_table(results, report.evidence)],
-        "poses": [pose_table(results)],
-        "costs": [cost_table(report.costs)],
-        "audit": [audit_table([*results, *report.repeated], report.reference)],
+        "differences": [result_tables.difference_table(report.differences)],
+        "why": [result_tables.fault_table(results, report.evidence)],
+        "poses": [result_tables.pose_table(results)],
+        "costs": [result_tables.cost_table(report.costs)],
+        "audit": [
+            result_tables.audit_table(
+                [*results, *report.repeated], report.reference
+            )
+        ],
     }
 
 
@@ -262,7 +242,7 @@ def _content(
         "report": report,
         "tables": tables,
         "judgements": report.reference.judge(report.compared, report.changes),
-        "survival_summary": survival_summary(report.survivals),
+        "survival_summary": survival.survival_summary(report.survivals),
     }
 
 
@@ -384,17 +364,17 @@ def _environment() -> Environment:
     found.filters |= {
         "captioned": _captioned,
         "data_address": _data_address,
-        "interval_text": interval_text,
+        "interval_text": survival.interval_text,
         "markdown": escape_markdown,
         "method_title": title,
-        "percent": percent,
+        "percent": survival.percent,
         "quoted": quote,
         "route_picture": route_picture,
     }
     found.globals |= {
         "bar_length": round(_BAR_LENGTH),
         "missing": MISSING,
-        "no_control": NO_CONTROL,
+        "no_control": survival.NO_CONTROL,
         "route_colours": _route_colours(),
     }
     return found

@@ -39,7 +39,6 @@ class Illustration:
 
     Attributes:
         stem: its path without ending.
-        title: what it shows.
         page_kind: "svg" or "webp", the form in which the page holds it.
         section: section of the page with the figure; "print" for none.
         num_panels: number of panels side by side; a phone shows one at a time.
@@ -60,7 +59,6 @@ class PageDrive:
     """A drive as the page shows it.
 
     Attributes:
-        name: name of the recording.
         frames: (K,) frames that are places or queries, increasing.
         X_WS: (K, 4, 4) poses of the sensor there.
         route: (M, 2) the path of the sensor from above [m].
@@ -88,8 +86,6 @@ def make_drive(
     """Returns a drive as the page shows it.
 
     Args:
-        name: name of the recording.
-        view: its surroundings from above.
         X_WS: (N, 4, 4) poses of the sensor at all frames.
         frames: K of these that are places or queries.
         thumbnails: K reduced scans.
@@ -97,10 +93,7 @@ def make_drive(
     positions = X_WS[:, :3, 3]
     stream = io.BytesIO()
     image.imsave(
-        stream,
-        view.image,
-        format="webp",
-        pil_kwargs={"quality": _WEBP_QUALITY},
+        stream, view.image, format="webp", pil_kwargs={"quality": _WEBP_QUALITY}
     )
     chosen = np.array(frames, dtype=np.int64)
     return PageDrive(
@@ -127,9 +120,6 @@ def browser_data(
     pictures that `evaluation.report.page.route_picture` makes.
 
     Args:
-        recognitions: one for each pair and method.
-        drives: name -> drive, for all drives of a pair.
-        changes: TCR_sym of each pair.
         pages: drive -> address of the page of its recording; drives without a
             page may be left out.
         evidence: (database, query) -> evidence of why best places are wrong;
@@ -210,8 +200,7 @@ def _pair_data(
         "matches": [np.flatnonzero(row).tolist() for row in retrieval.matches],
         "methods": [
             _method_data(
-                by_method[method],
-                evidence.get((first.database, first.query)),
+                by_method[method], evidence.get((first.database, first.query))
             )
             for method in in_table_order(by_method)
         ],

@@ -20,13 +20,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim, and its verdict by our numbers.
-
-    Attributes:
-        claim: to be judged.
-        verdict: whether it holds here.
-        evidence: the numbers behind the verdict.
-    """
+    """A claim, and its verdict by our numbers."""
 
     claim: str
     verdict: str

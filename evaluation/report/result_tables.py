@@ -37,6 +37,7 @@ from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.report.tables import (
+    CAPTIONS,
     Columns,
     Table,
     in_table_order,
@@ -46,50 +47,6 @@ from evaluation.report.tables import (
     title,
 )
 
-_CHANGE_CAPTION = (
-    "Temporal change ratio: TCR_sym is 0 where nothing changed and 1 where"
-    " everything did. Same stage: TCR_sym of the two routes in one stage of the"
-    " city, where nothing changed. Where both drove: only voxels within 40 m of"
-    " both routes. Visible change: the part of a query's scan that the best of"
-    " its matches does not show, mean over the queries that have one."
-)
-_AUDIT_CAPTION = (
-    "All numbers with 95 % intervals (bootstrap over blocks of 100 m of the"
-    " route) and the counts they are made of: R@1 = TP / N,"
-    " F1max = 2 TP / (TP + T). AUC strict: the"
-    " area with recall = TP / N, which wrong accepted answers lower, too."
-)
-_DIFFERENCE_CAPTION = (
-    "Differences of AUC (mode all) between methods on the same queries, with"
-    " 95 % intervals, by paired bootstrap over blocks of 100 m of the route; p"
-    " is corrected for the number of rows (Holm)."
-)
-_FAULT_CAPTION = (
-    "Why best places are wrong: how many of the queries with a wrong best"
-    " place have none in the database (no place); got no candidate; were put"
-    " just too far away, within two radii; have a right place from which less"
-    " than half of their scan is seen, since something hides it (hidden) or"
-    " for another reason (no overlap); have a right place of whose standing"
-    " points a quarter or more has come or gone (changed, and the class of"
-    " most of it); were taken to a twin, which fits on them as well as the"
-    " right place does. All others are the method's own fault (elsewhere). A"
-    " query with several of these faults counts only under the one that is"
-    " named first here."
-)
-_POSE_CAPTION = (
-    "Poses that come with the places. Errors of the accepted matches: best"
-    " places that are right, with a score from that of the greatest F1 on."
-    " Success: queries with a match whose pose is wrong by at most 2 m and"
-    " 5 deg, whatever the score. Recall at full precision: the part of the"
-    " queries with a match that a method finds, best scores first, before its"
-    " first wrong place. Scan Context++ and SOLiD estimate"
-    " little more than the turn."
-)
-_COST_CAPTION = (
-    "What each method costs on one core of the machine that made this report:"
-    " time of the processor, medians over some scans. This table alone"
-    " differs from run to run (--no-costs leaves it out)."
-)
 # Name in Table II -> attribute of our metrics and of published numbers, which
 # may lack it.
 _MEASURES = {"AUC": "auc", "strict": "auc_strict", "R@1": "recall_at_1"}
@@ -129,13 +86,7 @@ def change_table(
     reference: Reference = NO_REFERENCE,
     evidence: Evidence = MappingProxyType({}),
 ) -> Table:
-    """Returns Table I: the change of each pair, and its parts.
-
-    Args:
-        results: for all pairs.
-        reference: its published values stand beside ours, and below.
-        evidence: for the visible change of pairs.
-    """
+    """Returns Table I: the change of each pair, and its parts."""
 
     def visible(one: ChangeResult) -> tuple[float | None, int | None]:
         return _visible_change(evidence, one.report.source, one.report.target)
@@ -160,7 +111,7 @@ def change_table(
             "visible change": lambda r: visible(r)[0],
             "queries": lambda r: visible(r)[1],
         },
-        _CHANGE_CAPTION,
+        CAPTIONS["change"],
     )
     names = {result.map_name for result in results}
     further = tuple(
@@ -185,8 +136,7 @@ def _by_pair_and_method(
     pairs = list(dict.fromkeys(result.pair for result in results))
     methods = in_table_order(result.method for result in results)
     return sorted(
-        results,
-        key=lambda r: (pairs.index(r.pair), methods.index(r.method)),
+        results, key=lambda r: (pairs.index(r.pair), methods.index(r.method))
     )
 
 
@@ -245,12 +195,8 @@ def recognition_table(
     F1 is only in the form that is compared with the reference.
 
     Args:
-        results: for all pairs and methods.
-        changes: for the TCR_sym of the pairs.
         mode: mode in which methods are counted; None for the mode that the
             reference used for each.
-        reference: its values stand beside ours.
-        evidence: for the visible change of the pairs.
 
     Raises:
         InputError: results of two protocols.
@@ -364,35 +310,34 @@ def audit_table(
             "T of F1max": lambda c: c.at_f1_max(c.metrics.curve.counted),
             **protocol_columns("result.outcome.protocol"),
         },
-        _AUDIT_CAPTION,
+        CAPTIONS["audit"],
     )
 
 
 def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
     """Returns the metrics of other publications, as `metrics.csv` has them."""
     return Table.of(
-        [
-            _Metrics(one, one.outcome.outcomes, one.outcome.auc_over_radius())
-            for one in _by_pair_and_method(results)
-        ],
+        _by_pair_and_method(results),
         {
-            **_inner(_KEYS),
-            "auc_strict": lambda m: m.result.metrics["all"].auc_strict,
-            "recall_at_1": lambda m: m.outcomes.recall_at(1),
-            "recall_at_1_percent": lambda m: m.outcomes.recall_at(
-                m.outcomes.one_percent_rank
+            **_KEYS,
+            "auc_strict": lambda r: r.metrics["all"].auc_strict,
+            "recall_at_1": lambda r: r.outcome.outcomes.recall_at(1),
+            "recall_at_1_percent": lambda r: r.outcome.outcomes.recall_at(
+                r.outcome.outcomes.one_percent_rank
             ),
-            "mean_reciprocal_rank": lambda m: m.outcomes.mean_reciprocal_rank,
-            "recall_at_full_precision": lambda m: (
-                m.result.metrics["all"].curve.recall_at_full_precision
+            "mean_reciprocal_rank": lambda r: (
+                r.outcome.outcomes.mean_reciprocal_rank
             ),
-            "match_auroc": lambda m: m.outcomes.match_auroc,
-            "pose_success": lambda m: m.result.outcome.pose.success,
+            "recall_at_full_precision": lambda r: (
+                r.metrics["all"].curve.recall_at_full_precision
+            ),
+            "match_auroc": lambda r: r.outcome.outcomes.match_auroc,
+            "pose_success": lambda r: r.outcome.pose.success,
             **keyed(
                 {f"auc_within_{radius:g}_m": radius for radius in RADII},
-                lambda m, radius: m.areas[radius],
+                lambda r, radius: r.outcome.auc_over_radius()[radius],
             ),
-            **protocol_columns("result.outcome.protocol"),
+            **_PROTOCOL,
         },
     )
 
@@ -401,8 +346,6 @@ class MethodDifference(NamedTuple):
     """Two results of a pair, with the difference of their AUC.
 
     Attributes:
-        result: of the first method.
-        other: of the second one.
         difference: the first less the second.
         p_value: corrected for the number of all differences; NaN if unknown.
     """
@@ -476,16 +419,8 @@ def difference_table(differences: Sequence[MethodDifference]) -> Table:
             "high": lambda d: d.difference.interval.high,
             "p": lambda d: d.p_value,
         },
-        _DIFFERENCE_CAPTION,
+        CAPTIONS["differences"],
     )
-
-
-class _Metrics(NamedTuple):
-    """A result, its outcomes, and radius of a match [m] -> AUC."""
-
-    result: RecognitionResult
-    outcomes: QueryOutcomes
-    areas: Mapping[float, float]
 
 
 # Name in files -> value.
@@ -512,7 +447,7 @@ def pose_table(results: Sequence[RecognitionResult]) -> Table:
     return Table.of(
         _by_pair_and_method(results),
         {**_SHOWN, **dict(zip(names, _POSE_ERRORS.values(), strict=True))},
-        _POSE_CAPTION,
+        CAPTIONS["poses"],
     )
 
 
@@ -543,7 +478,6 @@ def fault_table(
     """Returns the reasons for wrong best places for print.
 
     Args:
-        results: for all pairs and methods.
         evidence: a pair without it has no row.
     """
 
@@ -564,7 +498,7 @@ def fault_table(
                 or None
             ),
         },
-        _FAULT_CAPTION,
+        CAPTIONS["faults"],
     )
 
 
@@ -624,7 +558,7 @@ def cost_table(costs: Sequence[Cost]) -> Table:
             "of places": lambda c: c.places,
             "bytes a place": lambda c: f"{c.place_bytes:.0f}",
         },
-        _COST_CAPTION,
+        CAPTIONS["costs"],
     )
 
 
@@ -672,7 +606,6 @@ class _Queries(NamedTuple):
 
     Attributes:
         pair: map, database and query.
-        result: the result.
         query, match: moments of the queries, and of their best places.
         distances: to the best places [m]; NaN without one.
         evidence: for the pair; None if there is none.
@@ -742,7 +675,6 @@ def query_table(
     """Returns a row for each pair, method and query, in the queries' order.
 
     Args:
-        results: each with its map, database and query.
         tracks: drive -> its track, for all drives.
         evidence: why best places are wrong; its columns are empty for pairs
             without it.

@@ -10,31 +10,10 @@ from matplotlib.lines import Line2D
 import numpy as np
 
 from evaluation.recognition.survival import Kept, Survival
+from evaluation.report import tables
 from evaluation.report.drawing import method_style, plain, save
-from evaluation.report.tables import (
-    MISSING,
-    Columns,
-    Table,
-    in_table_order,
-    keyed,
-    protocol_columns,
-    title,
-)
 
 NO_CONTROL = "no control"
-SURVIVAL_CAPTION = (
-    "What is left of AUC and R@1 where the city has changed. All queries count"
-    " (mode all), also those without a match. Without change: a control drive"
-    " takes the place of one drive of the pair. It follows the same route, but"
-    " in the stage of the other drive. Kept: the value with the change, divided"
-    " by the value without, and its 95 % interval (bootstrap over blocks of"
-    " 100 m of the route, the same ones with and without the change). AUC"
-    " strict has recall = TP / N, which wrong accepted answers lower, too."
-    " Recall at full precision: the"
-    " part of the queries with a match that a method finds, best scores first,"
-    " before its first wrong place. Where it is small, a user cannot rely on"
-    " single answers, even of a method that keeps its AUC."
-)
 # The width of a phone's screen, on which letters stay legible [inches].
 _WIDTH = 3.9
 _ROW = 0.17
@@ -52,7 +31,7 @@ def by_pair(
     groups: dict[tuple[str, str, str], list[Survival]] = {}
     for one in survivals:
         groups.setdefault(one.pair, []).append(one)
-    methods = in_table_order(one.method for one in survivals)
+    methods = tables.in_table_order(one.method for one in survivals)
     for group in groups.values():
         group.sort(key=lambda one: methods.index(one.method))
     return groups
@@ -60,7 +39,7 @@ def by_pair(
 
 def percent(share: float) -> str:
     """Returns a share as text."""
-    return MISSING if math.isnan(share) else f"{100.0 * share:.0f} %"
+    return tables.MISSING if math.isnan(share) else f"{100.0 * share:.0f} %"
 
 
 def interval_text(kept: Kept) -> str:
@@ -71,9 +50,9 @@ def interval_text(kept: Kept) -> str:
     return f"{100.0 * low:.0f}–{100.0 * high:.0f}"
 
 
-def survival_numbers(survivals: Sequence[Survival]) -> Table:
+def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
     """Returns all numbers, as `survival.csv` has them."""
-    return Table.of(
+    return tables.Table.of(
         survivals,
         {
             "map": lambda s: s.pair[0],
@@ -92,21 +71,21 @@ def survival_numbers(survivals: Sequence[Survival]) -> Table:
             "r1_kept_high": lambda s: s.recall_at_1.interval.high,
             "recall_at_full_precision": lambda s: s.recall_at_full_precision,
             "control": lambda s: s.control,
-            **protocol_columns("protocol"),
+            **tables.protocol_columns("protocol"),
             "auc_strict_unchanged": lambda s: s.auc_strict[0],
             "auc_strict_changed": lambda s: s.auc_strict[1],
         },
     )
 
 
-def survival_table(survivals: Sequence[Survival]) -> Table:
+def survival_table(survivals: Sequence[Survival]) -> tables.Table:
     """Returns the table for print: a row for each pair and method."""
-    return Table.of(
+    return tables.Table.of(
         [one for group in by_pair(survivals).values() for one in group],
         {
             "map": lambda s: s.pair[0],
             "DB → query": lambda s: " → ".join(s.pair[1:]),
-            "method": lambda s: title(s.method),
+            "method": lambda s: tables.title(s.method),
             **_shown("AUC", lambda s: s.auc),
             **_strict_columns(),
             **_shown("R@1", lambda s: s.recall_at_1),
@@ -114,11 +93,13 @@ def survival_table(survivals: Sequence[Survival]) -> Table:
                 s.recall_at_full_precision
             ),
         },
-        SURVIVAL_CAPTION,
+        tables.CAPTIONS["survival"],
     )
 
 
-def _shown(group: str, number: Callable[[Survival], Kept]) -> Columns[Survival]:
+def _shown(
+    group: str, number: Callable[[Survival], Kept]
+) -> tables.Columns[Survival]:
     """Returns the columns of a number without change, with it, and kept."""
 
     def kept(one: Survival) -> str | None:
@@ -137,9 +118,9 @@ def _shown(group: str, number: Callable[[Survival], Kept]) -> Columns[Survival]:
     }
 
 
-def _strict_columns() -> Columns[Survival]:
+def _strict_columns() -> tables.Columns[Survival]:
     names = "without change", "with change"
-    return keyed(
+    return tables.keyed(
         {("AUC strict", name): k for k, name in enumerate(names)},
         lambda one, k: one.auc_strict[k],
     )
@@ -154,11 +135,13 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
     for one in known:
         if not math.isnan(one.auc.share):
             shares.setdefault(one.method, []).append(one.auc.share)
-    medians = {m: float(np.median(shares[m])) for m in in_table_order(shares)}
+    medians = {
+        m: float(np.median(shares[m])) for m in tables.in_table_order(shares)
+    }
     parts = []
     if medians:
         listed = ", ".join(
-            f"{title(method)} {percent(medians[method])}"
+            f"{tables.title(method)} {percent(medians[method])}"
             for method in sorted(medians, key=lambda m: -medians[m])
         )
         number = len(pairs) - without
@@ -190,7 +173,6 @@ def draw_survival(
     Args:
         survivals: one for each pair and method; at least one has a
             control.
-        stem: path to write, without ending.
         beaten: pair and name of methods that another beats with the change,
             beyond doubt.
     """
@@ -216,7 +198,7 @@ def draw_survival(
         )
         for one in group:
             _draw_row(axes, one, height)
-            ticks.append((height, plain(title(one.method))))
+            ticks.append((height, plain(tables.title(one.method))))
             is_beaten = (pair, one.method) in beaten
             leading.append(pair in with_beaten and not is_beaten)
             height += 1.0

@@ -16,6 +16,7 @@ import numpy as np
 
 from cns_drake.base.csv_files import csv_text
 from cns_drake.base.files import completing
+from cns_drake.base.yaml_files import read_yaml
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 
 _Item = TypeVar("_Item")
@@ -27,6 +28,8 @@ _Key = TypeVar("_Key")
 Columns = Mapping[str | tuple[str, str], Callable[[_Item], object]]
 
 MISSING = "–"
+# Table -> what it shows.
+CAPTIONS = read_yaml(Path(__file__).with_name("captions.yaml"))
 # The spelling of the methods' authors, in the order of tables; our methods come
 # last.
 _METHOD_TITLES = {
@@ -101,10 +104,7 @@ class Table:
 
     @classmethod
     def of(
-        cls,
-        items: Iterable[_Item],
-        columns: Columns[_Item],
-        caption: str = "",
+        cls, items: Iterable[_Item], columns: Columns[_Item], caption: str = ""
     ) -> Table:
         """Returns a table with a row, or several, for each item."""
         names = [n if isinstance(n, tuple) else ("", n) for n in columns]
@@ -119,6 +119,17 @@ class Table:
             ),
             spans if any(group for group, _ in spans) else (),
             caption,
+        )
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[Mapping[str, object]]) -> Table:
+        """Returns a table of rows that all have the same columns.
+
+        A row with lists or arrays stands for several, see `Columns`.
+        """
+        return cls(
+            tuple(rows[0]) if rows else (),
+            tuple(line for row in rows for line in _rows(list(row.values()))),
         )
 
     def without_empty(self, name: str) -> Table:

@@ -33,9 +33,7 @@ class AgedPair:
     """The outcomes of all methods, with some years between the drives.
 
     Attributes:
-        map_name: name of the city.
         year: years between database and query; 0 without.
-        seed: seed of the city's history.
         direction: `FORWARD` or `BACKWARD`.
         tcr_sym: change of the city along the query's way; NaN if unknown.
         outcomes: one for each method, without and with the gate.
@@ -60,16 +58,11 @@ class YearRow:
     """A task of a method after some years.
 
     Attributes:
-        pair: the drives.
         task: `place`, `pose`, `localise`, `map` or `unchanged`.
-        method: its name.
-        gate: whether the gate was used.
         value: AUC, the share of right poses or ends, mean IoU, or the share of
             points.
-        today: the value without years between.
         interval: 95 % interval of `kept` by bootstrap over blocks of
             the route.
-        r1: R@1.
         visible_change: part of the queries' scans that the best place does not
             show, today's taken off.
         queries: number of queries, or of points that are gone or new.
@@ -291,12 +284,7 @@ def year_text(rows: Sequence[YearRow]) -> str:
 
 
 def draw_years(rows: Sequence[YearRow], stem: Path) -> None:
-    """Draws the share of today's AUC that is left over the years.
-
-    Args:
-        rows: rows for all maps.
-        stem: path to write, without ending.
-    """
+    """Draws the share of today's AUC that is left over the years."""
     maps = list(dict.fromkeys(row.pair.map_name for row in rows))
     columns = min(len(maps), 2)
     lines = math.ceil(len(maps) / columns)

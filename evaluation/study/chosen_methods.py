@@ -26,7 +26,6 @@ class MethodChoice:
     """A method that any process can make.
 
     Attributes:
-        name: under which it is registered.
         file: the Python file that registers it; None for a method of this
             package.
         settings: name and value of parameters; the others have their defaults.
@@ -69,7 +68,6 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
 
     Args:
         text: the setting; commas separate several values.
-        form: what the text should be, for the error message.
 
     Raises:
         InputError: if it has no name or no equals sign.

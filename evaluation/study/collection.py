@@ -24,9 +24,7 @@ class RecordingInfo:
     """A recording that exists or will be made, and its place in a study.
 
     Attributes:
-        name: the name of the recording.
         path: its file or folder, which may not exist yet.
-        map_name: the name of the city.
         stage: the stage of the city's life; stages sort by name.
         way: where the drive leads (see `driven_way`); None if it is unknown.
         needs: names of the jobs that make the recording.
@@ -60,8 +58,6 @@ class Repetition:
     """A method on a pair by the protocol of published numbers.
 
     Attributes:
-        method: the method.
-        protocol: that of the published numbers.
         shares_places: whether the study's own protocol describes places alike.
     """
 
@@ -85,7 +81,6 @@ class City:
     """The drives through one map.
 
     Attributes:
-        name: the name of the map.
         stages: one recording a stage, by stage: `<map>_<stage>`.
         others: further drives through one of the stages, which may serve as
             controls.
@@ -192,11 +187,6 @@ def find_recordings(
     are taken from its name, `<map>_<stage>`. A recording with neither is left
     out.
 
-    Args:
-        folder: the folder of the recordings.
-        on_note: gets a note on each recording that is left out.
-        lidar: name of the LiDAR, for recordings with several.
-
     Raises:
         InputError: if no recording has a map and a stage, or one cannot be
             read.
@@ -234,10 +224,6 @@ def group_cities(
     recordings: Iterable[RecordingInfo], reference: Reference = NO_REFERENCE
 ) -> list[City]:
     """Returns the cities of recordings, by name.
-
-    Args:
-        recordings: drives through any cities.
-        reference: names the pairs that are compared both ways.
 
     Raises:
         InputError: if two have one name, or claim the same place.

@@ -47,12 +47,8 @@ def explain_faults(
     """Returns the evidence of two drives; None if a drive closes no loop.
 
     Args:
-        reporter: takes the progress.
         surveyed: the `SurveyedDrive` and the `KeptScans` of the database, and
             of the query.
-        methods: the methods.
-        results: their `RecognitionResult` on the two drives.
-        protocol: the protocol of these results.
     """
     found = []
     for choice, part in zip(methods, results, strict=True):
@@ -77,11 +73,7 @@ def find_evidence(
     """Compares the scans of queries, of their matches and of wrong answers.
 
     Args:
-        database: the drive of the places.
-        query: the drive of the queries, in the same world frame.
         results: what one method or several found on the two.
-        protocol: that of these results.
-        track: reports progress.
 
     Raises:
         InputError: a scan cannot be read.
@@ -108,7 +100,6 @@ def find_evidence(
     overlaps, hidden, changed, right_fits = np.full((4, number), math.nan)
     changed_classes = [""] * number
     fits = {method: np.full(number, math.nan) for method in wrong}
-    aligner = _Aligner()
     for row in track(range(number), f"why: comparing {query.name}", number):
         frame = int(first.query_frames[row])
         query_scan = _Shown.of(query, frame, protocol.max_range)
@@ -130,7 +121,7 @@ def find_evidence(
         compared = [shown[k] for k in answers]
         if answers and right is not None:
             compared.append(right)
-        found = aligner.fits(query_scan, compared)
+        found = _fits(query_scan, compared)
         if len(found) > len(answers):
             right_fits[row] = found[-1]
         fit_of = dict(zip(answers, found, strict=False))
@@ -184,6 +175,10 @@ class _Shown:
     @cached_property
     def seen(self) -> SeenSurfaces:
         return SeenSurfaces.of(self.points)
+
+    @cached_property
+    def described(self) -> LayeredScan:
+        return LayeredOverlap().describe_place(self.points)
 
     @cached_property
     def standing(self) -> np.ndarray:
@@ -250,43 +245,31 @@ def _change(
     return changed.total() / total, name
 
 
-class _Aligner:
-    """Aligns scans as well as possible, without their poses."""
+def _fits(query: _Shown, places: Sequence[_Shown]) -> list[float]:
+    """Returns for each place the part of standing points that coincide.
 
-    def __init__(self) -> None:
-        self._method = LayeredOverlap()
-        self._places: dict[_Shown, LayeredScan] = {}
-
-    def fits(self, query: _Shown, places: Sequence[_Shown]) -> list[float]:
-        """Returns for each place the part of standing points that coincide.
-
-        The pose is that of layered overlap; the lesser of the query's and the
-        place's parts counts.
-        """
-        shared = [0.0] * len(places)
-        standing = [k for k, one in enumerate(places) if len(one.standing)]
-        if not (len(query.standing) and standing):
-            return shared
-        method = self._method
-        poses = method.relative_poses(
-            method.describe(query.points),
-            method.build_database([self._place(places[k]) for k in standing]),
-            range(len(standing)),
-        )
-        for k, X_PQ in zip(standing, poses, strict=True):
-            if X_PQ is not None:
-                place = places[k]
-                shared[k] = min(
-                    place.coinciding(transform(X_PQ, query.standing)),
-                    query.coinciding(transform(inverse(X_PQ), place.standing)),
-                )
+    The scans are aligned as well as possible, without their poses: the pose is
+    that of layered overlap. The lesser of the query's and the place's parts
+    counts.
+    """
+    shared = [0.0] * len(places)
+    standing = [k for k, one in enumerate(places) if len(one.standing)]
+    if not (len(query.standing) and standing):
         return shared
-
-    def _place(self, place: _Shown) -> LayeredScan:
-        """Returns the description of a place, computed once."""
-        if place not in self._places:
-            self._places[place] = self._method.describe_place(place.points)
-        return self._places[place]
+    method = LayeredOverlap()
+    poses = method.relative_poses(
+        method.describe(query.points),
+        method.build_database([places[k].described for k in standing]),
+        range(len(standing)),
+    )
+    for k, X_PQ in zip(standing, poses, strict=True):
+        if X_PQ is not None:
+            place = places[k]
+            shared[k] = min(
+                place.coinciding(transform(X_PQ, query.standing)),
+                query.coinciding(transform(inverse(X_PQ), place.standing)),
+            )
+    return shared
 
 
 def _standing() -> float:

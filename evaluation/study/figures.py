@@ -4,14 +4,8 @@ from pathlib import Path
 
 from cns_drake.base.files import file_name, make_folder
 from cns_drake.base.jobs.step import Reporter
+from evaluation.report import figures
 from evaluation.report.drawing import PIXELS
-from evaluation.report.figures import (
-    CHANGE_LEGEND,
-    SETS_LEGEND,
-    draw_change,
-    draw_routes,
-    top_view,
-)
 from evaluation.report.page_data import Illustration, PageDrive, make_drive
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.parts import Part
@@ -29,8 +23,6 @@ def draw_city(
     """Draws the routes of a city; returns its drives for the page, by name.
 
     Args:
-        reporter: takes the progress.
-        map_name: the name of the city.
         stages: the name of each, and its drive's `SurveyedDrive` and cloud.
         stem: path of the figure, without ending.
     """
@@ -38,7 +30,7 @@ def draw_city(
     for done, (name, surveyed, fine) in enumerate(stages):
         reporter.progress(done, len(stages) + 1)
         drive = surveyed.read()
-        view = top_view(fine.read(), drive.positions)
+        view = figures.top_view(fine.read(), drive.positions)
         names.append(name)
         views.append(view)
         routes.append(drive.positions)
@@ -47,7 +39,7 @@ def draw_city(
         )
     reporter.progress(len(stages), len(stages) + 1)
     make_folder(stem.parent)
-    draw_routes(map_name, names, views, routes, stem)
+    figures.draw_routes(map_name, names, views, routes, stem)
     return drives
 
 
@@ -60,8 +52,6 @@ def draw_changes(
     """Draws what changed between two stages, and the sets of the TCR.
 
     Args:
-        reporter: not used.
-        change: the `ChangeResult`.
         drives: `SurveyedDrive` and cloud of the earlier drive, and of the later
             one.
         stems: paths of the two figures, without endings.
@@ -69,7 +59,7 @@ def draw_changes(
     del reporter
     earlier, later = drives
     make_folder(stems[0].parent)
-    draw_change(
+    figures.draw_change(
         change.read(),
         (earlier[1].read(), later[1].read()),
         (earlier[0].read().coarse, later[0].read().coarse),
@@ -143,7 +133,7 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
                 change_stems(city, pair),
                 titles,
                 (2, 3),
-                (CHANGE_LEGEND, SETS_LEGEND),
+                (figures.CHANGE_LEGEND, figures.SETS_LEGEND),
                 strict=True,
             )
         ]
@@ -164,7 +154,6 @@ def auc_illustration(folder: Path, beside: str = "") -> Illustration:
     """Returns the figure of all cities together.
 
     Args:
-        folder: the folder of figures.
         beside: title of the reference in the figure; empty for none.
     """
     others = f", and of {beside}" if beside else ""

@@ -1,44 +1,56 @@
-"""Localisation of many pairs of drives, such as the rungs of a ladder."""
+"""Tasks with a map for many pairs of drives, such as the rungs of a ladder."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cns_drake.base import points as clouds
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
-from evaluation.localisation.estimators import (
-    KISS_MATCHER,
-    METHODS,
-    LocalisationMap,
-    default_settings,
-    make_estimator,
-    make_map,
-)
-from evaluation.localisation.localise import (
-    COLUMNS,
-    Localiser,
-    Starts,
-    mapped_frames,
-    query_frames,
-    way_axes,
-)
-from evaluation.report.compared import ComparedPair, write_compared
-from evaluation.report.localisation import LocalisedRow, draw_localised
-from evaluation.report.tables import Columns, keyed
-from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.localisation import estimators, localise
+from evaluation.localisation.localise import Starts
+from evaluation.report import ladder
+from evaluation.report.tables import Table
+from evaluation.study.parts import MakePart, StudyFiles
 from evaluation.study.surveys import DriveSource
 
 # Near starts measure accuracy, far ones the basin [m, deg].
 STARTS = (Starts(0.5, 2.0), Starts(2.0, 10.0))
 FAR_STARTS = STARTS[1:]
 # Those of the wheel that this package needs.
-SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
-_COST = 60.0
+SHIPPED = tuple(
+    name for name in estimators.METHODS if name != estimators.KISS_MATCHER
+)
+
+
+@dataclass(frozen=True)
+class ComparedPair:
+    """Two drives that are compared.
+
+    Attributes:
+        rung: the change between them; the drive of the map is the database.
+        sources: open both drives.
+    """
+
+    rung: ladder.LadderRung
+    sources: tuple[Callable[[], Drive], Callable[[], Drive]]
+    seed: int = 1
+
+    @property
+    def keys(self) -> dict[str, object]:
+        """The first columns of a row."""
+        return {name: get(self) for name, get in ladder.RUNG_COLUMNS.items()}
+
+    @property
+    def name(self) -> str:
+        """Its drives, cause, level and seed, which no other pair has."""
+        return " ".join(map(str, (*self.keys.values(), self.seed)))
 
 
 def localise_pairs(
@@ -51,13 +63,12 @@ def localise_pairs(
     """Localises the queries of pairs, by each method and from each start.
 
     Writes `localisation.csv`, a row for each pair, method and start,
-    `localisation_queries.csv`, one for each query of them, and a figure.
+    `localisation_queries.csv`, one for each query of them, and a figure: the
+    share of right ends, and the median error at the strongest level [cm].
     Finished pairs are not repeated.
 
     Args:
-        pairs: the pairs; in a map, the first is the one without a change.
-        output: the folder for everything.
-        cluster: where the work is done.
+        pairs: in a map, the first is the one without a change.
         methods: see `make_estimator`.
         spacing: between two queries [m].
 
@@ -81,36 +92,54 @@ def localise_pairs(
         cluster,
         measure_localisation,
         (named, texts, STARTS, spacing),
-        StudyFiles.localised,
+        "localised",
     )
-    rows = [
-        LocalisedRow(pair, Path(str(method)).stem, starts, queries)
-        for pair, of_pair in zip(pairs, found, strict=True)
-        for method, starts, queries in _by_method(of_pair, named)
-    ]
-    start: Columns[LocalisedRow] = {
-        "start": lambda row: row.starts.radius,
-        "start_turn_deg": lambda row: row.starts.turn_deg,
-    }
-    # Time differs from run to run.
-    summary: Columns[LocalisedRow] = keyed(
-        {name: name for name in rows[0].summary if name != "seconds_mean"},
-        lambda row, name: row.summary[name],
-    )
-    queries: Columns[LocalisedRow] = keyed(
-        {name: name for name in COLUMNS if name != "seconds"},
-        lambda row, name: row.rows[name].tolist(),
-    )
-    strength: Columns[LocalisedRow] = {
-        "strength": lambda row: row.rung.strength
-    }
+    summaries, queries, cells = [], [], []
+    for pair, of_pair in zip(pairs, found, strict=True):
+        draws = [
+            (Path(str(one)).stem, start) for one in named for start in STARTS
+        ]
+        for (method, start), rows in zip(draws, of_pair, strict=True):
+            numbers = localise.Localisation(rows).to_json()
+            # Time differs from run to run.
+            del numbers["seconds_mean"]
+            keys = {
+                **pair.keys,
+                "method": method,
+                "start": start.radius,
+                "start_turn_deg": start.turn_deg,
+            }
+            summaries.append(
+                {**keys, **numbers, "strength": pair.rung.strength}
+            )
+            named_columns = {
+                name: rows[name].tolist()
+                for name in localise.COLUMNS
+                if name != "seconds"
+            }
+            queries.append({**keys, **named_columns})
+            error = numbers["translation_median"]
+            cells.append(
+                ladder.CauseCell(
+                    pair.rung.map_name,
+                    f"start {start.radius:g} m, {start.turn_deg:g} deg",
+                    method,
+                    pair.rung.cause,
+                    pair.rung.level,
+                    float(numbers["success_03m_1deg"] or 0.0),
+                    "–" if error is None else _centimetres(error),
+                )
+            )
     table = output / "localisation.csv"
-    write_compared(table, rows, {**start, **summary, **strength})
-    write_compared(
-        output / "localisation_queries.csv", rows, {**start, **queries}
-    )
-    draw_localised(rows, output / "localisation")
+    Table.of_rows(summaries).write_csv(table)
+    Table.of_rows(queries).write_csv(output / "localisation_queries.csv")
+    meaning = "part within 0.3 m and 1 deg; numbers: cm"
+    ladder.draw_cells(cells, meaning, output / "localisation")
     return table
+
+
+def _centimetres(error: float) -> str:
+    return f"{100.0 * error:.1f}" if error < 0.1 else f"{100.0 * error:.0f}"
 
 
 def measure_pairs(
@@ -119,41 +148,31 @@ def measure_pairs(
     cluster: Cluster,
     function: Callable[..., Any],
     arguments: tuple[object, ...],
-    file: Callable[[StudyFiles, str], Part],
+    kind: str,
 ) -> list[Any]:
     """Returns what a function finds for each pair, once it is measured.
 
     Args:
-        pairs: the pairs.
         output: the folder for everything; it is made.
-        cluster: where the work is done.
         function: takes a `Reporter`, the sources of a pair, and the arguments.
         arguments: further ones, see `MakePart`.
-        file: gives the file of the pair of a name.
+        kind: see `StudyFiles.part`.
 
     Raises:
         InputError: the folder cannot be made, or a step failed.
     """
     make_folder(output)
     files = StudyFiles(output.absolute())
-    parts = [file(files, pair.name) for pair in pairs]
+    parts = [files.part(kind, pair.name) for pair in pairs]
     jobs = [
         Job(
             f"compare {pair.name}",
             MakePart(part, function, (*pair.sources, *arguments)),
-            cost=_COST,
         )
         for pair, part in zip(pairs, parts, strict=True)
     ]
     run_jobs(jobs, cluster)
     return [part.read() for part in parts]
-
-
-def _by_method(
-    found: list[np.ndarray], methods: tuple[str | Path, ...]
-) -> list[tuple[str | Path, Starts, np.ndarray]]:
-    keys = [(method, starts) for method in methods for starts in STARTS]
-    return [(*key, rows) for key, rows in zip(keys, found, strict=True)]
 
 
 def measure_localisation(
@@ -170,12 +189,8 @@ def measure_localisation(
     Each scan is read once, since a drive may be made while it is read.
 
     Args:
-        reporter: takes the progress.
-        database: the drive of the map.
-        query: the drive of the queries.
         methods: names, or Python files.
-        texts: the content of these files.
-        starts: draws of starts.
+        texts: the content of these files, which makes them other inputs.
         spacing: between two queries [m].
 
     Returns:
@@ -184,21 +199,23 @@ def measure_localisation(
     """
     del texts
     mapped, asked = database(), query()
-    maps: dict[tuple[float, int], LocalisationMap] = {}
+    maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
     localisers = []
     for method in methods:
-        settings = default_settings(str(method))
+        settings = estimators.default_settings(str(method))
         key = settings.voxel, settings.neighbours
         if key not in maps:
             # The drive is opened anew for each other map.
             source = mapped if not maps else database()
-            maps[key] = make_map(source, settings, reporter.track)
-        estimator = make_estimator(str(method), settings)
-        localisers.append(Localiser(maps[key], estimator, settings))
-    is_mapped = mapped_frames(mapped, localisers[0].surroundings, asked)
-    frames = query_frames(asked, is_mapped, spacing)
+            maps[key] = estimators.make_map(source, settings, reporter.track)
+        estimator = estimators.make_estimator(str(method), settings)
+        localisers.append(localise.Localiser(maps[key], estimator, settings))
+    is_mapped = localise.mapped_frames(
+        mapped, localisers[0].surroundings, asked
+    )
+    frames = localise.query_frames(asked, is_mapped, spacing)
     X_WS = asked.X_WS
-    R_WT = way_axes(X_WS[:, :3, 3], X_WS)
+    R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
     found: list[list[np.ndarray]] = [
         [] for _ in range(len(methods) * len(starts))
     ]

@@ -9,11 +9,8 @@ from evaluation.change.drive_change import compare as compare_maps
 from evaluation.drives import check_same_world
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.sampling import gather
+from evaluation.recognition import place_recognition
 from evaluation.recognition.costs import Cost, measure_cost
-from evaluation.recognition.place_recognition import (
-    RecognitionResult,
-    judge_retrieval,
-)
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
 from evaluation.study.chosen_methods import MethodChoice
@@ -34,9 +31,6 @@ def measure_change(
     """Returns the change between two drives; they must be of one world.
 
     Args:
-        reporter: not used.
-        map_name: the name of the city.
-        stages: the stage of the earlier drive, and of the later one.
         drives: the `SurveyedDrive` of the earlier drive, of the later one, and
             of their control if there is one.
     """
@@ -58,7 +52,7 @@ def recognise_places(
     described: tuple[Part, Part],
     choice: MethodChoice,
     protocol: RetrievalProtocol,
-) -> RecognitionResult | None:
+) -> place_recognition.RecognitionResult | None:
     """Returns the result of a method on two drives of one world.
 
     It is None if a drive is compared with itself and closes no loop.
@@ -73,10 +67,10 @@ def recognise_places(
         # A route need not close a loop.
         reporter.note(f"{query.name}: it never comes back to where it was")
         return None
-    outcome = judge_retrieval(
+    outcome = place_recognition.judge_retrieval(
         method, database.name, query.name, retrieval, protocol
     )
-    return RecognitionResult.of(map_name, stages, outcome)
+    return place_recognition.RecognitionResult.of(map_name, stages, outcome)
 
 
 def measure_costs(
@@ -90,13 +84,8 @@ def measure_costs(
     """Returns the cost of each method, measured on one core.
 
     Args:
-        reporter: takes the progress.
-        source: opens the query drive.
-        surveyed: the `SurveyedDrive` of the query drive.
-        methods: to measure.
         described: each method's descriptions of a database, and of the query
             drive.
-        protocol: the protocol of the descriptions.
     """
     drive, known = source(), surveyed.read()
     # A recording would be unpacked as a whole for its poses.

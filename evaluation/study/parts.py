@@ -194,11 +194,7 @@ def _find(module: str, name: str) -> Any:
 
 @dataclass(frozen=True)
 class Part:
-    """An intermediate result in a file.
-
-    Attributes:
-        path: the file, which need not exist yet.
-    """
+    """An intermediate result in a file."""
 
     path: Path
 
@@ -207,7 +203,6 @@ class Part:
 
         Args:
             inputs: all that the value depends on, ready for JSON.
-            value: a value of types that `encode` can keep.
 
         Raises:
             InputError: if it cannot be kept or written.
@@ -294,7 +289,6 @@ class MakePart(Step):
     """Writes what a function returns as a part.
 
     Attributes:
-        part: the file to write.
         function: a function of a module, whose code counts as an input; it
             takes a `Reporter` before the arguments.
         arguments: the inputs. Each is plain, a dataclass of plain values, a
@@ -355,9 +349,6 @@ class SurveyFiles:
     A key is the name of a method, or a `described_key`.
 
     A job that needs one method's descriptions reads no other's.
-
-    Attributes:
-        folder: the folder of the parts.
     """
 
     folder: Path
@@ -384,18 +375,16 @@ class SurveyFiles:
 
 @dataclass(frozen=True)
 class RecognitionFiles:
-    """The parts that hold the results of methods on two recordings.
-
-    A key is the name of a method, or a `described_key`.
-
-    Attributes:
-        folder: the folder of the parts.
-    """
+    """The parts that hold the results of methods on two recordings."""
 
     folder: Path
 
     def result(self, key: str) -> Part:
-        """Returns the part with the `RecognitionResult` of a method."""
+        """Returns the part with the `RecognitionResult` of a method.
+
+        Args:
+            key: the name of the method, or a `described_key`.
+        """
         return Part(self.folder / f"{file_name(key)}.data")
 
     @property
@@ -406,11 +395,7 @@ class RecognitionFiles:
 
 @dataclass(frozen=True)
 class StudyFiles:
-    """The files of a study.
-
-    Attributes:
-        output: the folder of the study.
-    """
+    """The files of a study."""
 
     output: Path
 
@@ -429,39 +414,11 @@ class StudyFiles:
         name = f"{file_name(database)},{file_name(query)}"
         return RecognitionFiles(self.output / "parts" / "recognition" / name)
 
-    def change(self, earlier: str, later: str) -> Part:
-        """Returns the part with the `ChangeResult` of two recordings."""
-        return self._part("changes", earlier, later)
+    def part(self, kind: str, *names: str) -> Part:
+        """Returns the part with a result of a kind, such as `changes`.
 
-    @property
-    def costs(self) -> Part:
-        """The list of `Cost`."""
-        return self._part("costs", "costs")
-
-    def page_drives(self, city: str) -> Part:
-        """Returns the part with a city's `PageDrive`s, by name."""
-        return self._part("pages", city)
-
-    def trend_points(self, database: str, query: str) -> Part:
-        """Returns the part with the `TrendPoint`s of two recordings."""
-        return self._part("trend", database, query)
-
-    def rung(self, name: str) -> Part:
-        """Returns the part with the `RungOutcome`s of a rung of a ladder."""
-        return self._part("rungs", name)
-
-    def localised(self, name: str) -> Part:
-        """Returns the part with the localised queries of a pair of drives."""
-        return self._part("localised", name)
-
-    def map_scores(self, name: str) -> Part:
-        """Returns the part with the scores of labels of a pair's maps."""
-        return self._part("maps", name)
-
-    def drawn(self, stem: str) -> Part:
-        """Returns the part that names the inputs of a figure."""
-        return self._part("figures", stem)
-
-    def _part(self, folder: str, *names: str) -> Part:
+        Args:
+            names: what it is of: drives, a rung, a figure.
+        """
         name = ",".join(map(file_name, names))
-        return Part(self.output / "parts" / folder / f"{name}.data")
+        return Part(self.output / "parts" / kind / f"{name}.data")

@@ -1,100 +1,391 @@
-"""The whole benchmark: its jobs, and the report of a folder of recordings."""
+"""The whole benchmark: its jobs, and the report that is made of their files."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
+from evaluation.change.drive_change import symmetric_changes
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.survival import Survival
+from evaluation.report import page, result_tables
+from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.study.assembly import assemble
+from evaluation.report.survival import draw_survival
+from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
     Pair,
     RecordingInfo,
-    Repetition,
     find_recordings,
     group_cities,
+    nothing_to_compare,
 )
 from evaluation.study.fault_evidence import explain_faults
-from evaluation.study.figures import (
-    change_stems,
-    draw_changes,
-    draw_city,
-    figure_files,
-    routes_stem,
-)
-from evaluation.study.measurements import (
-    measure_change,
-    measure_costs,
-    recognise_places,
-)
 from evaluation.study.parts import MakePart, StudyFiles
-from evaluation.study.surveys import Description, Survey
+from evaluation.study.surveys import Further, Survey
 
-# Expected seconds to start a process with its imports, and for the maps of a
-# drive of 3000 scans with 250 places and 150 queries.
-_START_COST = 2.0
-_MAP_COST = 10.0
-_ROLE_COST = {"places": 12.0, "queries": 8.0}
-# Those of the other jobs, beyond their start.
-_CHANGE_COST = 6.0
-_CITY_COST = 4.0
-_COSTS_COST = 8.0
-_RECOGNITION_COST = {
-    "ring++": 4.0,
-    "btc": 1.5,
-    "scan-context++": 1.0,
-    "solid": 0.1,
-}
-_OTHER_RECOGNITION_COST = 2.0
-_EVIDENCE_COST = 8.0
+# Expected seconds: for the maps of a drive of 3000 scans, for its places or
+# queries, to draw a city or a change, and to compare two drives by a method.
+_MAP_COST = 12.0
+_ROLE_COST = 10.0
+_DRAWING_COST = 7.0
+_RECOGNITION_COST = 2.0
 
 
-def plan_study(
-    recordings: Iterable[RecordingInfo],
-    output: Path,
-    methods: Sequence[MethodChoice] | None = None,
-    protocol: RetrievalProtocol = FAIR_PROTOCOL,
-    *,
-    with_costs: bool = False,
-    reference: Reference = NO_REFERENCE,
-) -> list[Job]:
-    """Returns the jobs whose results `assemble` puts into a report.
+@dataclass(frozen=True)
+class Study:
+    """The comparison of recordings, which need not exist yet.
 
-    For a city with one stage, only its route is drawn.
-
-    Args:
+    Attributes:
         recordings: each may be made by the jobs that it needs; drives of
             one map that share stage and route with others serve as same-stage
             controls.
-        output: folder to write.
         methods: by default those of this package.
-        protocol: that of place recognition.
         with_costs: whether to measure the costs of the methods, too, after all
             other jobs.
         reference: published numbers beside those of the report.
-
-    Raises:
-        InputError: if two recordings claim the same place.
     """
-    files = StudyFiles(output.absolute())
-    chosen = choose_methods() if methods is None else tuple(methods)
-    cities = group_cities(recordings, reference)
-    jobs = [
-        job
-        for city in cities
-        for job in _plan_city(city, files, chosen, protocol)
-    ]
-    pairs = [pair for city in cities for pair in city.recognition_pairs()]
-    if with_costs and pairs:
-        others = tuple(job.name for job in jobs)
-        jobs.append(_cost_job(pairs[0], files, chosen, protocol, others))
-    return jobs
+
+    recordings: Sequence[RecordingInfo]
+    output: Path
+    methods: tuple[MethodChoice, ...] = field(default_factory=choose_methods)
+    protocol: RetrievalProtocol = FAIR_PROTOCOL
+    with_costs: bool = False
+    reference: Reference = NO_REFERENCE
+
+    @cached_property
+    def cities(self) -> list[City]:
+        """The cities of the recordings.
+
+        Raises:
+            InputError: two recordings claim the same place.
+        """
+        return group_cities(self.recordings, self.reference)
+
+    @cached_property
+    def _files(self) -> StudyFiles:
+        return StudyFiles(self.output.absolute())
+
+    def jobs(self) -> list[Job]:
+        """Returns the jobs whose results `assemble` puts into a report.
+
+        For a city with one stage, only its route is drawn.
+
+        Raises:
+            InputError: see `cities`.
+        """
+        jobs = [job for city in self.cities for job in self._city_jobs(city)]
+        if self._costed_pairs:
+            needs = tuple(job.name for job in jobs)
+            jobs.append(self._cost_job(self._costed_pairs[0], needs))
+        return jobs
+
+    @property
+    def _costed_pairs(self) -> list[Pair]:
+        pairs = (city.recognition_pairs() for city in self.cities)
+        return [one for some in pairs for one in some if self.with_costs]
+
+    def assemble(
+        self,
+        pages: Mapping[str, str] | None = None,
+        on_note: Callable[[str], None] = lambda text: None,
+    ) -> Path:
+        """Writes the report, once all jobs are done.
+
+        Files: `report.html`, which holds everything; `report.md`; `survival`,
+        `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
+        .csv (all numbers), .md and .tex; `metrics.csv`, the metrics of other
+        benchmarks; `differences.csv`, the differences between methods;
+        `why.csv`, the reasons for wrong best places; `queries.csv` and
+        `queries_unchanged.csv`, every query of the pairs and of their controls;
+        and what is missing in the folder `figures`.
+
+        Args:
+            pages: recording -> address of its 3-D page, relative to the report,
+                for those that have one.
+            on_note: gets a note on each city without a pair to compare; the
+                report has these notes too.
+
+        Returns:
+            The path of `report.html`.
+
+        Raises:
+            InputError: a job has not been done, or a file cannot be written.
+        """
+        folder = self._files.figures
+        make_folder(folder)
+        report = page.Report(pages=pages or {}, reference=self.reference)
+        for city in self.cities:
+            self._collect(city, report)
+        if self.protocol.exclude_recent is None:
+            report.notes = nothing_to_compare(self.cities)
+        for note in report.notes:
+            on_note(note)
+        report.differences = result_tables.method_differences(
+            report.recognitions
+        )
+        if report.recognitions:
+            known = self.reference if report.compared else NO_REFERENCE
+            shown = figures.auc_illustration(folder, known.title)
+            changes = symmetric_changes(report.changes)
+            draw_auc_over_change(
+                report.recognitions, changes, shown.stem, known
+            )
+            report.illustrations.insert(0, shown)
+        if any(one.unchanged is not None for one in report.survivals):
+            shown = figures.survival_illustration(folder)
+            behind = result_tables.beaten(report.differences)
+            draw_survival(report.survivals, shown.stem, behind)
+            report.illustrations.insert(0, shown)
+        if self._costed_pairs:
+            report.costs = self._files.part("costs", "costs").read()
+        return page.write_report(report, self.output)
+
+    def _pairs(self, city: City) -> list[Pair]:
+        return city.recognition_pairs(
+            with_itself=self.protocol.exclude_recent is not None
+        )
+
+    def _city_jobs(self, city: City) -> list[Job]:
+        pairs = {
+            f"{city.name} {pair[0].stage} > {pair[1].stage}": pair
+            for pair in self._pairs(city)
+        }
+        # Two pairs may share a control.
+        controls = {
+            f"control {control[0].name} > {control[1].name}": control
+            for pair in pairs.values()
+            if (control := city.unchanged_pair(*pair)) is not None
+        }
+        drives = {one.name: one for one in city.stages.values()}
+        roles: dict[str, set[Role]] = defaultdict(set)
+        for pair in city.change_pairs():
+            control = city.control(*pair)
+            if control is not None:
+                drives[control.name] = control
+        for database, query in (*pairs.values(), *controls.values()):
+            drives |= {database.name: database, query.name: query}
+            roles[database.name].add("places")
+            roles[query.name].add("queries")
+        explained = {one.name for pair in pairs.values() for one in pair}
+        jobs = [
+            Job(
+                f"survey {name}",
+                Survey(
+                    one.source,
+                    frozenset(roles[name]),
+                    self.methods,
+                    self.protocol,
+                    self._files.survey(name),
+                    with_scans=name in explained,
+                    further=self._further(city, one),
+                ),
+                one.needs,
+                _MAP_COST + _ROLE_COST * len(roles[name]),
+            )
+            for name, one in drives.items()
+        ]
+        jobs.append(self._drawing_job(city))
+        jobs += [self._change_job(city, pair) for pair in city.change_pairs()]
+        jobs += [
+            self._recognition_job(city, pair, name, explains=name in pairs)
+            for name, pair in (pairs | controls).items()
+        ]
+        return jobs
+
+    def _further(self, city: City, drive: RecordingInfo) -> tuple[Further, ...]:
+        """Returns what repetitions describe of a drive."""
+        roles: dict[tuple[MethodChoice, RetrievalProtocol], set[Role]] = {}
+        for pair in city.recognition_pairs():
+            database, query = pair
+            for one in city.repetitions(pair, self.methods, self.protocol):
+                key = one.method, one.protocol
+                if query is drive:
+                    roles.setdefault(key, set()).add("queries")
+                if database is drive and not one.shares_places:
+                    roles.setdefault(key, set()).add("places")
+        return tuple(
+            (method, frozenset(needed), protocol)
+            for (method, protocol), needed in roles.items()
+        )
+
+    def _drawing_job(self, city: City) -> Job:
+        stages = city.stages.values()
+        surveys = [(one.stage, self._files.survey(one.name)) for one in stages]
+        stem = self._files.figures / figures.routes_stem(city)
+        step = MakePart(
+            self._files.part("pages", city.name),
+            figures.draw_city,
+            (
+                city.name,
+                tuple((stage, one.drive, one.fine) for stage, one in surveys),
+                stem,
+            ),
+            figures.figure_files(stem),
+        )
+        return Job(
+            f"draw {city.name}", step, _survey_names(stages), _DRAWING_COST
+        )
+
+    def _change_job(self, city: City, pair: Pair) -> Job:
+        control = city.control(*pair)
+        drives = [*pair] if control is None else [*pair, control]
+        earlier, later = pair
+        surveys = tuple(self._files.survey(one.name) for one in drives)
+        change = self._files.part("changes", earlier.name, later.name)
+        names = figures.change_stems(city, pair)
+        stems = tuple(self._files.figures / name for name in names)
+        steps = (
+            MakePart(
+                change,
+                measurements.measure_change,
+                (
+                    city.name,
+                    (earlier.stage, later.stage),
+                    tuple(one.drive for one in surveys),
+                ),
+            ),
+            MakePart(
+                self._files.part("figures", names[0]),
+                figures.draw_changes,
+                (
+                    change,
+                    tuple((one.drive, one.fine) for one in surveys[:2]),
+                    stems,
+                ),
+                figures.figure_files(*stems),
+            ),
+        )
+        return Job(
+            f"change {city.name} {earlier.stage} > {later.stage}",
+            Steps(change.path, steps),
+            _survey_names(drives),
+            _DRAWING_COST,
+        )
+
+    def _recognition_job(
+        self, city: City, pair: Pair, name: str, *, explains: bool
+    ) -> Job:
+        """Returns the job of a pair.
+
+        Args:
+            explains: whether it also finds why best places are wrong, and
+                repeats what is compared with published numbers.
+        """
+        database, query = pair
+        surveys = [self._files.survey(one.name) for one in pair]
+        results = self._files.recognition(database.name, query.name)
+        runs = [
+            (one, self.protocol, one.name, one.name) for one in self.methods
+        ]
+        if explains:
+            runs += [
+                (one.method, one.protocol, one.places_key, one.key)
+                for one in city.repetitions(pair, self.methods, self.protocol)
+            ]
+        steps = [
+            MakePart(
+                results.result(key),
+                measurements.recognise_places,
+                (
+                    city.name,
+                    (database.stage, query.stage),
+                    (surveys[0].described(places), surveys[1].described(key)),
+                    method,
+                    protocol,
+                ),
+            )
+            for method, protocol, places, key in runs
+        ]
+        if explains:
+            evidence = MakePart(
+                results.evidence,
+                explain_faults,
+                (
+                    tuple((one.drive, one.scans) for one in surveys),
+                    self.methods,
+                    tuple(results.result(one.name) for one in self.methods),
+                    self.protocol,
+                ),
+            )
+            steps.insert(len(self.methods), evidence)
+        cost = _RECOGNITION_COST * (1 + len(steps))
+        step = Steps(results.folder, tuple(steps))
+        return Job(name, step, _survey_names(pair), cost)
+
+    def _cost_job(self, pair: Pair, needs: tuple[str, ...]) -> Job:
+        """Returns the job that runs after all others, alone on the machine."""
+        places, queries = (self._files.survey(one.name) for one in pair)
+        described = tuple(
+            (places.described(one.name), queries.described(one.name))
+            for one in self.methods
+        )
+        arguments = (
+            pair[1].source,
+            queries.drive,
+            self.methods,
+            described,
+            self.protocol,
+        )
+        step = MakePart(
+            self._files.part("costs", "costs"),
+            measurements.measure_costs,
+            arguments,
+        )
+        return Job("costs of the methods", step, needs, _DRAWING_COST)
+
+    def _collect(self, city: City, report: page.Report) -> None:
+        """Adds the results of a city to a report."""
+        files = self._files
+        for earlier, later in city.change_pairs():
+            change = files.part("changes", earlier.name, later.name).read()
+            report.changes.append(change)
+        survivals, closures = [], []
+        for pair in self._pairs(city):
+            control = city.unchanged_pair(*pair)
+            results = files.recognition(*(one.name for one in pair))
+            for method in self.methods:
+                changed = results.result(method.name).read()
+                if pair[0] is pair[1]:
+                    if changed is not None:
+                        closures.append(changed)
+                    continue
+                unchanged = None
+                if control is not None:
+                    beside = files.recognition(*(one.name for one in control))
+                    unchanged = beside.result(method.name).read()
+                survivals.append(Survival.of(changed, unchanged))
+            for again in city.repetitions(pair, self.methods, self.protocol):
+                report.repeated.append(results.result(again.key).read())
+            evidence = results.evidence.read()
+            if evidence is not None:
+                report.evidence[pair[0].name, pair[1].name] = evidence
+            for drive in (*pair, *(control or ())):
+                if drive.name not in report.tracks:
+                    survey = files.survey(drive.name).drive.read()
+                    report.tracks[drive.name] = result_tables.DriveTrack(
+                        survey.stamps_ns, survey.X_WS
+                    )
+        compared = [*(one.changed for one in survivals), *closures]
+        if compared:
+            stem = files.figures / figures.curves_stem(city)
+            draw_pr_curves(city.name, compared, stem)
+        report.survivals += survivals
+        report.recognitions += compared
+        report.drives.update(files.part("pages", city.name).read())
+        report.illustrations += figures.illustrations(city, files.figures)
+
+
+def _survey_names(recordings: Iterable[RecordingInfo]) -> tuple[str, ...]:
+    return tuple(f"survey {recording.name}" for recording in recordings)
 
 
 def write_report(
@@ -112,21 +403,13 @@ def write_report(
 ) -> Path:
     """Measures all recordings in a folder; writes tables, figures, a page.
 
-    See `evaluation.study` for the files. Results of an earlier run, finished
+    See `Study.assemble` for the files. Results of an earlier run, finished
     or not, are used if they belong to the same recordings and methods.
 
     Args:
-        recordings: folder of recordings; drives of one map that share stage
-            and route with others serve as same-stage controls.
-        output: folder to write, made if needed.
-        cluster: where the work is done.
-        own_methods: Python files with one method each, to run besides those
-            of this package.
-        protocol: that of place recognition.
+        own_methods, settings: see `choose_methods`.
         on_note: gets notes on recordings that are left out, and on cities
             without a pair to compare.
-        settings: see `choose_methods`.
-        with_costs: whether to measure the costs of the methods, too.
         reference_for: returns the reference for the report of some maps.
         lidar: name of the LiDAR, for recordings with several.
 
@@ -140,266 +423,8 @@ def write_report(
     methods = choose_methods(own_methods, settings)
     found = find_recordings(recordings, on_note, lidar)
     reference = reference_for({one.map_name for one in found})
-    jobs = plan_study(
-        found,
-        output,
-        methods,
-        protocol,
-        with_costs=with_costs,
-        reference=reference,
-    )
+    study = Study(found, output, methods, protocol, with_costs, reference)
+    jobs = study.jobs()
     make_folder(output)
     run_jobs(jobs, cluster)
-    return assemble(
-        found,
-        output,
-        methods,
-        protocol=protocol,
-        with_costs=with_costs,
-        reference=reference,
-        on_note=on_note,
-    )
-
-
-def _plan_city(
-    city: City,
-    files: StudyFiles,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-) -> list[Job]:
-    compared = _compared_pairs(city, protocol)
-    explained = {
-        one.name
-        for name, pair in compared.items()
-        if name == _pair_name(city, pair)
-        for one in pair
-    }
-    repeated = [
-        (pair, city.repetitions(pair, methods, protocol))
-        for pair in city.recognition_pairs()
-    ]
-    jobs = [
-        Job(
-            name=f"survey {recording.name}",
-            step=Survey(
-                recording.source,
-                frozenset(roles),
-                methods,
-                protocol,
-                files.survey(recording.name),
-                with_scans=recording.name in explained,
-                further=_further(recording, repeated),
-            ),
-            needs=recording.needs,
-            cost=_START_COST
-            + _MAP_COST
-            + sum(_ROLE_COST[role] for role in roles),
-        )
-        for recording, roles in _roles(city, protocol)
-    ]
-    stages = city.stages.values()
-    stem = files.figures / routes_stem(city)
-    shown = tuple(
-        (one.stage, files.survey(one.name).drive, files.survey(one.name).fine)
-        for one in stages
-    )
-    jobs.append(
-        Job(
-            name=f"draw {city.name}",
-            step=MakePart(
-                files.page_drives(city.name),
-                draw_city,
-                (city.name, shown, stem),
-                figure_files(stem),
-            ),
-            needs=_survey_names(stages),
-            cost=_START_COST + _CITY_COST,
-        )
-    )
-    jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
-    jobs += [
-        _recognition_job(city, pair, name, methods, protocol, files)
-        for name, pair in compared.items()
-    ]
-    return jobs
-
-
-def _compared_pairs(city: City, protocol: RetrievalProtocol) -> dict[str, Pair]:
-    """Returns all pairs of database and query, and their controls, by name.
-
-    Two pairs may share a control.
-    """
-    pairs = city.recognition_pairs(
-        with_itself=protocol.exclude_recent is not None
-    )
-    named = {_pair_name(city, pair): pair for pair in pairs}
-    for pair in pairs:
-        control = city.unchanged_pair(*pair)
-        if control is not None:
-            database, query = control
-            name = f"control {database.name} > {query.name}"
-            named[name] = control
-    return named
-
-
-def _pair_name(city: City, pair: Pair) -> str:
-    database, query = pair
-    return f"{city.name} {database.stage} > {query.stage}"
-
-
-def _further(
-    recording: RecordingInfo,
-    repeated: Iterable[tuple[Pair, Sequence[Repetition]]],
-) -> tuple[Description, ...]:
-    """Returns what repetitions describe of a drive."""
-    roles: dict[Repetition, set[Role]] = {}
-    for (database, query), found in repeated:
-        for one in found:
-            if query is recording:
-                roles.setdefault(one, set()).add("queries")
-            if database is recording and not one.shares_places:
-                roles.setdefault(one, set()).add("places")
-    return tuple(
-        Description(one.method, frozenset(needed), one.protocol)
-        for one, needed in roles.items()
-    )
-
-
-def _roles(
-    city: City, protocol: RetrievalProtocol
-) -> list[tuple[RecordingInfo, set[Role]]]:
-    """Returns all drives that are needed, with their roles."""
-    roles: dict[str, tuple[RecordingInfo, set[Role]]] = {}
-
-    def need(recording: RecordingInfo, *new: Role) -> None:
-        roles.setdefault(recording.name, (recording, set()))[1].update(new)
-
-    for recording in city.stages.values():
-        need(recording)
-    for pair in city.change_pairs():
-        control = city.control(*pair)
-        if control is not None:
-            need(control)
-    for database, query in _compared_pairs(city, protocol).values():
-        need(database, "places")
-        need(query, "queries")
-    return list(roles.values())
-
-
-def _change_job(city: City, pair: Pair, files: StudyFiles) -> Job:
-    control = city.control(*pair)
-    drives = [*pair] if control is None else [*pair, control]
-    earlier, later = pair
-    surveys = tuple(files.survey(one.name) for one in drives)
-    change = files.change(earlier.name, later.name)
-    names = change_stems(city, pair)
-    stems = tuple(files.figures / name for name in names)
-    shown = tuple((survey.drive, survey.fine) for survey in surveys[:2])
-    stages = earlier.stage, later.stage
-    return Job(
-        name=f"change {city.name} {earlier.stage} > {later.stage}",
-        step=Steps(
-            change.path,
-            (
-                MakePart(
-                    change,
-                    measure_change,
-                    (city.name, stages, tuple(one.drive for one in surveys)),
-                ),
-                MakePart(
-                    files.drawn(names[0]),
-                    draw_changes,
-                    (change, shown, stems),
-                    figure_files(*stems),
-                ),
-            ),
-        ),
-        needs=_survey_names(drives),
-        cost=_START_COST + _CHANGE_COST,
-    )
-
-
-def _recognition_job(
-    city: City,
-    pair: Pair,
-    name: str,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    files: StudyFiles,
-) -> Job:
-    database, query = pair
-    cost = sum(
-        _RECOGNITION_COST.get(method.name, _OTHER_RECOGNITION_COST)
-        for method in methods
-    )
-    surveys = files.survey(database.name), files.survey(query.name)
-    results = files.recognition(database.name, query.name)
-    stages = database.stage, query.stage
-
-    def recognise(
-        method: MethodChoice,
-        protocol: RetrievalProtocol,
-        places_key: str,
-        key: str,
-    ) -> MakePart:
-        described = surveys[0].described(places_key), surveys[1].described(key)
-        return MakePart(
-            results.result(key),
-            recognise_places,
-            (city.name, stages, described, method, protocol),
-        )
-
-    steps = [recognise(one, protocol, one.name, one.name) for one in methods]
-    if name == _pair_name(city, pair):
-        cost += _EVIDENCE_COST
-        evidence = MakePart(
-            results.evidence,
-            explain_faults,
-            (
-                tuple((survey.drive, survey.scans) for survey in surveys),
-                methods,
-                tuple(results.result(method.name) for method in methods),
-                protocol,
-            ),
-        )
-        repeated = (
-            recognise(one.method, one.protocol, one.places_key, one.key)
-            for one in city.repetitions(pair, methods, protocol)
-        )
-        steps += [evidence, *repeated]
-    return Job(
-        name=name,
-        step=Steps(results.folder, tuple(steps)),
-        needs=_survey_names(pair),
-        cost=_START_COST + cost,
-    )
-
-
-def _cost_job(
-    pair: Pair,
-    files: StudyFiles,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    others: tuple[str, ...],
-) -> Job:
-    """Returns the job that runs after all others, alone on the machine."""
-    query = pair[1]
-    surveys = tuple(files.survey(one.name) for one in pair)
-    described = tuple(
-        tuple(survey.described(method.name) for survey in surveys)
-        for method in methods
-    )
-    return Job(
-        name="costs of the methods",
-        step=MakePart(
-            files.costs,
-            measure_costs,
-            (query.source, surveys[1].drive, methods, described, protocol),
-        ),
-        needs=others,
-        cost=_START_COST + _COSTS_COST,
-    )
-
-
-def _survey_names(recordings: Iterable[RecordingInfo]) -> tuple[str, ...]:
-    return tuple(f"survey {recording.name}" for recording in recordings)
+    return study.assemble(on_note=on_note)

@@ -11,12 +11,8 @@ from typing import TypeAlias
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
+from evaluation.recognition import description
 from evaluation.recognition.costs import cpu_ms, query_ms
-from evaluation.recognition.description import (
-    DescribedDrive,
-    DescribedScans,
-    Role,
-)
 from evaluation.recognition.metrics import pr_curve
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -25,7 +21,7 @@ from evaluation.recognition.retrieval import compare, compare_with_gates
 from evaluation.recognition.rung_outcome import RungOutcome
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource, describe
+from evaluation.study.surveys import DriveSource, survey_recording
 
 # The source of a drive, or the parts of its scans and of its descriptions by
 # each method.
@@ -52,14 +48,10 @@ def measure_rung(
     """Returns the outcomes of a rung, two for each method.
 
     Args:
-        reporter: takes the progress.
-        database: drive of the places.
-        query: drive of the queries, in the same world frame.
+        database, query: the drives, in one world.
         distractors: descriptions of drives through other cities, whose places
             are added to the database.
         num_distractors: number of these places.
-        methods: to run.
-        protocol: that of place recognition.
     """
     place_scans, places = _describe(
         database, "places", methods, protocol, reporter
@@ -68,12 +60,13 @@ def measure_rung(
         query, "queries", methods, protocol, reporter
     )
     overlaps = None
-    found = []
+    outcomes = []
     for k, choice in enumerate(
         reporter.track(methods, "comparing", len(methods))
     ):
+        method = choice.make()
         mapped, asked = places(k), queries(k)
-        known = [mapped, *(parts[k].read() for parts in distractors)]
+        known = [mapped, *(parts[k].read()[1] for parts in distractors)]
         searched = replace(
             mapped,
             places=joined_places(
@@ -82,7 +75,7 @@ def measure_rung(
         )
         drives = [one.name for one in known for _ in one.places.frames]
         both = compare_with_gates(
-            choice.make(), searched, asked, protocol, [None, protocol.radius]
+            method, searched, asked, protocol, [None, protocol.radius]
         )
         if overlaps is None:
             overlaps = best_overlaps(
@@ -92,32 +85,40 @@ def measure_rung(
                 asked.queries.X_WS,
                 both[0].matches[:, : len(place_scans)],
             )
-        found += [
+        outcomes += [
             RungOutcome.of(choice.name, is_gated, one, asked, drives, overlaps)
             for is_gated, one in zip((False, True), both, strict=True)
         ]
-    return found
+    return outcomes
 
 
 def _describe(
     drive: DescribedSource,
-    role: Role,
+    role: description.Role,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
     reporter: Reporter,
-) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
+) -> tuple[list[np.ndarray], Callable[[int], description.DescribedDrive]]:
     """Returns the scans of a drive, and what gives each description once."""
     if isinstance(drive, tuple):
         scans, *parts = drive
-        return scans.read(), lambda k: parts[k].read()
-    kept: list[np.ndarray] = []
-    found = describe(drive, role, methods, protocol, reporter, kept)
-    return kept, lambda k: found.pop(methods[k].name)
+        return scans.read(), lambda k: parts[k].read()[1]
+    found = survey_recording(
+        drive(),
+        {role},
+        [choice.make() for choice in methods],
+        protocol,
+        reporter.track,
+        with_scans=True,
+        with_map=False,
+    )
+    assert isinstance(found.scans, list)
+    return found.scans, lambda k: found.described.pop(methods[k].name)
 
 
 def joined_places(
-    drives: Sequence[DescribedScans], num_others: int
-) -> DescribedScans:
+    drives: Sequence[description.DescribedScans], num_others: int
+) -> description.DescribedScans:
     """Returns the places of a drive together with places of others.
 
     Args:
@@ -133,7 +134,7 @@ def joined_places(
         X_WS[:, 0, 3] += number * _APART
         poses.append(X_WS)
     end = len(first.frames) + num_others
-    return DescribedScans(
+    return description.DescribedScans(
         frames=np.concatenate([one.frames for one in drives])[:end],
         stamps_ns=np.concatenate([one.stamps_ns for one in drives])[:end],
         X_WS=np.concatenate(poses)[:end],
@@ -149,10 +150,7 @@ class SizePoint:
     Times are of the processor.
 
     Attributes:
-        method: its name.
         others: number of places of other cities.
-        places: number of all places.
-        queries: number of queries.
         auc: without the gate; NaN if all queries would take over an hour.
         r1: R@1, likewise.
         query_ms: of one query, the median of some [ms].
@@ -181,21 +179,16 @@ def measure_size(
     """Returns the point of a method.
 
     Args:
-        reporter: takes the progress.
-        database: the method's description of the drive of the places.
-        query: likewise of the drive of the queries.
+        database, query: the method's descriptions of both drives.
         distractors: likewise of drives through other cities.
-        num_distractors: number of their places in the database.
-        choice: the method.
-        protocol: that of place recognition.
     """
     method = choice.make()
-    mapped, asked = database.read(), query.read()
+    (_, mapped), (_, asked) = database.read(), query.read()
     known = [mapped.places]
     for part in distractors:
         if sum(len(one.frames) for one in known[1:]) >= num_distractors:
             break
-        known.append(part.read().places)
+        known.append(part.read()[1].places)
     places = joined_places(known, num_distractors)
     number = len(asked.queries.frames)
     build_ms = cpu_ms(method.build_database, places.descriptors)

@@ -5,13 +5,12 @@ before or after the drive is recorded. The job therefore has the source of the
 drive, not the drive.
 """
 
-import abc
-from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 import io
 import os
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import zstandard
@@ -26,18 +25,15 @@ from evaluation.drives.sampling import cropped, within_range
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VOXEL_SIZE, VoxelAccumulator, VoxelMap
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.description import (
-    DescribedDrive,
-    Request,
-    Role,
-    describe_drive,
-)
+from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part, SurveyFiles
 
 # Divisions of a voxel's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 10
+# A method, and what it describes of a drive by a second protocol.
+Further: TypeAlias = "tuple[MethodChoice, frozenset[str], RetrievalProtocol]"
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
 
@@ -102,12 +98,7 @@ class DriveSource(Protocol):
 
 @dataclass(frozen=True)
 class RecordedDrive:
-    """A drive on disk, in any format that can be read.
-
-    Attributes:
-        path: the file or folder of the drive.
-        lidar: name of the LiDAR, for a drive with several.
-    """
+    """A drive on disk, in any format that can be read."""
 
     path: Path
     lidar: str | None = None
@@ -148,10 +139,8 @@ class SurveyedDrive:
     """A drive with its map on the grid of the TCR.
 
     Attributes:
-        placed: name and world of the drive.
         stamps_ns: (N,) int64 of its frames.
         X_WS: (N, 4, 4) poses of the sensor along the drive.
-        coarse: the map.
         frames: (K,) frames that are places or queries, increasing; none if
             the drive has no role.
         thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
@@ -236,18 +225,21 @@ class RecordingSurvey:
     """A recording's maps, places and queries, which replace its scans.
 
     Attributes:
-        drive: with its map on the grid of the TCR.
-        fine: (K, 3) cloud for pictures, in W [m].
+        placed: name and world of the drive.
         described: method -> its descriptions of the drive; empty if the
             recording has no role. Those by another protocol are under a
             `described_key`.
         scans: those of the places and queries; None unless they are kept.
+            Without maps they are (N, 3) float32, as their role sees them.
+        drive: with its map on the grid of the TCR; None without maps.
+        fine: (K, 3) cloud for pictures, in W [m]; likewise.
     """
 
-    drive: SurveyedDrive
-    fine: np.ndarray
-    described: dict[str, DescribedDrive]
-    scans: KeptScans | None = None
+    placed: PlacedDrive
+    described: dict[str, description.DescribedDrive]
+    scans: KeptScans | list[np.ndarray] | None = None
+    drive: SurveyedDrive | None = None
+    fine: np.ndarray | None = None
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
@@ -257,113 +249,106 @@ def described_key(method: str, protocol: RetrievalProtocol) -> str:
 
 def survey_recording(
     recording: Drive,
-    roles: Set[Role],
+    roles: Set[description.Role],
     methods: Sequence[Method],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     track: Track = silent,
     *,
     with_scans: bool = False,
-    further: Sequence[Request] = (),
+    with_map: bool = True,
+    further: Sequence[description.Request] = (),
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
-    Each scan is read once, in order.
+    Each scan is read once, in order; without a map, only those of places and
+    queries.
 
     Args:
-        recording: the drive.
         roles: the roles of the drive in place recognition; may be empty.
         methods: that describe it; may be none.
-        protocol: sets the places and queries.
-        track: reports progress.
         with_scans: whether to keep the scans of places and queries, too.
         further: descriptions by another protocol; none without a role.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
     """
-    frames, thumbnails = [], []
-    scans_per_place = [
-        *map(protocol.scans, methods),
-        *(other.scans(method) for method, _, other in further),
-    ]
-    mapped = MappedDrive(recording, kept=max(scans_per_place, default=1))
+    frames: list[int] = []
+    thumbnails = []
+    number = max(
+        [
+            *map(protocol.scans, methods),
+            *(other.scans(method) for method, _, other in further),
+        ],
+        default=1,
+    )
+    mapped = MappedDrive(recording, number) if with_map else None
+    drive = mapped or RecentScans(recording, number)
+    seen: list[np.ndarray] = []
+    instances = recording.instances if with_map and with_scans else None
+    kept = KeptScans(instances=instances and dict(instances))
 
-    scans = None
-    if with_scans:
-        instances = recording.instances
-        scans = KeptScans(instances=instances and dict(instances))
-
-    def keep(frame: int, _: np.ndarray) -> None:
+    def keep(frame: int, cloud: np.ndarray) -> None:
+        if mapped is None:
+            seen.append(cloud.astype(np.float32))
+            return
         # Pictures show the scan as recorded, whatever its query sees.
         frames.append(frame)
         scan = mapped.scan(frame)
-        if scans is not None:
-            scans.keep(frame, scan, protocol.max_range)
+        if with_scans:
+            kept.keep(frame, scan, protocol.max_range)
         height = MethodConfig().sensor_height
-        cloud = cropped(scan, protocol.max_range)
-        thumbnails.append(thumbnail(cloud, height, seed=frame))
+        shown = cropped(scan, protocol.max_range)
+        thumbnails.append(thumbnail(shown, height, seed=frame))
 
     described = {}
     if roles:
-        drives = describe_drive(
-            mapped,
+        found = description.describe_drive(
+            drive,
             methods,
             roles,
             protocol,
             track,
-            visit=keep,
+            visit=keep if with_map or with_scans else None,
             further=further,
         )
-        keys = [
-            *(method.name for method in methods),
-            *(
-                described_key(method.name, other)
-                for method, _, other in further
-            ),
-        ]
-        described = dict(zip(keys, drives, strict=True))
+        keys = [method.name for method in methods]
+        keys += [described_key(method.name, one) for method, _, one in further]
+        described = dict(zip(keys, found, strict=True))
+    placed = PlacedDrive.of(recording)
+    if mapped is None:
+        return RecordingSurvey(placed, described, seen if with_scans else None)
     coarse, fine = mapped.finish(track)
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
-    drive = SurveyedDrive(
-        placed=PlacedDrive.of(recording),
+    surveyed = SurveyedDrive(
+        placed=placed,
         stamps_ns=mapped.stamps_ns,
         X_WS=mapped.X_WS,
         coarse=coarse,
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )
-    return RecordingSurvey(drive, fine, described, scans)
+    scans = kept if with_scans else None
+    return RecordingSurvey(placed, described, scans, surveyed, fine)
 
 
 @dataclass(frozen=True)
-class Description:
-    """What a method describes of a drive by a second protocol.
+class Survey(Step):
+    """Writes the survey of a drive, or its missing parts.
 
     Attributes:
-        method: the method.
-        roles: the roles of the drive that are described.
-        protocol: sets the places and queries.
+        roles, with_scans, with_map: see `survey_recording`.
+        further: descriptions by a second protocol; none without a role.
     """
 
-    method: MethodChoice
-    roles: frozenset[Role]
+    source: DriveSource
+    roles: frozenset[description.Role]
+    methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
-
-    @property
-    def key(self) -> str:
-        """The `described_key`."""
-        return described_key(self.method.name, self.protocol)
-
-    def request(self) -> Request:
-        """Returns it as `describe_drive` takes it."""
-        return self.method.make(), self.roles, self.protocol
-
-
-class _PartsStep(Step):
-    """Writes those parts of a drive that are missing."""
-
     files: SurveyFiles
+    with_scans: bool = False
+    with_map: bool = True
+    further: tuple[Further, ...] = ()
 
     @property
     def output(self) -> Path:
@@ -371,33 +356,6 @@ class _PartsStep(Step):
 
     def is_done(self) -> bool:
         return not self._missing()
-
-    @abc.abstractmethod
-    def _missing(self) -> dict[Part, Mapping]:
-        """Returns the missing parts, each with its inputs."""
-
-
-@dataclass(frozen=True)
-class Survey(_PartsStep):
-    """Writes the survey of a drive, or its missing parts.
-
-    Attributes:
-        source: opens the drive.
-        roles: the roles of the drive in place recognition; may be empty.
-        methods: the methods that describe its places and queries.
-        protocol: sets the places and queries.
-        files: the parts to write.
-        with_scans: whether to keep the scans of places and queries, too.
-        further: descriptions by a second protocol; none without a role.
-    """
-
-    source: DriveSource
-    roles: frozenset[Role]
-    methods: tuple[MethodChoice, ...]
-    protocol: RetrievalProtocol
-    files: SurveyFiles
-    with_scans: bool = False
-    further: tuple[Description, ...] = ()
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()
@@ -414,7 +372,6 @@ class Survey(_PartsStep):
 
         Args:
             drive: that of the source, or the same drive while it is being made.
-            reporter: takes the progress.
             missing: parts that are needed; all by default.
 
         Raises:
@@ -425,15 +382,19 @@ class Survey(_PartsStep):
             part = self.files.described(key)
             return bool(self.roles) and (missing is None or part in missing)
 
-        methods, further = self.methods, self.further
         return survey_recording(
             drive,
             self.roles,
-            [one.make() for one in methods if needed(one.name)],
+            [one.make() for one in self.methods if needed(one.name)],
             self.protocol,
             reporter.track,
             with_scans=self.with_scans,
-            further=[one.request() for one in further if needed(one.key)],
+            with_map=self.with_map,
+            further=[
+                (choice.make(), roles, protocol)
+                for choice, roles, protocol in self.further
+                if needed(described_key(choice.name, protocol))
+            ],
         )
 
     def write(
@@ -450,7 +411,7 @@ class Survey(_PartsStep):
         for key in list(found.described):
             part = self.files.described(key)
             # Each value is dropped when it is written.
-            value = found.drive.placed, found.described.pop(key)
+            value = found.placed, found.described.pop(key)
             if part in missing:
                 part.write(missing[part], value)
         for part, one in (
@@ -462,10 +423,11 @@ class Survey(_PartsStep):
                 part.write(missing[part], one)
 
     def _missing(self) -> dict[Part, Mapping]:
+        """Returns the parts that are missing or stale, and their inputs."""
         drive = self.source.identity()
 
         def inputs(
-            roles: Set[Role], protocol: RetrievalProtocol
+            roles: Set[description.Role], protocol: RetrievalProtocol
         ) -> dict[str, object]:
             options = protocol.described(queries="queries" in roles)
             return self.made_of(
@@ -473,132 +435,28 @@ class Survey(_PartsStep):
                     "drive": drive,
                     "roles": sorted(roles),
                     "protocol": options if roles else None,
+                    "with_map": self.with_map,
                 }
             )
 
         own = inputs(self.roles, self.protocol)
-        expected = dict.fromkeys([self.files.fine, self.files.drive], own)
+        expected: dict[Part, Mapping] = {}
+        if self.with_map:
+            expected = dict.fromkeys([self.files.fine, self.files.drive], own)
         if self.with_scans:
             expected[self.files.scans] = own
         if self.roles:
             for choice in self.methods:
                 part = self.files.described(choice.name)
                 expected[part] = {**own, "method": choice.identity()}
-            for one in self.further:
-                expected[self.files.described(one.key)] = {
-                    **inputs(one.roles, one.protocol),
-                    "method": one.method.identity(),
+            for choice, roles, protocol in self.further:
+                key = described_key(choice.name, protocol)
+                expected[self.files.described(key)] = {
+                    **inputs(roles, protocol),
+                    "method": choice.identity(),
                 }
-        return _stale(expected)
-
-
-@dataclass(frozen=True)
-class DescribeDrive(_PartsStep):
-    """Writes each method's descriptions of a drive, without its map.
-
-    Only the scans that are described are read.
-
-    Attributes:
-        source: opens the drive.
-        role: the role of the drive.
-        methods: the methods that describe it.
-        protocol: where it has places and queries.
-        files: the parts to write; only those of the descriptions, and of the
-            scans.
-        with_scans: whether to keep the described scans, too.
-    """
-
-    source: DriveSource
-    role: Role
-    methods: tuple[MethodChoice, ...]
-    protocol: RetrievalProtocol
-    files: SurveyFiles
-    with_scans: bool = False
-
-    def run(self, reporter: Reporter) -> None:
-        missing = self._missing()
-        files = {one: self.files.described(one.name) for one in self.methods}
-        methods = [one for one in self.methods if files[one] in missing]
-        scans: list[np.ndarray] | None = [] if self.with_scans else None
-        found = describe(
-            self.source, self.role, methods, self.protocol, reporter, scans
-        )
-        for choice in methods:
-            # Each value is dropped when it is written.
-            part = files[choice]
-            part.write(missing[part], found.pop(choice.name))
-        if self.files.scans in missing:
-            self.files.scans.write(missing[self.files.scans], scans)
-
-    def _missing(self) -> dict[Part, Mapping]:
-        inputs = self.made_of(
-            {
-                "drive": self.source.identity(),
-                "role": self.role,
-                "protocol": self.protocol.described(
-                    queries=self.role == "queries"
-                ),
-            }
-        )
-        expected = {
-            self.files.described(method.name): {
-                **inputs,
-                "method": method.identity(),
-            }
-            for method in self.methods
+        return {
+            part: made_of
+            for part, made_of in expected.items()
+            if not part.is_current(made_of)
         }
-        if self.with_scans:
-            expected[self.files.scans] = inputs
-        return _stale(expected)
-
-
-def _stale(expected: Mapping[Part, Mapping]) -> dict[Part, Mapping]:
-    """Returns the parts that are missing or have other inputs than these."""
-    return {
-        part: inputs
-        for part, inputs in expected.items()
-        if not part.is_current(inputs)
-    }
-
-
-def describe(
-    source: DriveSource,
-    role: Role,
-    methods: Iterable[MethodChoice],
-    protocol: RetrievalProtocol,
-    reporter: Reporter,
-    scans: list[np.ndarray] | None = None,
-) -> dict[str, DescribedDrive]:
-    """Returns name of method -> its descriptions of a drive.
-
-    Args:
-        source: opens the drive.
-        role: the role of the drive.
-        methods: that describe it.
-        protocol: where it has places and queries.
-        reporter: takes the progress.
-        scans: gets the single scan (N, 3) float32 of each described frame, in
-            the frame of the sensor.
-
-    Raises:
-        InputError: see `describe_drive`.
-    """
-    running = [choice.make() for choice in methods]
-    kept = max(map(protocol.scans, running), default=1)
-    drive = RecentScans(source(), kept)
-
-    def keep(_: int, scan: np.ndarray) -> None:
-        assert scans is not None
-        scans.append(scan.astype(np.float32))
-
-    found = describe_drive(
-        drive,
-        running,
-        {role},
-        protocol,
-        reporter.track,
-        visit=None if scans is None else keep,
-    )
-    return {
-        method.name: one for method, one in zip(running, found, strict=True)
-    }

@@ -16,14 +16,8 @@ from scipy.stats import rankdata
 from cns_drake.base.files import make_folder
 from evaluation.recognition.metrics import percentile_interval
 from evaluation.recognition.protocol import check_one_protocol
+from evaluation.report import tables
 from evaluation.report.drawing import method_entry, method_style, save
-from evaluation.report.tables import (
-    Columns,
-    Table,
-    in_table_order,
-    keyed,
-    protocol_columns,
-)
 from evaluation.study.trend_databases import TrendPoint
 
 # Width of the kernel that smooths over TCR_sym, as part of its range. The band
@@ -70,15 +64,15 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
     make_folder(folder)
     path = folder / "trend.csv"
     check_one_protocol(point.protocol for point in points)
-    numbers: Columns[TrendPoint] = keyed(
+    numbers: tables.Columns[TrendPoint] = tables.keyed(
         {name: name for name in _NUMBERS},
         lambda point, name: _rounded(getattr(point, name)),
     )
-    strict: Columns[TrendPoint] = {
+    strict: tables.Columns[TrendPoint] = {
         "auc_strict": lambda point: _rounded(point.auc_strict)
     }
-    columns = {**numbers, **protocol_columns("protocol"), **strict}
-    table = Table.of(points, columns)
+    columns = {**numbers, **tables.protocol_columns("protocol"), **strict}
+    table = tables.Table.of(points, columns)
     table.write_csv(path)
     correlation_table(points).write_csv(folder / "correlations.csv")
     draw_trend(points, folder / "trend")
@@ -86,7 +80,7 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
     return path
 
 
-def correlation_table(points: Sequence[TrendPoint]) -> Table:
+def correlation_table(points: Sequence[TrendPoint]) -> tables.Table:
     """Returns how well each measure of change predicts each method's failure.
 
     A row has Spearman's rank correlation of 1 - AUC with TCR_sym and with the
@@ -94,7 +88,7 @@ def correlation_table(points: Sequence[TrendPoint]) -> Table:
     databases, and the interval of the difference of the two.
     """
     rows: list[tuple[object, ...]] = []
-    for method in in_table_order(point.method for point in points):
+    for method in tables.in_table_order(point.method for point in points):
         known = np.array(
             [
                 (one.failure, *(getattr(one, name) for name in _CHANGES))
@@ -121,7 +115,7 @@ def correlation_table(points: Sequence[TrendPoint]) -> Table:
             ]
         rows.append(tuple(cells))
     names = ("rho_tcr_sym", "rho_visible_change", "difference")
-    return Table(
+    return tables.Table(
         (
             *("method", "databases"),
             *(
@@ -147,17 +141,6 @@ def _correlations(values: np.ndarray) -> np.ndarray:
     return (ranks[..., :1] * ranks[..., 1:]).sum(axis=-2)
 
 
-def _draw_failures(points: Sequence[TrendPoint], stem: Path) -> None:
-    """Draws what fails over both measures of change."""
-    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
-    panels = figure.subplots(1, len(_CHANGES), sharey=True)
-    for axes, change in zip(panels, _CHANGES, strict=True):
-        _draw_panel(axes, points, "1 - AUC", lambda one: one.failure, change)
-        axes.set_ylim(-0.02, 1.02)
-    _add_legend(panels[0], points)
-    save(figure, stem)
-
-
 def _rounded(value: object) -> object:
     if not isinstance(value, float) or math.isnan(value):
         return value
@@ -170,40 +153,40 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
     The line is smooth, or straight from point to point where points are few.
 
     A second panel shows the kept share of AUC, if databases have controls.
-
-    Args:
-        points: those of all databases and methods.
-        stem: path to write, without ending.
     """
     survives = any(not math.isnan(point.kept) for point in points)
-    figure = Figure(
-        figsize=(12.0 if survives else 6.4, 4.4), layout="constrained"
-    )
-    panels = figure.subplots(1, 2 if survives else 1, squeeze=False)[0]
+    number = 2 if survives else 1
+    width = 12.0 if survives else 6.4
+    figure = Figure(figsize=(width, 4.4), layout="constrained")
+    panels = figure.subplots(1, number, squeeze=False)[0]
     _draw_panel(panels[0], points, "AUC", lambda point: point.auc)
     panels[0].set_ylim(0.0, 1.02)
     if survives:
-        _draw_panel(
-            panels[1],
-            points,
-            "share of AUC that is kept",
-            lambda point: point.kept,
-        )
+        label = "share of AUC that is kept"
+        _draw_panel(panels[1], points, label, lambda point: point.kept)
         panels[1].set_ylim(bottom=0.0)
         panels[1].axhline(1.0, color="gray", linewidth=0.8)
-    _add_legend(panels[0], points)
+    _save(figure, points, stem)
+
+
+def _draw_failures(points: Sequence[TrendPoint], stem: Path) -> None:
+    """Draws what fails over both measures of change."""
+    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
+    panels = figure.subplots(1, len(_CHANGES), sharey=True)
+    for axes, change in zip(panels, _CHANGES, strict=True):
+        _draw_panel(axes, points, "1 - AUC", lambda one: one.failure, change)
+        axes.set_ylim(-0.02, 1.02)
+    _save(figure, points, stem)
+
+
+def _save(figure: Figure, points: Sequence[TrendPoint], stem: Path) -> None:
+    """Writes a figure with the methods in the legend of its first panel."""
+    handles = [
+        method_entry(method, with_line=True)
+        for method in tables.in_table_order(point.method for point in points)
+    ]
+    figure.axes[0].legend(handles=handles, fontsize=8, framealpha=0.8)
     save(figure, stem)
-
-
-def _add_legend(axes: Axes, points: Sequence[TrendPoint]) -> None:
-    axes.legend(
-        handles=[
-            method_entry(method, with_line=True)
-            for method in in_table_order(point.method for point in points)
-        ],
-        fontsize=8,
-        framealpha=0.8,
-    )
 
 
 def _draw_panel(
@@ -213,7 +196,7 @@ def _draw_panel(
     value: Callable[[TrendPoint], float],
     change: str = "tcr_sym",
 ) -> None:
-    for method in in_table_order(point.method for point in points):
+    for method in tables.in_table_order(point.method for point in points):
         colour, style, marker = method_style(method)
         known = sorted(
             (getattr(p, change), value(p))

@@ -30,13 +30,11 @@ from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.surveys import (
     DriveSource,
     KeptDrive,
+    KeptScans,
     RecordedDrive,
     Survey,
     survey_recording,
 )
-
-# Expected seconds for a database.
-_COST = 30.0
 
 
 @dataclass(frozen=True)
@@ -44,14 +42,9 @@ class TrendPoint:
     """A method on one database.
 
     Attributes:
-        database: name of the drive.
-        method: its name.
-        tcr_sym: between database and query.
         auc, auc_low, auc_high: with its 95 % interval over blocks of the
             route.
         recall_at_1: over queries with a match.
-        queries, with_match: numbers of queries, and of those with a match.
-        protocol: that of place recognition.
         auc_strict: with recall = TP / N.
         auc_unchanged: AUC of the database's control; NaN without one.
         visible_change: mean over queries, see `PairEvidence`.
@@ -84,20 +77,6 @@ class TrendPoint:
         return self.auc / self.auc_unchanged
 
 
-@dataclass(frozen=True)
-class TrendDatabase:
-    """A database drive and its control.
-
-    Attributes:
-        source: opens it.
-        control: name of the drive on its route through the city of the
-            query; None if there is none.
-    """
-
-    source: DriveSource
-    control: str | None = None
-
-
 def measure_trend(
     query: Path,
     databases: Sequence[Path],
@@ -116,17 +95,8 @@ def measure_trend(
     the surveys of many would fill a disk.
 
     Args:
-        query: the query drive.
-        databases: the drives whose places are searched.
-        output: folder for intermediate results, made if needed.
-        cluster: where the work is done.
-        own_methods: Python files with one method each, to run besides those
-            of this package.
-        protocol: that of place recognition.
         controls: drives on the routes of databases, but in the stage of the
             query; each serves the databases whose route it has.
-        lidar: name of the LiDAR, for recordings with several.
-        settings: `METHOD.NAME=VALUE` of parameters of methods.
 
     Raises:
         InputError: a recording cannot be read, two have one name, a control
@@ -147,7 +117,7 @@ def measure_trend(
         names.add(drive.name)
         check_same_world(drive, query_drive)
         opened[path] = drive
-    searched = {}
+    serving: dict[str, str | None] = {}
     for path in databases:
         way = driven_way(opened[path].scenario)
         same = [
@@ -155,18 +125,18 @@ def measure_trend(
             for control in controls
             if way is not None and driven_way(opened[control].scenario) == way
         ]
-        searched[opened[path].name] = TrendDatabase(
-            _recorded(path, lidar), same[0] if same else None
-        )
-    used = {one.control for one in searched.values()}
+        serving[opened[path].name] = same[0] if same else None
     for path in controls:
-        if opened[path].name not in used:
+        if opened[path].name not in serving.values():
             raise InputError(f"--control: {path}: no database has its route")
     return measure_drives(
         query_drive.name,
-        _recorded(query, lidar),
-        searched,
-        {opened[path].name: _recorded(path, lidar) for path in controls},
+        RecordedDrive(query.absolute(), lidar),
+        {
+            drive.name: RecordedDrive(path.absolute(), lidar)
+            for path, drive in opened.items()
+        },
+        serving,
         output,
         cluster,
         methods,
@@ -177,8 +147,8 @@ def measure_trend(
 def measure_drives(
     query_name: str,
     query: DriveSource,
-    databases: Mapping[str, TrendDatabase],
-    controls: Mapping[str, DriveSource],
+    sources: Mapping[str, DriveSource],
+    controls: Mapping[str, str | None],
     output: Path,
     cluster: Cluster,
     methods: tuple[MethodChoice, ...],
@@ -187,14 +157,9 @@ def measure_drives(
     """Returns the points of drives that need not be recorded.
 
     Args:
-        query_name: name of the query drive.
-        query: opens it.
-        databases: name -> drive whose places are searched.
-        controls: name -> source of a control of databases.
-        output: folder for intermediate results, made if needed.
-        cluster: where the work is done.
-        methods: to run.
-        protocol: that of place recognition.
+        sources: name -> opens a drive: a database or a control.
+        controls: database -> the drive on its route through the city of the
+            query; None if there is none.
 
     Raises:
         InputError: see `measure_trend`.
@@ -202,43 +167,30 @@ def measure_drives(
     files = StudyFiles(output.absolute())
     make_folder(output)
     survey = files.survey(query_name)
-    step = Survey(
-        query,
-        frozenset({"queries"}),
+    roles = frozenset({"queries"})
+    step = Survey(query, roles, methods, protocol, survey, with_scans=True)
+    jobs = [Job(f"survey {query_name}", step)]
+    parts = {name: files.part("trend", name, query_name) for name in sources}
+    shared = (
+        (survey.drive, survey.scans),
+        tuple(survey.described(one.name) for one in methods),
         methods,
         protocol,
-        survey,
-        with_scans=True,
     )
-    jobs = [Job(name=f"survey {query_name}", step=step)]
-    sources = {name: one.source for name, one in databases.items()}
-    sources |= controls
-    parts = {name: files.trend_points(name, query_name) for name in sources}
     jobs += [
         Job(
-            name=f"measure {name}",
-            step=MakePart(
-                part,
-                measure_database,
-                (
-                    sources[name],
-                    (survey.drive, survey.scans),
-                    tuple(survey.described(one.name) for one in methods),
-                    methods,
-                    protocol,
-                ),
-            ),
-            needs=(jobs[0].name,),
-            cost=_COST,
+            f"measure {name}",
+            MakePart(part, measure_database, (sources[name], *shared)),
+            (jobs[0].name,),
         )
         for name, part in parts.items()
     ]
     run_jobs(jobs, cluster)
     points: list[TrendPoint] = []
-    for name, one in databases.items():
+    for name, control in controls.items():
         unchanged = {}
-        if one.control is not None:
-            measured = parts[one.control].read()
+        if control is not None:
+            measured = parts[control].read()
             unchanged = {point.method: point.auc for point in measured}
         points += [
             replace(point, auc_unchanged=unchanged.get(point.method, math.nan))
@@ -258,26 +210,21 @@ def measure_database(
     """Returns the points of one database.
 
     Args:
-        reporter: takes the progress.
         source: opens the database, which is in the world of the query.
         surveyed: the `SurveyedDrive` and the `KeptScans` of the query drive.
         described: each method's descriptions of the query drive.
-        methods: to run.
-        protocol: that of place recognition.
     """
     running = [method.make() for method in methods]
     database = survey_recording(
-        source(),
-        {"places"},
-        running,
-        protocol,
-        reporter.track,
-        with_scans=True,
+        source(), {"places"}, running, protocol, reporter.track, with_scans=True
     )
+    drive, scans = database.drive, database.scans
+    assert drive is not None
+    assert isinstance(scans, KeptScans)
     query_track, query_scans = (part.read() for part in surveyed)
-    check_same_world(database.drive.placed, query_track.placed)
+    check_same_world(database.placed, query_track.placed)
     change = temporal_change(
-        database.drive.coarse.centroids_W, query_track.coarse.centroids_W
+        drive.coarse.centroids_W, query_track.coarse.centroids_W
     )
     points: list[TrendPoint] = []
     visible_change = math.nan
@@ -290,9 +237,8 @@ def measure_database(
         )
         if not points:
             # Matches do not depend on the method.
-            assert database.scans is not None
             visible_change = _visible_change(
-                KeptDrive(database.drive, database.scans),
+                KeptDrive(drive, scans),
                 KeptDrive(query_track, query_scans),
                 retrieval,
                 protocol,
@@ -343,7 +289,3 @@ def _visible_change(
         retrieval.matches,
     )
     return mean_visible_change(overlaps)[0]
-
-
-def _recorded(path: Path, lidar: str | None) -> RecordedDrive:
-    return RecordedDrive(path.absolute(), lidar)

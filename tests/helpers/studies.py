@@ -14,9 +14,9 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.pictures.stage_scene import StageScene
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL
-from evaluation.study.assembly import assemble
+from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
-from evaluation.study.plan import plan_study
+from evaluation.study.plan import Study
 
 
 def do(jobs):
@@ -37,10 +37,10 @@ def report(recordings, output, methods=None, protocol=FAIR_PROTOCOL):
     """Returns the path of the report on a folder of recordings."""
     found = find_recordings(recordings)
     reference = reference_for({one.map_name for one in found})
-    do(plan_study(found, output, methods, protocol, reference=reference))
-    return assemble(
-        found, output, methods, protocol=protocol, reference=reference
-    )
+    chosen = choose_methods() if methods is None else tuple(methods)
+    study = Study(found, output, chosen, protocol, reference=reference)
+    do(study.jobs())
+    return study.assemble()
 
 
 def leave_figures_unrendered(patch):

@@ -47,15 +47,14 @@ def planned(monkeypatch):
         lambda jobs, cluster: runs.append({job.name: job for job in jobs}),
     )
 
-    def assemble(recordings, output, methods, pages, **options):
-        del options["reference"]  # None is there for this town.
-        assert callable(options.pop("on_note"))
-        assert options == {"protocol": FAIR_PROTOCOL, "with_costs": False}
-        runs[-1]["recordings"] = {one.name: one for one in recordings}
+    def assemble(study, pages, on_note):
+        assert callable(on_note)
+        assert (study.protocol, study.with_costs) == (FAIR_PROTOCOL, False)
+        runs[-1]["recordings"] = {one.name: one for one in study.recordings}
         runs[-1]["pages"] = pages
-        return output / "report.html"
+        return study.output / "report.html"
 
-    monkeypatch.setattr(reproduction, "assemble", assemble)
+    monkeypatch.setattr(reproduction.Study, "assemble", assemble)
     return runs
 
 

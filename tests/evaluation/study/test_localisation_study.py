@@ -18,11 +18,11 @@ from evaluation.localisation.localise import (
     Localiser,
     localise,
 )
-from evaluation.report.compared import ComparedPair
 from evaluation.report.ladder import LadderRung
 from evaluation.study import localisation
 from evaluation.study.localisation import (
     STARTS,
+    ComparedPair,
     localise_pairs,
     measure_localisation,
 )

@@ -9,10 +9,9 @@ import pytest
 
 from evaluation.methods import known_methods
 from evaluation.recognition import costs
-from evaluation.study.assembly import assemble
 from evaluation.study.collection import find_recordings
 from evaluation.study.parts import StudyFiles
-from evaluation.study.plan import plan_study
+from evaluation.study.plan import Study
 
 pytestmark = pytest.mark.slow
 
@@ -26,12 +25,13 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
         drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
     found = find_recordings(tmp_path / "in")
     output = tmp_path / "out"
-    jobs = plan_study(found, output, with_costs=True)
+    study = Study(found, output, with_costs=True)
+    jobs = study.jobs()
     # The job runs alone on the machine.
     assert set(jobs[-1].needs) == {job.name for job in jobs[:-1]}
     studies.do(jobs)
     assert jobs[-1].step.is_done()
-    path = assemble(found, output, with_costs=True)
+    path = study.assemble()
     with (output / "costs.csv").open(newline="") as stream:
         rows = {row["method"]: row for row in csv.DictReader(stream)}
     assert tuple(rows) == known_methods()

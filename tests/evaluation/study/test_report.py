@@ -16,7 +16,7 @@ from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings, group_cities
-from evaluation.study.plan import plan_study, write_report
+from evaluation.study.plan import Study, write_report
 
 pytestmark = pytest.mark.slow
 
@@ -254,7 +254,7 @@ def test_report_is_the_same_for_any_number_of_workers(
 
 
 def test_finished_jobs_start_no_process(recordings, report, monkeypatch):
-    jobs = plan_study(find_recordings(recordings), report)
+    jobs = Study(find_recordings(recordings), report).jobs()
     monkeypatch.setattr(Cluster, "connect", None)
     run_jobs(jobs, Cluster())
     (report / "figures" / "routes_metropolis.webp").rename(report / "aside")

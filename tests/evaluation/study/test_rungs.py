@@ -17,7 +17,7 @@ from evaluation.study import rungs
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import MakePart, Part, SurveyFiles
 from evaluation.study.rungs import measure_rung, measure_size
-from evaluation.study.surveys import DescribeDrive, RecordedDrive
+from evaluation.study.surveys import RecordedDrive, Survey
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
 PROTOCOL = RetrievalProtocol()
@@ -57,8 +57,14 @@ def folder(tmp_path_factory):
 def described(folder, name, role):
     """The parts of a drive's scans and descriptions, which are there."""
     files = SurveyFiles(folder / "parts" / name)
-    step = DescribeDrive(
-        RecordedDrive(folder / name), role, METHODS, PROTOCOL, files, True
+    step = Survey(
+        RecordedDrive(folder / name),
+        frozenset({role}),
+        METHODS,
+        PROTOCOL,
+        files,
+        with_scans=True,
+        with_map=False,
     )
     if not step.is_done():
         step.run(Reporter())

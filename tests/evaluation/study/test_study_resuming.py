@@ -7,7 +7,7 @@ from helpers.small_towns import drive
 import pytest
 
 from evaluation.study.collection import find_recordings
-from evaluation.study.plan import plan_study
+from evaluation.study.plan import Study
 from evaluation.study.surveys import Survey
 
 pytestmark = pytest.mark.slow
@@ -17,7 +17,7 @@ def measuring_jobs(recordings, output):
     """Returns the jobs without drawing, which takes most of the time."""
     return [
         job
-        for job in plan_study(find_recordings(recordings), output)
+        for job in Study(find_recordings(recordings), output).jobs()
         if isinstance(job.step, Survey)
         or (" > " in job.name and not job.name.startswith("change"))
     ]
