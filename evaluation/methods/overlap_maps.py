@@ -35,9 +35,9 @@ _RING = 2.0
 _GROUND_STEP = 0.15
 _GROUND_SLOPE = 0.2
 
-# Words of the fine maps of a place overlap: half of one's bits, so many, are
-# also those of the next.
-_HALF = 32
+# Rows and columns around the cells of a place: twice the greatest step of a
+# climb, which is 6 cells, and one.
+_MARGIN = 13
 # The unit of sines and cosines is 2 to minus this power.
 _UNIT_BITS = 14
 # Every second bit, pair of bits and nibble, and the first bit of every byte.
@@ -45,9 +45,6 @@ _EVERY_2ND = np.uint64(0x5555555555555555)
 _PAIRS = np.uint64(0x3333333333333333)
 _NIBBLES = np.uint64(0x0F0F0F0F0F0F0F0F)
 _BYTES = np.uint64(0x0101010101010101)
-# Three counts share a word. A layer has at most GRID * GRID cells.
-_COUNT_BITS = 21
-_COUNT_MASK = np.uint64((1 << _COUNT_BITS) - 1)
 
 
 def layer_cells(
@@ -302,25 +299,15 @@ def climb(
         (3 + layers,) int64: the pose, and the query's cells that meet some
         of the place, in each layer.
     """
-    # The place's layers with the neighbours of all filled cells; a row and half
-    # a word without bits on either side.
-    num_words = GRID // _HALF + 2
-    wide = np.zeros((NUM_LAYERS, (GRID + 2) * num_words), np.uint64)
-    place = np.zeros_like(wide)
+    # The place's filled cells and their neighbours, with a margin.
+    size = GRID + 2 * _MARGIN
+    place = np.zeros((NUM_LAYERS, size, size), np.uint8)
     for layer in range(NUM_LAYERS):
         for i in range(place_starts[layer], place_starts[layer + 1]):
             row, column = int(place_cells[i]) >> 8, int(place_cells[i]) & 255
-            for near in range(max(column - 1, 0), min(column + 2, GRID)):
-                word = (row + 1) * num_words + near // _HALF
-                bit = np.uint64(1) << np.uint64(near % _HALF)
-                wide[layer, word] |= bit << np.uint64(_HALF)
-                wide[layer, word + 1] |= bit
-        for i in range(num_words, (GRID + 1) * num_words):
-            place[layer, i] = (
-                wide[layer, i - num_words]
-                | wide[layer, i]
-                | wide[layer, i + num_words]
-            )
+            for r in range(max(row - 1, 0), min(row + 2, GRID)):
+                for c in range(max(column - 1, 0), min(column + 2, GRID)):
+                    place[layer, _MARGIN + r, _MARGIN + c] = 1
     common = np.zeros((3, 3, NUM_LAYERS), np.int64)
     pose = start.copy()
     _count_common(cells, starts, place, turns, pose, 1, common)
@@ -376,12 +363,12 @@ def _count_common(
 ) -> None:
     """Counts the cells of each layer that meet the place's, near a pose.
 
-    Shifts by whole cells move all cells alike: each is turned once, and of the
-    place's bits those of three columns are read together.
+    Shifts by whole cells move all cells alike: each is turned once.
 
     Args:
         cells, starts, turns: see `climb`.
-        place: (layers, rows times words) uint64, bits of the place.
+        place: (layers, rows, columns) uint8, 1 where the place has a cell or a
+            neighbour of one; `_MARGIN` more rows and columns on every side.
         pose: (3,) int64.
         step: k, of the shifts in whole cells, from 1 to 6.
         common: (3, 3, layers) int64 to fill: for shifts by -k, 0 and k
@@ -389,33 +376,19 @@ def _count_common(
     """
     c, s = turns[pose[0], 0], turns[pose[0], 1]
     right, up = (pose[1] + GRID) << _UNIT_BITS, (pose[2] + GRID) << _UNIT_BITS
-    one, k = np.uint64(1), np.uint64(step)
-    # A product takes the three bits of a row, k apart, to where their counts
-    # begin: none of its other terms is there.
-    first, second = np.uint64(_COUNT_BITS), np.uint64(2 * _COUNT_BITS)
-    wanted = one | one << k | one << (k + k)
-    spread = one | one << (first - k) | one << (second - k - k)
-    counted = one | one << first | one << second
-    num_words = place.shape[1] // (GRID + 2)
+    # Beside the map are no cells.
+    last = GRID + step
+    common[:] = 0
     for layer in range(NUM_LAYERS):
-        words = place[layer]
-        before = here = after = np.uint64(0)
         for i in range(starts[layer], starts[layer + 1]):
             u = 2 * (np.int64(cells[i]) >> 8) + 1 - GRID
             v = 2 * (np.int64(cells[i]) & 255) + 1 - GRID
             row = (c * u - s * v + right) >> (_UNIT_BITS + 1)
             column = (s * u + c * v + up) >> (_UNIT_BITS + 1)
-            # Beside the map are no bits.
-            bit = _HALF - step + min(max(column, -1 - step), GRID + step)
-            first, shift = num_words + bit // _HALF, np.uint64(bit % _HALF)
-            at = np.uint64(first + min(max(row - step, -1), GRID) * num_words)
-            before += (words[at] >> shift & wanted) * spread & counted
-            at = np.uint64(first + min(max(row, -1), GRID) * num_words)
-            here += (words[at] >> shift & wanted) * spread & counted
-            at = np.uint64(first + min(max(row + step, -1), GRID) * num_words)
-            after += (words[at] >> shift & wanted) * spread & counted
-        for dr, counts in enumerate((before, here, after)):
-            for dc in range(3):
-                common[dr, dc, layer] = np.int64(
-                    counts >> np.uint64(dc * _COUNT_BITS) & _COUNT_MASK
-                )
+            row = _MARGIN + min(max(row, -1 - step), last)
+            column = _MARGIN + min(max(column, -1 - step), last)
+            for dr in range(3):
+                for dc in range(3):
+                    common[dr, dc, layer] += place[
+                        layer, row + (dr - 1) * step, column + (dc - 1) * step
+                    ]

@@ -106,7 +106,7 @@ class SeenSurfaces:
         """
         if len(points) == 0:
             return Shares(math.nan, math.nan)
-        kinds = self._kinds(points)
+        kinds, _ = self._look(points)
         return Shares(
             float(np.mean(kinds == _SHOWN)), float(np.mean(kinds == _BEHIND))
         )
@@ -122,24 +122,15 @@ class SeenSurfaces:
         Args:
             points: in this sensor's frame.
         """
-        return _measure_clearances(
-            np.ascontiguousarray(points, dtype=np.float64),
-            self.points,
-            self.angles_deg,
-            self.starts,
-        )
+        return self._look(points)[1]
 
     def hides(self, points: np.ndarray) -> np.ndarray:
         """Returns which of points (N, 3) are behind, (N,) bool."""
-        return self._kinds(points) == _BEHIND
+        return self._look(points)[0] == _BEHIND
 
-    def _kinds(self, points: np.ndarray) -> np.ndarray:
-        return _classify(
-            np.ascontiguousarray(points, dtype=np.float64),
-            self.points,
-            self.angles_deg,
-            self.starts,
-        )
+    def _look(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        return _look(points, self.points, self.angles_deg, self.starts)
 
 
 @compiled
@@ -189,23 +180,6 @@ def _find_corners(
 
 
 @compiled
-def _is_on_plane(
-    p: np.ndarray, seen: np.ndarray, corners: np.ndarray, away: np.ndarray
-) -> bool:
-    """Returns whether a point lies on the plane of the nearest three returns.
-
-    That is, along its direction, within `TOLERANCE`.
-    """
-    plane = _fit_plane(seen, corners, away)
-    along = plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2]
-    if along == 0.0:
-        return False
-    # The plane meets the ray at `part` times the point.
-    part = plane[3] / along
-    return abs(part - 1.0) * _length(p) <= TOLERANCE
-
-
-@compiled
 def _fit_plane(
     seen: np.ndarray, corners: np.ndarray, away: np.ndarray
 ) -> tuple[float, float, float, float]:
@@ -237,11 +211,15 @@ def _length(p: np.ndarray) -> float:
 
 
 @compiled
-def _classify(
+def _look(
     others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
-) -> np.ndarray:
-    """Returns whether each of M points is shown, hidden, or neither."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns whether M points are shown, hidden, or neither, and clearances.
+
+    The latter are how far they lie before what is seen [m].
+    """
     kinds = np.full(len(others), _UNKNOWN, np.int8)
+    clearances = np.empty(len(others))
     corners = np.empty(4, np.int64)
     away = np.empty(4)
     for i in range(len(others)):
@@ -258,47 +236,30 @@ def _classify(
             farthest, nearest = max(farthest, reach), min(nearest, reach)
             is_alike = abs(reach - distance) <= TOLERANCE
             is_shown = is_shown or (is_alike and away[quadrant] <= _NEAR_DEG)
-        if count >= 3 and not is_shown:
+        is_one_surface = count >= 3 and farthest <= _FARTHEST * nearest
+        along = size = h = 0.0
+        if count >= 3:
+            x, y, z, h = _fit_plane(seen, corners, away)
+            along = x * p[0] + y * p[1] + z * p[2]
+            size = math.sqrt(x * x + y * y + z * z)
             is_between = nearest - TOLERANCE <= distance <= farthest + TOLERANCE
-            is_shown = (
-                is_between and farthest <= _FARTHEST * nearest
-            ) or _is_on_plane(p, seen, corners, away)
+            # The plane meets the ray at h / along times the point.
+            is_on_plane = (
+                along != 0.0 and abs(h / along - 1.0) * distance <= TOLERANCE
+            )
+            is_shown |= (is_between and is_one_surface) or is_on_plane
         if is_shown:
             kinds[i] = _SHOWN
         elif count > 0 and distance > farthest + TOLERANCE:
             kinds[i] = _BEHIND
-    return kinds
-
-
-@compiled
-def _measure_clearances(
-    others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
-) -> np.ndarray:
-    """Returns how far M points lie before what is seen [m]."""
-    found = np.empty(len(others))
-    corners = np.empty(4, np.int64)
-    away = np.empty(4)
-    for i in range(len(others)):
-        p = others[i]
-        distance = _length(p)
-        _find_corners(p, angles, starts, corners, away)
-        farthest, nearest, count = 0.0, math.inf, 0
-        for quadrant in range(4):
-            if corners[quadrant] >= 0:
-                reach = _length(seen[corners[quadrant]])
-                count += 1
-                farthest, nearest = max(farthest, reach), min(nearest, reach)
-        found[i] = math.nan
+        clearances[i] = math.nan
         if count == 0:
-            found[i] = math.inf
-        elif count >= 3 and farthest <= _FARTHEST * nearest:
-            x, y, z, h = _fit_plane(seen, corners, away)
-            along = x * p[0] + y * p[1] + z * p[2]
-            size = math.sqrt(x * x + y * y + z * z)
+            clearances[i] = math.inf
+        elif is_one_surface:
             if along != 0.0 and size > 0.0:
-                found[i] = math.copysign(1.0, along) * (h - along) / size
+                clearances[i] = math.copysign(1.0, along) * (h - along) / size
         elif distance < nearest:
-            found[i] = nearest - distance
+            clearances[i] = nearest - distance
         elif distance > farthest:
-            found[i] = farthest - distance
-    return found
+            clearances[i] = farthest - distance
+    return kinds, clearances
