@@ -312,7 +312,13 @@ class McapFile:
                     left -= len(part) * _INDEX_ENTRY.itemsize
                     found += len(part)
                     parts.append(part)
-                self._check_count(channel.id, found)
+                statistics = self._summary.statistics
+                if statistics is not None:
+                    count = statistics.channel_message_counts.get(channel.id)
+                    if count not in (None, found):
+                        raise ValueError(
+                            f"the index has {found} of {count} messages"
+                        )
         locations = np.concatenate(parts)
         places = np.sort(locations[["chunk", "offset"]])
         if (places[1:] == places[:-1]).any():
@@ -324,12 +330,7 @@ class McapFile:
 
     @staticmethod
     def _read_index(stream: BinaryIO, offset: int, left: int) -> np.ndarray:
-        """Returns where a chunk has a channel's messages; see `LOCATION`.
-
-        Args:
-            offset: where the record of the index begins in it [bytes].
-            left: how long the index may be [bytes].
-        """
+        """Returns the index at an offset, which has at most `left` bytes."""
         stream.seek(offset + RECORD_HEADER.size)
         _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
         if length > left:
@@ -387,16 +388,6 @@ class McapFile:
             raise InputError(
                 f"{self.path}: messages of channel {min(unknown)}, which the "
                 "summary does not list"
-            )
-
-    def _check_count(self, channel_id: int, found: int) -> None:
-        """Refuses an index that does not list all messages of a channel."""
-        if self._summary.statistics is None:
-            return
-        counts = self._summary.statistics.channel_message_counts
-        if found != counts.get(channel_id, found):
-            raise ValueError(
-                f"the index has {found} of {counts[channel_id]} messages"
             )
 
     def _check_ends(self, stream: BinaryIO) -> None:
