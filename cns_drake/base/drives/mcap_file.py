@@ -8,8 +8,7 @@ file, so that opening a file of gigabytes reads a few kilobytes.
 The package checks only the checksums of chunks, and trusts the sizes that a
 chunk claims. Here damaged or hostile records are refused."""
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 import contextlib
 import functools
 import io
@@ -29,7 +28,6 @@ import zstandard
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
-from cns_drake.base.process import num_cores
 
 MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.
@@ -230,43 +228,21 @@ class McapFile:
         """
         return self._message(self._chunk(int(location["chunk"])), location)
 
-    def visit(
-        self,
-        locations: np.ndarray,
-        take: Callable[[int, memoryview], None],
-    ) -> None:
-        """Passes many messages to a function, unpacking each chunk once.
-
-        Chunks are unpacked on all cores, which zstd leaves Python free to
-        do, as far as a few megabytes of memory go.
+    def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
+        """Yields many messages in the file's order, unpacking each chunk once.
 
         Args:
-            locations: (N,) of `LOCATION`: where the messages lie.
-            take: called from several threads with a position in `locations` and
-                the serialised message there. It must keep no reference to the
-                message, or all chunks stay in memory.
+            locations: (N,) of `LOCATION`.
+
+        Yields:
+            A position in `locations`, and the serialised message there.
 
         Raises:
-            InputError: if a chunk is damaged, or as `take` does.
+            InputError: if a chunk is damaged.
         """
         order = np.lexsort((locations["offset"], locations["chunk"]))
-        chunks = locations["chunk"][order]
-        groups = np.split(order, np.flatnonzero(np.diff(chunks)) + 1)
-
-        def visit_chunk(group: np.ndarray) -> None:
-            chunk = self._unpack(int(locations[group[0]]["chunk"]))
-            for i in group.tolist():
-                take(i, self._message(chunk, locations[i]))
-
-        largest = max(one.uncompressed_size for one in self._chunk_indexes)
-        at_once = CHUNK_LIMIT_BYTES // max(largest, 1)
-        pool = ThreadPoolExecutor(min(num_cores(), max(at_once, 1)))
-        try:
-            for _ in pool.map(visit_chunk, groups if len(order) else ()):
-                pass
-        finally:
-            # After an error the other chunks need not be read.
-            pool.shutdown(cancel_futures=True)
+        for i in order.tolist():
+            yield i, self.read(locations[i])
 
     def attachment(self, name: str) -> bytes | None:
         """Returns the content of the attachment of this name, if any.
