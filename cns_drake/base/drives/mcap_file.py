@@ -207,10 +207,7 @@ class McapFile:
         return self._locations[topic]
 
     def step_back_ns(self, topic: str) -> int:
-        """Returns how far a topic's log time goes back, in the file's order.
-
-        Returns:
-            The largest step back between two neighbours [ns]; 0 without one.
+        """Returns the largest step back of a topic's log time in the file [ns].
 
         Raises:
             InputError: if the index cannot be read.
