@@ -1,6 +1,6 @@
 """Compilation of the few loops that NumPy cannot express."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 import contextlib
 import fcntl
 import functools
@@ -56,23 +56,17 @@ def _for_all(
     """
 
     def compile_once(types: tuple) -> object:
-        with _locked(file):
+        with contextlib.ExitStack() as stack:
+            # Such a lock binds processes and not threads, which numba lets
+            # compile one by one: theirs could wait for each other. It is not
+            # forked. Where there is none, each process compiles.
+            with contextlib.suppress(OSError):
+                file.parent.mkdir(parents=True, exist_ok=True)
+                stream = stack.enter_context(file.open("a"))
+                fcntl.lockf(stream, fcntl.LOCK_EX)
             return compile_for(tuple(map(numba.types.unliteral, types)))
 
     return compile_once
-
-
-@contextlib.contextmanager
-def _locked(file: Path) -> Iterator[None]:
-    """Locks a file for this process, if that can be done."""
-    with contextlib.ExitStack() as stack:
-        # Such a lock binds processes and not threads, which numba lets compile
-        # one by one: theirs could wait for each other. It is not forked.
-        with contextlib.suppress(OSError):
-            file.parent.mkdir(parents=True, exist_ok=True)
-            stream = stack.enter_context(file.open("a"))
-            fcntl.lockf(stream, fcntl.LOCK_EX)
-        yield
 
 
 @functools.cache

@@ -62,19 +62,19 @@ def print_note(progress: Progress, text: str) -> None:
     progress.console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
-@contextlib.contextmanager
-def show_progress(console: Console | None = None) -> Iterator[Progress]:
+def show_progress(
+    console: Console | None = None,
+) -> contextlib.AbstractContextManager[Progress]:
     """Shows progress bars, each one line, with elapsed and remaining time.
 
     See `show_bars`; without a terminal see `count_progress`.
     """
-    with show_bars(
+    return show_bars(
         TimeElapsedColumn(table_column=fixed_column()),
         TextColumn("left", table_column=fixed_column()),
         TimeRemainingColumn(table_column=fixed_column()),
         console=console,
-    ) as progress:
-        yield progress
+    )
 
 
 def count_progress(

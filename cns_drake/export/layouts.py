@@ -73,11 +73,7 @@ def checked_name(drive: McapDrive, text: str) -> str:
 
 
 def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
-    """Returns `scenario.yaml`, if the recording has a scenario.
-
-    Args:
-        name: the drive's name; by default the recording's.
-    """
+    """Returns `scenario.yaml` under a drive's name, if recorded."""
     if drive.scenario is None:
         return {}
     scenario = {**drive.scenario, "name": name or drive.name}
@@ -203,15 +199,11 @@ def _kitti_number(drive: McapDrive) -> str:
     return f"{100 * lidar + int(digits or 0):02d}"
 
 
-def _kitti_name(drive: McapDrive) -> str:
-    """Returns the drive's name; later LiDARs add their own name."""
-    if drive.lidar_name == drive.lidar_names[0]:
-        return drive.name
-    return f"{drive.name}_{drive.lidar_name}"
-
-
 def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
     elapsed_ns = drive.stamps_ns - drive.stamps_ns[0]
+    # Later LiDARs add their own name.
+    is_first = drive.lidar_name == drive.lidar_names[0]
+    name = drive.name if is_first else f"{drive.name}_{drive.lidar_name}"
     calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
     calibration["Tr"] = _X_CS
     return {
@@ -219,12 +211,12 @@ def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
         "poses.txt": _kitti_poses(drive),
         "times.txt": "".join(f"{seconds(ns)}\n" for ns in elapsed_ns.tolist()),
         "calib.txt": "".join(
-            f"{name}: {_kitti_rows(X[None])}" for name, X in calibration.items()
+            f"{key}: {_kitti_rows(X[None])}" for key, X in calibration.items()
         ),
         "first_pose.txt": _kitti_rows(drive.X_WS[:1]),
         **imu_files(drive),
         **structure_files(drive),
-        **scenario_files(drive, _kitti_name(drive)),
+        **scenario_files(drive, name),
     }
 
 

@@ -29,9 +29,6 @@ class MarkedDrive(McapDrive):
     def __init__(self, path: Path, lidar: str | None, stage: str):
         """Opens a recording and loads the other stage.
 
-        Args:
-            stage: the other stage's name, as in `stage_<stage>.sdf`.
-
         Raises:
             InputError: if the recording cannot be read, was not taken in a
                 map's stage or has no structures, the map is missing, has other
@@ -44,7 +41,13 @@ class MarkedDrive(McapDrive):
             raise InputError(f"{path}: has no list of structures")
         folder = self._map_folder()
         self._check_structures(folder.structures, recorded)
-        standing = structures_in(load_world(_world_file(folder, stage)))
+        stages = folder.stages()
+        if stage not in stages:
+            raise InputError(
+                f"{folder.path}: no stage '{stage}'; it has: "
+                f"{', '.join(stages) or 'none'}"
+            )
+        standing = structures_in(load_world(stages[stage]))
         self._absent = {
             instance: entry
             for instance, entry in recorded.items()
@@ -118,13 +121,3 @@ class MarkedDrive(McapDrive):
                     f"{listed.instance} of {self.name}: the map has changed "
                     "since"
                 )
-
-
-def _world_file(folder: MapFolder, stage: str) -> Path:
-    stages = folder.stages()
-    if stage not in stages:
-        raise InputError(
-            f"{folder.path}: no stage '{stage}'; it has: "
-            f"{', '.join(stages) or 'none'}"
-        )
-    return stages[stage]

@@ -70,7 +70,10 @@ def find_speed_profile(
         _MARGIN * speeds.lateral_acceleration / np.maximum(bending, 1e-9)
     )
     limit = np.minimum(lateral, speeds.cruise)
-    limit = np.minimum(limit, _at_knots(path, speed_limits, u))
+    # At a place, the lower one of the limits at both ends of its interval.
+    knot = (u / path.spacing).astype(int).clip(0, len(speed_limits) - 2)
+    limit = np.minimum(limit, speed_limits[knot])
+    limit = np.minimum(limit, speed_limits[knot + 1])
     limit = _early_and_late(limit, u[1])
     # Along the path v = |p'| u', so v' = |p'| u'' + |p'|' u'^2.
     parametric = np.max(np.abs(jet.dspeed) * limit**2)
@@ -89,14 +92,6 @@ def drive_positions(profile: SpeedProfile) -> np.ndarray:
     knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * path_geometry.REACH
     drive_times = (np.arange(knots + 1) - path_geometry.REACH) * KNOT_PERIOD
     return _drive(drive_times, times, u, speed)
-
-
-def _at_knots(
-    path: path_geometry.SmoothPath, speed_limits: np.ndarray, u: np.ndarray
-) -> np.ndarray:
-    """Returns the lower one of the limits at both ends of the interval."""
-    index = (u / path.spacing).astype(int).clip(0, len(speed_limits) - 2)
-    return np.minimum(speed_limits[index], speed_limits[index + 1])
 
 
 def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:

@@ -274,12 +274,7 @@ class VehicleMotion(LeafSystem):
 
 
 class Sweep(NamedTuple):
-    """Poses of a frame P in the world at N times.
-
-    Attributes:
-        R_WPset: (N, 3, 3) float64.
-        p_WPset: (N, 3) float64 [m].
-    """
+    """Poses of a frame P in the world at N times; (N, 3, 3) and (N, 3) [m]."""
 
     R_WPset: np.ndarray
     p_WPset: np.ndarray

@@ -21,17 +21,8 @@ _ENCAPSULATION = 4
 _NUMBERS = 10
 # A record of the table of velocities.
 MOTION_DTYPE = np.dtype(
-    [
-        ("x", "<f4"),
-        ("y", "<f4"),
-        ("z", "<f4"),
-        ("vx", "<f4"),
-        ("vy", "<f4"),
-        ("vz", "<f4"),
-        ("yaw_rate", "<f4"),
-        ("instance", "<u2"),
-        ("moving", "<u2"),
-    ]
+    [(name, "<f4") for name in ("x", "y", "z", "vx", "vy", "vz", "yaw_rate")]
+    + [("instance", "<u2"), ("moving", "<u2")]
 )
 _DELETE_ALL = 1
 _RGB = {"person": (0.95, 0.35, 0.2), "bicyclist": (0.95, 0.75, 0.1)}

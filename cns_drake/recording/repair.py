@@ -89,12 +89,7 @@ BytesCallback = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Fault:
-    """A place where a file cannot be read.
-
-    Attributes:
-        offset: where the damaged record begins [bytes].
-        text: what is wrong.
-    """
+    """What is wrong where a file cannot be read, from an offset on [bytes]."""
 
     offset: int
     text: str

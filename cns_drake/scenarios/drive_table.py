@@ -22,19 +22,13 @@ from cns_drake.scenarios.scenario import Scenario
 
 @dataclass(frozen=True)
 class DriveRow:
-    """A drive and its figures.
+    """A drive and its figures; `sequence` is its name.
 
     Attributes:
-        sequence: the drive's name.
-        map: the map's name.
-        stage: the city's stage.
-        title: the drive's title.
         checksum: that of the files that the figures depend on.
-        length: length of the path [m].
-        duration: duration of the drive [s].
-        frames: number of recorded frames.
-        structures: in the stage.
-        triangles: in the stage.
+        length: of the path [m].
+        duration: [s].
+        structures, triangles: in the stage.
     """
 
     sequence: str

@@ -134,11 +134,11 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     digest = hashlib.sha256()
     found = referenced_files(path, watch or FileWatch())
     named = [(f"{n} {size}\n", one) for n, (one, size) in sorted(found.items())]
-    # The file itself comes last, without its name.
+    # The file itself comes last, without its name. Meshes may have any size.
     files: list[tuple[str, Path | str]] = [*named, ("", path)]
     for line, file in files:
         digest.update(line.encode())
         with user_errors(file), open(file, "rb") as stream:
-            while block := stream.read(_BLOCK_BYTES):  # Of a mesh of any size.
+            while block := stream.read(_BLOCK_BYTES):
                 digest.update(block)
     return digest.hexdigest()

@@ -44,33 +44,37 @@ def _not_both(one: bool, other: bool) -> bool:
     return not (one and other)
 
 
-# Field -> earlier fields, whether the two fit by what is given, and the fault
-# if they do not.
-_ALTERNATIVES: dict[str, tuple[tuple[str, Any, str], ...]] = {
-    "stage": (("map", operator.eq, "give a map and its stage together"),),
-    "world": (
-        ("map", operator.ne, "give either a map and its stage, or a world"),
+# Field, an earlier one, whether the two fit by what is given, and the fault if
+# they do not.
+_ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
+    ("stage", "map", operator.eq, "give a map and its stage together"),
+    (
+        "world",
+        "map",
+        operator.ne,
+        "give either a map and its stage, or a world",
     ),
-    "route": (
-        ("world", _not_both, "a world has no roads, give waypoints instead"),
+    (
+        "route",
+        "world",
+        _not_both,
+        "a world has no roads, give waypoints instead",
     ),
-    "waypoints": (
-        ("route", operator.ne, "give either a route or waypoints"),
-        (
-            "aside",
-            _not_both,
-            "aside is for a route only; with waypoints, move these instead",
-        ),
+    ("waypoints", "route", operator.ne, "give either a route or waypoints"),
+    (
+        "waypoints",
+        "aside",
+        _not_both,
+        "aside is for a route only; with waypoints, move these instead",
     ),
-    "u_turns": (
-        (
-            "route",
-            _not_both,
-            "is for waypoints only; a route turns round where the next leg "
-            "leads back on its road",
-        ),
+    (
+        "u_turns",
+        "route",
+        _not_both,
+        "is for waypoints only; a route turns round where the next leg leads "
+        "back on its road",
     ),
-}
+)
 # Field -> fields that it takes the place of.
 _REPLACED: dict[str, tuple[str, ...]] = {
     "world": ("map", "stage", "route", "aside"),
@@ -310,15 +314,15 @@ class Scenario(Section):
         if base is not None:
             raise ValueError("only a scenario file has one")
 
-    @field_validator(*_ALTERNATIVES)
+    @field_validator("stage", "world", "route", "waypoints", "u_turns")
     @classmethod
     def _check_alternatives(cls, value: Any, info: ValidationInfo) -> Any:
-        for other, fits, fault in _ALTERNATIVES[str(info.field_name)]:
+        for field, other, fits, fault in _ALTERNATIVES:
             # An invalid earlier field has its own error.
-            if other in info.data and not fits(
-                _is_given(value), _is_given(info.data[other])
-            ):
-                raise ValueError(fault)
+            if field == info.field_name and other in info.data:
+                given = _is_given(value), _is_given(info.data[other])
+                if not fits(*given):
+                    raise ValueError(fault)
         return value
 
     @field_validator("driver")

@@ -82,7 +82,12 @@ def read_scenario_file(path: Path) -> Scenario:
     files: dict[Path, dict] = {}
     file: Path | None = path
     while file is not None:
-        files[file] = values = _read_fields(file)
+        values = read_yaml(file)
+        if not isinstance(values, dict):
+            raise InputError(f"{file}: not a mapping of scenario fields")
+        values.setdefault("name", drive_name(file))
+        find_files(values, file)
+        files[file] = values
         file = _find_base(values.pop("base", None), file, files)
     scenario = None
     for file, values in reversed(files.items()):
@@ -93,16 +98,6 @@ def read_scenario_file(path: Path) -> Scenario:
         scenario._files = (file, *scenario.files)
     assert scenario is not None  # There is at least one file.
     return scenario
-
-
-def _read_fields(path: Path) -> dict:
-    """Returns the fields of a file, with absolute paths."""
-    values = read_yaml(path)
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: not a mapping of scenario fields")
-    values.setdefault("name", drive_name(path))
-    find_files(values, path)
-    return values
 
 
 def _find_base(

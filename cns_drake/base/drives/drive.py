@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 import re
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -205,28 +205,9 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
         ) from error
 
 
-class Placed(Protocol):
-    """Anything with poses in a named world frame; see `Drive`."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def world_frame(self) -> str: ...
-
-    @property
-    def scenario(self) -> Mapping | None: ...
-
-
 @dataclass(frozen=True)
 class PlacedDrive:
-    """The world frame and the map of a drive that is closed again.
-
-    Attributes:
-        name: the drive's name.
-        world_frame: name of the frame of its poses.
-        scenario: its `map`, if it names one.
-    """
+    """A drive that is closed again: of its scenario, only `map` is left."""
 
     name: str
     world_frame: str
@@ -241,13 +222,16 @@ class PlacedDrive:
         return cls(drive.name, drive.world_frame, scenario)
 
 
+# What has poses in a named world frame.
+Placed = Drive | PlacedDrive
+
+
 def check_same_world(
     first: Placed, second: Placed, *, across_maps: bool = False
 ) -> None:
     """Refuses two drives whose poses cannot be compared.
 
-    Args:
-        across_maps: their maps may differ, if they share a frame.
+    Their maps may differ only `across_maps`.
 
     Raises:
         InputError: if their world frames or their maps differ by name.
@@ -274,16 +258,13 @@ def check_same_map(first: Placed, second: Placed) -> None:
     Raises:
         InputError: if their maps differ by name.
     """
-    maps = [_map_name(drive) for drive in (first, second)]
+    maps = []
+    for drive in (first, second):
+        place = (drive.scenario or {}).get("map")
+        # Its name may be a path.
+        maps.append(None if place is None else Path(str(place)).name)
     if None not in maps and maps[0] != maps[1]:
         raise InputError(
             f"{second.name}: a drive through {maps[1]}, but {first.name} is "
             f"one through {maps[0]}"
         )
-
-
-def _map_name(drive: Placed) -> str | None:
-    """Returns the last part of the map's name, which may be a path."""
-    if drive.scenario is None or "map" not in drive.scenario:
-        return None
-    return Path(str(drive.scenario["map"])).name

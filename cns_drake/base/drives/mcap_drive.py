@@ -197,10 +197,10 @@ class McapDrive(Drive):
     def imu(self) -> np.ndarray | None:
         if _IMU_TOPIC not in self._message_types:
             return None
-        rows = np.zeros(len(self._file.locate(_IMU_TOPIC)), IMU_DTYPE)
+        places = self._file.locate(_IMU_TOPIC)
+        rows = np.zeros(len(places), IMU_DTYPE)
         first = self._first(_IMU_TOPIC).header
-
-        def take(position: int, data: memoryview) -> None:
+        for position, data in self._file.visit(places):
             message = self._decode(_IMU_TOPIC, data)
             self._check_frame(
                 _IMU_TOPIC,
@@ -209,8 +209,6 @@ class McapDrive(Drive):
                 first.frame_id,
             )
             rows[position] = mcap_messages.imu_row(message)
-
-        self._file.visit(self._file.locate(_IMU_TOPIC), take)
         self._check_agreement(_IMU_TOPIC, rows)
         return rows
 
@@ -243,8 +241,8 @@ class McapDrive(Drive):
         odometry = np.zeros(len(places), ODOMETRY_DTYPE)
         lidar_frame = self._first(self._lidar_topic).header.frame_id
         vehicle_frames = _vehicle_frames(self._first(_ODOMETRY_TOPIC))
-
-        def take(position: int, data: memoryview) -> None:
+        together = np.concatenate([self._scans, places])
+        for position, data in self._file.visit(together):
             if position < num_scans:
                 topic, first = self._lidar_topic, lidar_frame
                 with self._faults(topic):
@@ -257,8 +255,6 @@ class McapDrive(Drive):
                 topic, first = _ODOMETRY_TOPIC, vehicle_frames
                 stamp_ns, frame = row[0], _vehicle_frames(message)
             self._check_frame(topic, stamp_ns, frame, first)
-
-        self._file.visit(np.concatenate([self._scans, places]), take)
         disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
         if len(disorder):
             raise InputError(

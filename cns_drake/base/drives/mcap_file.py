@@ -8,8 +8,7 @@ file, so that opening a file of gigabytes reads a few kilobytes.
 The package checks only the checksums of chunks, and trusts the sizes that a
 chunk claims. Here damaged or hostile records are refused."""
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 import contextlib
 import functools
 import io
@@ -29,7 +28,6 @@ import zstandard
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
-from cns_drake.base.process import num_cores
 
 MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.
@@ -209,10 +207,7 @@ class McapFile:
         return self._locations[topic]
 
     def step_back_ns(self, topic: str) -> int:
-        """Returns how far a topic's log time goes back, in the file's order.
-
-        Returns:
-            The largest step back between two neighbours [ns]; 0 without one.
+        """Returns the largest step back of a topic's log time in the file [ns].
 
         Raises:
             InputError: if the index cannot be read.
@@ -230,43 +225,21 @@ class McapFile:
         """
         return self._message(self._chunk(int(location["chunk"])), location)
 
-    def visit(
-        self,
-        locations: np.ndarray,
-        take: Callable[[int, memoryview], None],
-    ) -> None:
-        """Passes many messages to a function, unpacking each chunk once.
-
-        Chunks are unpacked on all cores, which zstd leaves Python free to
-        do, as far as a few megabytes of memory go.
+    def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
+        """Yields many messages in the file's order, unpacking each chunk once.
 
         Args:
-            locations: (N,) of `LOCATION`: where the messages lie.
-            take: called from several threads with a position in `locations` and
-                the serialised message there. It must keep no reference to the
-                message, or all chunks stay in memory.
+            locations: (N,) of `LOCATION`.
+
+        Yields:
+            A position in `locations`, and the serialised message there.
 
         Raises:
-            InputError: if a chunk is damaged, or as `take` does.
+            InputError: if a chunk is damaged.
         """
         order = np.lexsort((locations["offset"], locations["chunk"]))
-        chunks = locations["chunk"][order]
-        groups = np.split(order, np.flatnonzero(np.diff(chunks)) + 1)
-
-        def visit_chunk(group: np.ndarray) -> None:
-            chunk = self._unpack(int(locations[group[0]]["chunk"]))
-            for i in group.tolist():
-                take(i, self._message(chunk, locations[i]))
-
-        largest = max(one.uncompressed_size for one in self._chunk_indexes)
-        at_once = CHUNK_LIMIT_BYTES // max(largest, 1)
-        pool = ThreadPoolExecutor(min(num_cores(), max(at_once, 1)))
-        try:
-            for _ in pool.map(visit_chunk, groups if len(order) else ()):
-                pass
-        finally:
-            # After an error the other chunks need not be read.
-            pool.shutdown(cancel_futures=True)
+        for i in order.tolist():
+            yield i, self.read(locations[i])
 
     def attachment(self, name: str) -> bytes | None:
         """Returns the content of the attachment of this name, if any.
@@ -312,7 +285,13 @@ class McapFile:
                     left -= len(part) * _INDEX_ENTRY.itemsize
                     found += len(part)
                     parts.append(part)
-                self._check_count(channel.id, found)
+                statistics = self._summary.statistics
+                if statistics is not None:
+                    count = statistics.channel_message_counts.get(channel.id)
+                    if count not in (None, found):
+                        raise ValueError(
+                            f"the index has {found} of {count} messages"
+                        )
         locations = np.concatenate(parts)
         places = np.sort(locations[["chunk", "offset"]])
         if (places[1:] == places[:-1]).any():
@@ -324,12 +303,7 @@ class McapFile:
 
     @staticmethod
     def _read_index(stream: BinaryIO, offset: int, left: int) -> np.ndarray:
-        """Returns where a chunk has a channel's messages; see `LOCATION`.
-
-        Args:
-            offset: where the record of the index begins in it [bytes].
-            left: how long the index may be [bytes].
-        """
+        """Returns the index at an offset, which has at most `left` bytes."""
         stream.seek(offset + RECORD_HEADER.size)
         _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
         if length > left:
@@ -387,16 +361,6 @@ class McapFile:
             raise InputError(
                 f"{self.path}: messages of channel {min(unknown)}, which the "
                 "summary does not list"
-            )
-
-    def _check_count(self, channel_id: int, found: int) -> None:
-        """Refuses an index that does not list all messages of a channel."""
-        if self._summary.statistics is None:
-            return
-        counts = self._summary.statistics.channel_message_counts
-        if found != counts.get(channel_id, found):
-            raise ValueError(
-                f"the index has {found} of {counts[channel_id]} messages"
             )
 
     def _check_ends(self, stream: BinaryIO) -> None:

@@ -12,16 +12,9 @@ import numpy as np
 
 # Datatype constant of sensor_msgs/msg/PointField -> NumPy type, without the
 # order of bytes.
-_DATATYPES = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    8: "f8",
-}
+_DATATYPES = dict(
+    enumerate(["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"], start=1)
+)
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
 _LABEL_FIELDS = ("label", "instance")

@@ -68,12 +68,7 @@ def script_digest(path: Path) -> str:
 
 
 class _Module(NamedTuple):
-    """A module, found or not.
-
-    Attributes:
-        root: folder that its name starts from.
-        name: with dots.
-    """
+    """A module, found or not; its name starts from the folder `root`."""
 
     root: Path
     name: str

@@ -30,8 +30,10 @@ def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
         raise error
 
     # Signal handlers stay as the tests set them.
-    monkeypatch.setattr(terminal, "interrupt_on_termination", lambda: None)
-    monkeypatch.setattr(terminal, "ignore_interrupts", lambda: None)
+    monkeypatch.setattr(
+        terminal.interrupts, "interrupt_on_termination", lambda: None
+    )
+    monkeypatch.setattr(terminal.interrupts, "ignore_interrupts", lambda: None)
     monkeypatch.setattr("sys.argv", ["program"])
     with pytest.raises(SystemExit) as raised:
         terminal.run(app, "program")
