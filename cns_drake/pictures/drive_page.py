@@ -155,11 +155,7 @@ def make_drive_page(
 def make_panel(
     title: str, drive: DriveRecord, changes: Set[str], shown: ShownStages
 ) -> str:
-    """Returns the HTML of title, legend, plots and buttons.
-
-    Args:
-        changes: the keys of `CHANGE_RGB` that the page has.
-    """
+    """Returns the HTML of title, legend (of `CHANGE_RGB`), plots, buttons."""
     # Only pages need templates, whose import takes a moment.
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup

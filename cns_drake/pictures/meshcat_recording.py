@@ -98,11 +98,9 @@ class MeshcatRecorder(LeafSystem):
         self.DeclareForcedPublishEvent(self._publish)
 
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
-        """Adds another moving thing; its limbs stay as at the first frame.
+        """Adds another moving thing, whose name is unique; its first frame leads.
 
-        Args:
-            name: unique in the page.
-            frames: frames of its geometry; the first one leads.
+        Its limbs stay as at the first frame of the drive.
         """
         leading = frames[0]
         self.drive.X_WFs[leading] = []
@@ -111,9 +109,6 @@ class MeshcatRecorder(LeafSystem):
 
     def save(self, path: Path, *, title: str = "cns-drake") -> None:
         """Writes the page of the drive up to now.
-
-        Args:
-            path: the HTML file; an older one is replaced.
 
         Raises:
             InputError: if the file cannot be written.

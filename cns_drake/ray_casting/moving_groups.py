@@ -127,14 +127,9 @@ class MovingGroups:
     ) -> Placed:
         """Sets `X_OL`, `motion` and `in_sight` of groups.
 
-        Groups that are out of sight stay where they are, and so do those
-        whose frames have not moved.
-
-        Args:
-            calc_X_WF: gives the pose of a frame in the world.
-            motions: motion of each frame that moves during the turn.
-            known: poses of frames, which replace calls of `calc_X_WF`.
-            seen: the ball in which rays can meet geometry.
+        Groups that are out of sight, beyond the ball `seen`, stay where they
+        are, and so do those whose frames have not moved. Known poses replace
+        calls of `calc_X_WF`.
 
         Returns:
             The groups that were placed.

@@ -110,11 +110,8 @@ class RayCastingScene:
     ) -> None:
         """Moves the geometry of the frames that are not anchored.
 
-        Args:
-            calc_X_WF: gives the pose of a frame in the world.
-            motions: motion of each frame that moves during the next casts.
-            known: poses of frames, which replace calls of `calc_X_WF`.
-            seen: the ball in which the next rays can meet geometry.
+        Known poses replace calls of `calc_X_WF`; rays can meet geometry only in
+        the ball `seen`.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):

@@ -28,9 +28,6 @@ def scan_world(
 ) -> np.ndarray:
     """Returns one scan of the world's models in their initial state.
 
-    Args:
-        returns: the model of a real unit; None for ideal returns.
-
     Returns:
         Structured array of `POINT_DTYPE`, in the sensor frame.
     """
@@ -39,11 +36,7 @@ def scan_world(
 
 
 def still_scene(world: World, pattern: BeamPattern) -> RayCastingScene:
-    """Returns the world's models in their initial state, to cast rays on.
-
-    Args:
-        world: the world; its SceneGraph is used up.
-    """
+    """Returns the world's models in their initial state, to cast rays on."""
     lidar, context = _stand(world, RigidTransform(), pattern)
     return lidar.EvalScene(context)
 

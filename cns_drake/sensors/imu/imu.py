@@ -156,9 +156,6 @@ def add_described_imu(
 ) -> dict[str, OutputPort]:
     """Adds the IMU that a description describes to a diagram.
 
-    Args:
-        scan_rate: scans per second of the fastest LiDAR.
-
     Returns:
         The ports `specific_force` and `angular_velocity`; and `imu_samples`
         of an IMU with a rate or errors of its own.
@@ -198,11 +195,7 @@ class NoisyImu(LeafSystem):
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
-        """Declares the ports.
-
-        Args:
-            rate: samples per second [1/s].
-        """
+        """Declares the ports."""
         super().__init__()
         self._errors = ImuErrors(noise, rate)
         self._rate = rate

@@ -477,11 +477,7 @@ class SeenGeometry:
         return np.where(moves[self.instance], self.moving_label, self.label)
 
     def materials(self, *, is_wet: bool) -> Materials:
-        """Returns the materials of the geometries of `scene`.
-
-        Args:
-            is_wet: whether the ground is wet; the same at each call.
-        """
+        """Returns the materials of `scene`; wet at each call, or at none."""
         if self._materials is None:
             self._materials = find_materials(
                 self._built, self._table, is_wet=is_wet

@@ -204,15 +204,7 @@ def _drops(
     key: np.uint64,
     num_beams: int,
 ) -> _Pulses:
-    """Returns the echoes of drops in front of surfaces.
-
-    Args:
-        surfaces: their echoes.
-        receiver: the unit's.
-        scattering: its detected echoes of drops.
-        key: the frame's.
-        num_beams: number of beams of the turn.
-    """
+    """Returns the echoes of drops in front of surfaces."""
     distances, counts = scattering.distances, scattering.counts
     # Drops are arrivals of a Poisson process, in units of their mean number.
     # The first one of most beams is beyond the farthest end of any.

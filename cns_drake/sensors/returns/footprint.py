@@ -210,11 +210,6 @@ def _range_on(hits: BeamHits, i: int, d_W: np.ndarray) -> float:
     """Returns a ray's range at the plane of the i-th hit [m].
 
     It is inf if the ray does not meet the plane, or there is no hit.
-
-    Args:
-        hits: all of them.
-        i: which one.
-        d_W: (3,) direction of the ray.
     """
     along = 0.0
     for axis in range(3):
@@ -257,12 +252,7 @@ def _find_edges(
 
 @compiled
 def _touch(a: BeamHits, i: int, b: BeamHits, j: int) -> bool:
-    """Returns whether the planes of two places are one, or meet in between.
-
-    Args:
-        a, i: a place: the hit of the i-th of these rays.
-        b, j: another place.
-    """
+    """Returns whether the planes of two places are one, or meet in between."""
     if a.geometry[i] < 0 or b.geometry[j] < 0:
         return False
     # -n . d for the plane of each and the direction of the other.

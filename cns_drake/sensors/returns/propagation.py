@@ -148,11 +148,7 @@ def start_ways(
 
 @compiled
 def pane_shares(cosine: float) -> tuple[float, float]:
-    """Returns the reflected and the transmitted part of light at a pane.
-
-    Args:
-        cosine: cosine of the angle of incidence.
-    """
+    """Returns the reflected and the transmitted part of light at a pane."""
     n = _GLASS_INDEX
     sine = np.sqrt(max(1.0 - cosine**2, 0.0)) / n
     inner = np.sqrt(1.0 - sine**2)
@@ -209,10 +205,6 @@ def _step(
     """Takes each ray to its hit.
 
     NumPy takes ten times as long, a twelfth of a frame.
-
-    Args:
-        ways, met, materials, divergence, max_range: see `follow`.
-        scale: see `LinkBudget`.
 
     Returns:
         The returning light, and the continued rays.
