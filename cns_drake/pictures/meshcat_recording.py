@@ -98,7 +98,7 @@ class MeshcatRecorder(LeafSystem):
         self.DeclareForcedPublishEvent(self._publish)
 
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
-        """Adds another moving thing, whose name is unique; its first frame leads.
+        """Adds a moving thing of a unique name; its first frame leads.
 
         Its limbs stay as at the first frame of the drive.
         """
