@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
@@ -94,15 +94,10 @@ def _stand(
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
     )
-    context = _make_still_world(world, lidar).CreateDefaultContext()
-    return lidar, lidar.GetMyContextFromRoot(context)
-
-
-def _make_still_world(world: World, lidar: Lidar) -> Diagram:
-    """Makes the Diagram of a world whose models keep their initial state."""
     plant = world.plant
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
+    # The models keep their initial state.
     positions = plant.GetPositions(plant.CreateDefaultContext())
     source = builder.AddNamedSystem("position", ConstantVectorSource(positions))
     to_pose = builder.AddNamedSystem(
@@ -115,4 +110,5 @@ def _make_still_world(world: World, lidar: Lidar) -> Diagram:
         scene_graph.get_source_pose_port(plant.get_source_id()),
     )
     connect_lidar(builder, scene_graph, lidar)
-    return builder.Build()
+    context = builder.Build().CreateDefaultContext()
+    return lidar, lidar.GetMyContextFromRoot(context)
