@@ -160,12 +160,14 @@ def _scan_seen_by(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns pixels of a scan's points and their distances [m]."""
     x, y, z = view.position
-    down = scene.cast_rays(
+    down = scene.scene.cast_rays(
         np.array([x, y, z]), np.array([[0.0, 0.0, -1.0]]), 100.0
     )
     p_WS = np.array([x, y, z - down.ranges[0] + _SENSOR_HEIGHT])
     pattern = make_beam_pattern("cns", FRAME_PERIOD)
-    hits = scene.cast_rays(p_WS, pattern.beams(0).d_Sset, pattern.max_range)
+    hits = scene.scene.cast_rays(
+        p_WS, pattern.beams(0).d_Sset, pattern.max_range
+    )
     hit = np.isfinite(hits.ranges)
     ranges = hits.ranges[hit]
     points = p_WS + ranges[:, None] * pattern.beams(0).d_Sset[hit]

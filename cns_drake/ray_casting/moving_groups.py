@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.ray_casting.ray_groups import Member, Motion, RayGroup
+from cns_drake.ray_casting.ray_groups import Motion, RayGroup
 from cns_drake.scene import surfaces
 
 
@@ -194,14 +194,8 @@ class MovingGroups:
 
 def _radius_about_F(group: RayGroup) -> float:
     """Returns the greatest distance of a group's geometry from origin F [m]."""
-    stretch = float(np.linalg.norm(group.X_FL[:3, :3], 2))
-    middle = float(np.linalg.norm(group.X_FL[:3, 3]))
-    return middle + stretch * _radius_about_L(group.members)
-
-
-def _radius_about_L(members: Iterable[Member]) -> float:
     radii = []
-    for _, X_LG, surface in members:
+    for _, X_LG, surface in group.members:
         if isinstance(surface, surfaces.TriangleSurface):
             p_LVset = surface.p_GVset @ X_LG.rotation().matrix().T
             p_LVset = p_LVset + X_LG.translation()
@@ -209,11 +203,10 @@ def _radius_about_L(members: Iterable[Member]) -> float:
             continue
         if isinstance(surface, surfaces.EllipsoidSurface):
             radius = max(surface.semi_axes)
-        elif isinstance(
-            surface, surfaces.CylinderSurface | surfaces.CapsuleSurface
-        ):
-            radius = surface.radius + surface.length / 2.0
-        else:
+        elif isinstance(surface, surfaces.HalfSpaceSurface):
             radius = np.inf
+        else:
+            radius = surface.radius + surface.length / 2.0
         radii.append(float(np.linalg.norm(X_LG.translation())) + radius)
-    return max(radii)
+    stretch = float(np.linalg.norm(group.X_FL[:3, :3], 2))
+    return float(np.linalg.norm(group.X_FL[:3, 3])) + stretch * max(radii)

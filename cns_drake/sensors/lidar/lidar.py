@@ -396,9 +396,12 @@ class Lidar(LeafSystem):
     ) -> None:
         scan = self._scan.Eval(context)
         p_WSset, R_WSset = self._calc_poses(context)
-        column_t_ns = self._first.beams.column_t_ns
-        p_WRset = points_in_world(scan, column_t_ns, p_WSset, R_WSset)
-        _fill(output.get_mutable_value(), p_WRset.T)
+        # The pose of S when each point was measured: one, or each column's.
+        columns = self._first.beams.column_t_ns
+        pose = np.searchsorted(columns, scan["t"]) % len(p_WSset)
+        p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
+        p_SRset_W = np.einsum("nij,nj->ni", R_WSset[pose], p_SRset)
+        _fill(output.get_mutable_value(), (p_WSset[pose] + p_SRset_W).T)
 
 
 def _value(port: InputPort, context: Context, default: Any = None) -> Any:
@@ -620,24 +623,3 @@ def assemble_points(
     scan["label"][is_solid] = label[met[is_solid]]
     scan["instance"][is_solid] = instance[met[is_solid]]
     return scan
-
-
-def points_in_world(
-    scan: np.ndarray,
-    column_t_ns: np.ndarray,
-    p_WSset: np.ndarray,
-    R_WSset: np.ndarray,
-) -> np.ndarray:
-    """Returns the places of a scan's points in the world, (N, 3) [m].
-
-    Args:
-        scan: (N,) records of `POINT_DTYPE`.
-        column_t_ns: (T,) rising firing times of the columns [ns].
-        p_WSset: (K, 3) positions of S: one, or each column's.
-        R_WSset: (K, 3, 3) its orientations.
-    """
-    column = np.searchsorted(column_t_ns, scan["t"])
-    p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
-    return p_WSset[column % len(p_WSset)] + np.einsum(
-        "nij,nj->ni", R_WSset[column % len(R_WSset)], p_SRset
-    )
