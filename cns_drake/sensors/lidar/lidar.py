@@ -25,6 +25,7 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
+from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
@@ -294,16 +295,13 @@ class Lidar(LeafSystem):
         moving = _value(self._moving, context)
         if moving is not None:
             labels = seen.labels(moving)
-        output.set_value(
-            assemble_points(
-                turn.table,
-                returns,
-                met,
-                labels,
-                seen.instance,
-                self._measurement.resolution,
-            )
+        # Zeros, so that the padding between fields is defined, too.
+        scan = np.zeros(len(returns.beams), POINT_DTYPE)
+        step = np.float32(self._measurement.resolution)
+        assemble_points(
+            scan, turn.table, returns, met, labels, seen.instance, step
         )
+        output.set_value(scan)
 
     def _measure(
         self,
@@ -590,15 +588,19 @@ class _Turn:
         )
 
 
+@compiled
 def assemble_points(
+    scan: np.ndarray,
     table: BeamTable,
     returns: Returns,
     met: np.ndarray,
     label: np.ndarray,
     instance: np.ndarray,
-    step: float,
-) -> np.ndarray:
-    """Returns a scan, one point of `POINT_DTYPE` for each of N returns.
+    step: np.float32,
+) -> None:
+    """Fills a scan, one point of `POINT_DTYPE` for each of N returns.
+
+    NumPy takes a fifth of a frame.
 
     Args:
         met: (N,) int32 index of the hit geometry in `label` and `instance`;
@@ -607,19 +609,29 @@ def assemble_points(
         instance: uint16 structures.
         step: coordinates are rounded to multiples of it [m]; not rounded if 0.
     """
-    beams = returns.beams
-    p_SRset = table.d_Sset[beams] * returns.ranges[:, None]
-    if len(table.p_Sset):
-        p_SRset += table.p_Sset[beams]
-    if step > 0.0:
-        p_SRset = np.rint(p_SRset / np.float32(step)) * np.float32(step)
-    # Zeros, so that the padding between fields is defined, too.
-    scan = np.zeros(len(beams), POINT_DTYPE)
-    scan["x"], scan["y"], scan["z"] = p_SRset.T
-    scan["intensity"] = returns.intensity
-    scan["ring"], scan["t"] = table.ring[beams], table.t_ns[beams]
-    is_solid = met >= 0
-    scan["label"] = SCATTERED_LABEL
-    scan["label"][is_solid] = label[met[is_solid]]
-    scan["instance"][is_solid] = instance[met[is_solid]]
-    return scan
+    # As names of their own, fields are fast.
+    beams, ranges, intensity = returns.beams, returns.ranges, returns.intensity
+    for k in range(len(beams)):
+        # For a signed index, numba looks at each use whether it counts from
+        # the end.
+        beam, point = np.uint64(beams[k]), scan[k]
+        x = table.d_Sset[beam, 0] * ranges[k]
+        y = table.d_Sset[beam, 1] * ranges[k]
+        z = table.d_Sset[beam, 2] * ranges[k]
+        if len(table.p_Sset):
+            x += table.p_Sset[beam, 0]
+            y += table.p_Sset[beam, 1]
+            z += table.p_Sset[beam, 2]
+        if step > 0:
+            x = np.rint(x / step) * step
+            y = np.rint(y / step) * step
+            z = np.rint(z / step) * step
+        point.x, point.y, point.z = x, y, z
+        point.intensity = intensity[k]
+        point.ring, point.t = table.ring[beam], table.t_ns[beam]
+        if met[k] < 0:
+            point.label, point.instance = SCATTERED_LABEL, 0
+        else:
+            geometry = np.uint64(met[k])
+            point.label = label[geometry]
+            point.instance = instance[geometry]
