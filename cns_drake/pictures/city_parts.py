@@ -91,10 +91,6 @@ def compare_parts(
 
     A structure that was moved, or has another shape of the same height, is
     common to both.
-
-    Args:
-        own: structure -> its parts in this stage.
-        other: structure -> its parts in the other stage.
     """
     difference = StageDifference()
     for name, parts in own.items():

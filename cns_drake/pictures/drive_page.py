@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 import contextlib
 from dataclasses import dataclass, field, replace
 from importlib import resources
 import logging
+from pathlib import Path
 
 import numpy as np
 from pydrake import geometry
+from pydrake.common.value import Value
+from pydrake.geometry import FrameId, MeshcatParams, QueryObject
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
+from cns_drake.base.files import write_text
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
 from cns_drake.pictures.static_page import make_static_page
@@ -52,6 +57,12 @@ _MAX_SAMPLES = 400
 _PLOT_WIDTH, _PLOT_HEIGHT = 400.0, 20.0
 # Least range of a plot: a smaller one would magnify noise.
 _LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
+# Together they keep the page of any drive below 25 MB.
+_MAX_SCANS = 160
+_MAX_POINTS_PER_SCAN = 3000
+# One point for each cube of this size [m]: without that, nearly all points
+# would lie on the rings of ground around the vehicle.
+_THINNING_SIZE = 0.5
 
 
 @dataclass(frozen=True)
@@ -75,17 +86,15 @@ class DriveRecord:
 
     period: float
     X_WBs: list[RigidTransform] = field(default_factory=list)
-    X_WFs: dict[geometry.FrameId, list[RigidTransform]] = field(
-        default_factory=dict
-    )
+    X_WFs: dict[FrameId, list[RigidTransform]] = field(default_factory=dict)
     scans: list[tuple[int, np.ndarray]] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
     specific_forces_I: list[np.ndarray] = field(default_factory=list)
     angular_velocities_I: list[np.ndarray] = field(default_factory=list)
-    limbs: dict[geometry.FrameId, dict[geometry.FrameId, RigidTransform]] = (
-        field(default_factory=dict)
+    limbs: dict[FrameId, dict[FrameId, RigidTransform]] = field(
+        default_factory=dict
     )
-    names: dict[geometry.FrameId, str] = field(default_factory=dict)
+    names: dict[FrameId, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -135,9 +144,7 @@ def make_drive_page(
     then violet. Below the time line are plots of speed, IMU and stage.
     """
     with _quiet():
-        meshcat = geometry.Meshcat(
-            geometry.MeshcatParams(host="127.0.0.1", port=0)
-        )
+        meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))
     changes = _draw_city(meshcat, world, shown.other)
     if len(drive.X_WBs) > 1:
         drawing.draw_route(meshcat, "/route", drive.X_WBs)
@@ -155,11 +162,7 @@ def make_drive_page(
 def make_panel(
     title: str, drive: DriveRecord, changes: Set[str], shown: ShownStages
 ) -> str:
-    """Returns the HTML of title, legend, plots and buttons.
-
-    Args:
-        changes: the keys of `CHANGE_RGB` that the page has.
-    """
+    """Returns the HTML of title, legend (of `CHANGE_RGB`), plots, buttons."""
     # Only pages need templates, whose import takes a moment.
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -249,7 +252,7 @@ def motion_plots(drive: DriveRecord) -> list[Plot]:
     ]
 
 
-def moving_frames(world: World) -> tuple[geometry.FrameId, ...]:
+def moving_frames(world: World) -> tuple[FrameId, ...]:
     """Returns the frames with visible geometry that may move."""
     inspector = world.scene_graph.model_inspector()
     frames = (
@@ -299,14 +302,27 @@ def _animate(
 ) -> None:
     """Draws moving bodies and scans, and animates them over the drive."""
     animation = geometry.MeshcatAnimation(frames_per_second=1.0 / drive.period)
+    # The frame that leads each limb, and the pose of the limb in it.
+    led = {frame: (frame, RigidTransform()) for frame in drive.X_WFs}
+    for leading, X_FLs in drive.limbs.items():
+        led |= {limb: (leading, X_FL) for limb, X_FL in X_FLs.items()}
+    drawn: dict[FrameId, list[PerceptionGeometry]] = {
+        frame: [] for frame in drive.X_WFs
+    }
     inspector = world.scene_graph.model_inspector()
-    own = [frame for frame in drive.X_WFs if frame not in drive.limbs]
-    for path, frame_id in _moving_paths(world, own).items():
-        drawing.draw_body(
-            meshcat, path, read_perception_geometry(inspector, frame_id.__eq__)
-        )
-        _move(meshcat, animation, path, drive.X_WFs[frame_id])
-    _animate_limbs(meshcat, animation, drive, inspector)
+    for one in read_perception_geometry(inspector, led.__contains__):
+        leading, X_FL = led[one.frame_id]
+        drawn[leading].append(replace(one, X_FG=X_FL @ one.X_FG))
+    for leading, geometries in drawn.items():
+        path = _path(world, drive, leading)
+        drawing.draw_body(meshcat, path, geometries)
+        X_WFs = drive.X_WFs[leading]
+        meshcat.SetTransform(path, X_WFs[0])
+        # In between, the page interpolates.
+        interval = _TRAFFIC_INTERVAL if leading in drive.limbs else 1
+        last = len(X_WFs) - 1
+        for frame in {*range(0, last, interval), last}:
+            animation.SetTransform(frame, path, X_WFs[frame])
     # The page's script places it.
     drawing.draw_marker(meshcat, "/vehicle/marker")
     for k, (frame, p_WRset) in enumerate(drive.scans):
@@ -321,58 +337,14 @@ def _animate(
     meshcat.SetAnimation(animation)
 
 
-def _animate_limbs(
-    meshcat: geometry.Meshcat,
-    animation: geometry.MeshcatAnimation,
-    drive: DriveRecord,
-    inspector: geometry.SceneGraphInspector,
-) -> None:
-    """Draws a moving frame and its limbs as one."""
-    # The frame that leads each limb, and the pose of the limb in it.
-    led = {
-        limb: (leading, X_FL)
-        for leading, X_FLs in drive.limbs.items()
-        for limb, X_FL in X_FLs.items()
-    }
-    drawn: dict[geometry.FrameId, list[PerceptionGeometry]] = {
-        f: [] for f in drive.limbs
-    }
-    if led:
-        for one in read_perception_geometry(inspector, led.__contains__):
-            leading, X_FL = led[one.frame_id]
-            drawn[leading].append(replace(one, X_FG=X_FL @ one.X_FG))
-    for leading, geometries in drawn.items():
-        path = f"/moving/{drive.names[leading]}"
-        drawing.draw_body(meshcat, path, geometries)
-        _move(meshcat, animation, path, drive.X_WFs[leading], _TRAFFIC_INTERVAL)
-
-
-def _move(
-    meshcat: geometry.Meshcat,
-    animation: geometry.MeshcatAnimation,
-    path: str,
-    X_WFs: Sequence[RigidTransform],
-    interval: int = 1,
-) -> None:
-    """Moves a path; between frames of an interval the page interpolates."""
-    meshcat.SetTransform(path, X_WFs[0])
-    last = len(X_WFs) - 1
-    for frame in {*range(0, last, interval), last}:
-        animation.SetTransform(frame, path, X_WFs[frame])
-
-
-def _moving_paths(
-    world: World, frame_ids: Iterable[geometry.FrameId]
-) -> dict[str, geometry.FrameId]:
-    """Returns the layer of each moving frame."""
-    paths = {}
-    for frame_id in frame_ids:
-        body = world.plant.GetBodyFromFrameId(frame_id)
-        path = f"/moving/{body.scoped_name()}".replace("::", "/")
-        if body.model_instance() == world.vehicle:
-            path = f"/vehicle/{body.name()}"
-        paths[path] = frame_id
-    return paths
+def _path(world: World, drive: DriveRecord, frame_id: FrameId) -> str:
+    """Returns the layer of a moving frame."""
+    if frame_id in drive.names:
+        return f"/moving/{drive.names[frame_id]}"
+    body = world.plant.GetBodyFromFrameId(frame_id)
+    if body.model_instance() == world.vehicle:
+        return f"/vehicle/{body.name()}"
+    return f"/moving/{body.scoped_name()}".replace("::", "/")
 
 
 @contextlib.contextmanager
@@ -398,3 +370,161 @@ def _gradient(colours: Sequence[np.ndarray] | np.ndarray) -> str:
 
 def _hex(rgb: Rgb | np.ndarray) -> str:
     return "#" + "".join(f"{round(255.0 * value):02x}" for value in rgb)
+
+
+class MeshcatRecorder(LeafSystem):
+    """Follows a drive and saves it as a page (see `make_drive_page`).
+
+    .. pydrake_system::
+
+        name: MeshcatRecorder
+        input_ports:
+        - geometry_query
+        - odometry
+        - specific_force
+        - angular_velocity
+        - <lidar>_scan (one for each LiDAR)
+
+    Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is
+    an `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I
+    [rad/s] are expressed in I; `<lidar>_scan` is a structured array of points
+    expressed in S.
+
+    The poses of all moving frames are recorded at every frame, and the scans
+    whenever the vehicle has gone another `scan_spacing` meters. On a long drive
+    the spacing is doubled as often as needed.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        X_BSs: Mapping[str, RigidTransform],
+        period: float,
+        num_frames: int | None = None,
+        shown: ShownStages | None = None,
+        scan_spacing: float = 15.0,
+    ):
+        """Declares the ports and the schedule.
+
+        Args:
+            X_BSs: LiDAR name -> pose of its frame S in B.
+            period: time between frames [s].
+            num_frames: number of frames to record, if not all.
+            scan_spacing: distance between two shown scans [m].
+        """
+        super().__init__()
+        self._world = world
+        self._shown = shown or ShownStages()
+        self._X_BSs = dict(X_BSs)
+        self._scan_spacing = scan_spacing
+        self._way_to_scan = 0.0
+        self._num_frames = num_frames
+        self.drive = DriveRecord(
+            period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
+        )
+
+        self._geometry_query = self.DeclareAbstractInputPort(
+            "geometry_query", Value(QueryObject())
+        )
+        self._odometry = self.DeclareAbstractInputPort(
+            "odometry", Value(object())
+        )
+        self._specific_force = self.DeclareVectorInputPort("specific_force", 3)
+        self._angular_velocity = self.DeclareVectorInputPort(
+            "angular_velocity", 3
+        )
+        self._scans = {
+            name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
+            for name in self._X_BSs
+        }
+        self.DeclarePeriodicPublishEvent(
+            period_sec=period, offset_sec=0.0, publish=self._publish
+        )
+        self.DeclareForcedPublishEvent(self._publish)
+
+    def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
+        """Adds a moving thing of a unique name; its first frame leads.
+
+        Its limbs stay as at the first frame of the drive.
+        """
+        leading = frames[0]
+        self.drive.X_WFs[leading] = []
+        self.drive.names[leading] = name
+        self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
+
+    def save(self, path: Path, *, title: str = "cns-drake") -> None:
+        """Writes the page of the drive up to now.
+
+        Raises:
+            InputError: if the file cannot be written.
+        """
+        page = make_drive_page(self.drive, self._world, self._shown, title)
+        write_text(path, page)
+
+    def _publish(self, context: Context) -> EventStatus:
+        if len(self.drive.X_WBs) == self._num_frames:
+            return EventStatus.DidNothing()
+        query_object = self._geometry_query.Eval(context)
+        for frame_id, X_WFs in self.drive.X_WFs.items():
+            X_WF = query_object.GetPoseInWorld(frame_id)
+            # Copies: the values of the ports may be overwritten at the next
+            # step.
+            X_WFs.append(RigidTransform(X_WF))
+        if not self.drive.X_WBs:
+            for leading, X_FLs in self.drive.limbs.items():
+                X_FW = self.drive.X_WFs[leading][0].inverse()
+                for limb in X_FLs:
+                    X_FLs[limb] = X_FW @ query_object.GetPoseInWorld(limb)
+        odometry = self._odometry.Eval(context)
+        X_WB = RigidTransform(odometry.X_WB)
+        self.drive.speeds.append(float(odometry.V_WB_B.translational()[0]))
+        self.drive.specific_forces_I.append(
+            self._specific_force.Eval(context).copy()
+        )
+        self.drive.angular_velocities_I.append(
+            self._angular_velocity.Eval(context).copy()
+        )
+        X_WBs = self.drive.X_WBs
+        if X_WBs:
+            step = X_WB.translation() - X_WBs[-1].translation()
+            self._way_to_scan -= float(np.linalg.norm(step))
+        X_WBs.append(X_WB)
+        if self._way_to_scan <= 0.0:
+            self._take_scan(context, X_WB)
+        return EventStatus.Succeeded()
+
+    def _take_scan(self, context: Context, X_WB: RigidTransform) -> None:
+        p_WRset = np.concatenate(
+            [
+                _positions(X_WB @ self._X_BSs[name], scan.Eval(context))
+                for name, scan in self._scans.items()
+            ]
+        )
+        frame = len(self.drive.X_WBs) - 1
+        self.drive.scans.append((frame, _thinned(p_WRset)))
+        if len(self.drive.scans) > _MAX_SCANS:
+            del self.drive.scans[1::2]
+            self._scan_spacing *= 2.0
+        self._way_to_scan = self._scan_spacing
+
+
+def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:
+    """Returns the (N, 3) positions of a scan in the world [m]."""
+    p_SRset = np.column_stack([scan["x"], scan["y"], scan["z"]])
+    return p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
+
+
+def _thinned(p_WRset: np.ndarray) -> np.ndarray:
+    """Returns an evenly spread part of a point set."""
+    cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
+    # One number for each cube, in the order of x, y, z: it is sorted in a
+    # fraction of the time of three.
+    cubes -= cubes.min(axis=0, initial=0)
+    _, num_y, num_z = cubes.max(axis=0, initial=0) + 1
+    numbers = (cubes[:, 0] * num_y + cubes[:, 1]) * num_z + cubes[:, 2]
+    _, first = np.unique(numbers, return_index=True)
+    count = min(len(first), _MAX_POINTS_PER_SCAN)
+    # Points are dropped evenly over the sorted cubes, so on all sides alike.
+    kept = first[np.linspace(0, len(first) - 1, count).astype(int)]
+    return p_WRset[np.sort(kept)]

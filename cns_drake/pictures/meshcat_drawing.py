@@ -52,8 +52,7 @@ def draw_parts(
 ) -> None:
     """Draws parts of a city as one mesh for each class, `<path>/<class>`.
 
-    Args:
-        rgba: colour of all of it; by default each part has its own.
+    Without a colour for all of it, each part has its own.
     """
     by_class: dict[str, list[Part]] = {}
     for part in parts:
@@ -94,11 +93,7 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 def draw_route(
     meshcat: Meshcat, path: str, X_WBs: Sequence[RigidTransform]
 ) -> None:
-    """Draws a route as a ribbon on the ground, red (start) to blue (end).
-
-    Args:
-        X_WBs: poses along the route; its width lies along y of B.
-    """
+    """Draws a route as a ribbon along y of B, red (start) to blue (end)."""
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
     left_W = np.array([X_WB.rotation().matrix()[:, 1] for X_WB in X_WBs])
     step = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1)
@@ -135,11 +130,7 @@ def height_rgb(z: np.ndarray) -> np.ndarray:
 
 
 def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
-    """Draws points coloured by their height, as large near as far away.
-
-    Args:
-        p_WRset: (N, 3) positions in the world [m].
-    """
+    """Draws points (N, 3) in W [m], coloured by height, alike near and far."""
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
     cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T
     rgb = _linear(height_rgb(p_WRset[:, 2]))

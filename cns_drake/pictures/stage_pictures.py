@@ -52,12 +52,9 @@ def load_views(path: Path) -> dict[str, View]:
 def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     """Draws a view of stages side by side, above the scans taken there.
 
-    The LiDAR stands below the camera; its points are seen by the camera,
-    coloured by distance.
-
-    Args:
-        stages: title -> SDF world, from left to right.
-        path: the picture to write; its ending chooses the format.
+    Stages have titles, and are drawn from left to right. The LiDAR stands below
+    the camera; its points are seen by the camera, coloured by distance. The
+    ending of the path chooses the format.
 
     Raises:
         InputError: a world cannot be loaded or the picture not be written.
@@ -87,11 +84,8 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
 def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     """Draws drives side by side, from above, north up.
 
-    All panels show the same piece of the world, so that they compare.
-
-    Args:
-        scenarios: title -> drive.
-        path: the picture to write; its ending chooses the format.
+    Drives have titles. All panels show the same piece of the world, so that
+    they compare. The ending of the path chooses the format.
 
     Raises:
         InputError: a drive cannot be planned, a world cannot be loaded, or the
@@ -166,12 +160,14 @@ def _scan_seen_by(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns pixels of a scan's points and their distances [m]."""
     x, y, z = view.position
-    down = scene.cast_rays(
+    down = scene.scene.cast_rays(
         np.array([x, y, z]), np.array([[0.0, 0.0, -1.0]]), 100.0
     )
     p_WS = np.array([x, y, z - down.ranges[0] + _SENSOR_HEIGHT])
     pattern = make_beam_pattern("cns", FRAME_PERIOD)
-    hits = scene.cast_rays(p_WS, pattern.beams(0).d_Sset, pattern.max_range)
+    hits = scene.scene.cast_rays(
+        p_WS, pattern.beams(0).d_Sset, pattern.max_range
+    )
     hit = np.isfinite(hits.ranges)
     ranges = hits.ranges[hit]
     points = p_WS + ranges[:, None] * pattern.beams(0).d_Sset[hit]

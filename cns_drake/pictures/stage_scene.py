@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, RayHits
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     read_perception_geometry,
@@ -81,7 +81,11 @@ class View(BaseModel):
 
 
 class StageScene:
-    """The geometry of a stage, ready for pictures and scans."""
+    """The geometry of a stage, ready for pictures and scans.
+
+    Attributes:
+        scene: casts rays.
+    """
 
     def __init__(self, path: Path, without: Collection[str] = ()):
         """Loads an SDF world.
@@ -93,7 +97,7 @@ class StageScene:
         self._geometries = read_perception_geometry(
             world.scene_graph.model_inspector()
         )
-        self._scene = RayCastingScene(
+        self.scene = RayCastingScene(
             self._geometries,
             {geometry.frame_id for geometry in self._geometries},
             lambda frame_id: RigidTransform(),
@@ -108,7 +112,7 @@ class StageScene:
     ) -> np.ndarray:
         """Returns the rendered (height, width, 3) picture."""
         return render(
-            self._scene,
+            self.scene,
             self._geometries,
             view.pose(),
             width=width,
@@ -116,12 +120,6 @@ class StageScene:
             fov_y_deg=view.fov_y,
             haze_length=haze_length,
         )
-
-    def cast_rays(
-        self, p_WS: np.ndarray, d_Wset: np.ndarray, max_range: float
-    ) -> RayHits:
-        """Casts rays; see `RayCastingScene.cast_rays`."""
-        return self._scene.cast_rays(p_WS, d_Wset, max_range)
 
 
 def look_at(p_WC: ArrayLike, p_WT: ArrayLike) -> RigidTransform:

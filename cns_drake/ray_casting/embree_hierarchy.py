@@ -289,9 +289,6 @@ class EmbreeScene:
     ):
         """Builds the scene of groups that are placed.
 
-        Args:
-            previous: a scene whose parts for unchanged groups are reused.
-
         Raises:
             MemoryError: Embree cannot build it.
         """

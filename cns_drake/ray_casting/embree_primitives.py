@@ -93,23 +93,13 @@ def _as_primitives(
     surfaces: Sequence[tuple[int, RigidTransform, TriangleSurface]], mask: int
 ) -> Primitives:
     merged, owners = merge_triangles(surfaces)
-    return Primitives(
-        embree.TRIANGLE,
-        [
-            (
-                embree.VERTEX_BUFFER,
-                embree.FLOAT3,
-                merged.p_GVset.astype(np.float32),
-            ),
-            (
-                embree.INDEX_BUFFER,
-                embree.UINT3,
-                merged.triangles.astype(np.uint32),
-            ),
-        ],
-        owners,
-        mask,
-    )
+    vertices = merged.p_GVset.astype(np.float32)
+    corners = merged.triangles.astype(np.uint32)
+    buffers = [
+        (embree.VERTEX_BUFFER, embree.FLOAT3, vertices),
+        (embree.INDEX_BUFFER, embree.UINT3, corners),
+    ]
+    return Primitives(embree.TRIANGLE, buffers, owners, mask)
 
 
 def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
@@ -142,33 +132,27 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
             # ends of flat ones; discs do not tilt.
             discs.append((index, ends, [-axis, axis]))
 
-    for kind, segments in [
+    for kind, segments in (
         (embree.CONE, cones),
         (embree.ROUND_SEGMENT, capsules),
-    ]:
+    ):
+        first_ends = 2 * np.arange(len(segments), dtype=np.uint32)
         if segments:
-            first_ends = 2 * np.arange(len(segments), dtype=np.uint32)
+            ends_of = embree.INDEX_BUFFER, embree.UINT, first_ends
             yield Primitives(
-                kind,
-                [
-                    _vertices(segments),
-                    (embree.INDEX_BUFFER, embree.UINT, first_ends),
-                ],
-                np.array([s[0] for s in segments], np.int32),
+                kind, [_vertices(segments), ends_of], _owners(segments)
             )
     if discs:
         normals = _float32(d[2] for d in discs)
-        yield Primitives(
-            embree.DISC,
-            [_vertices(discs), (embree.NORMAL_BUFFER, embree.FLOAT3, normals)],
-            np.repeat([d[0] for d in discs], 2).astype(np.int32),
-        )
+        facing = embree.NORMAL_BUFFER, embree.FLOAT3, normals
+        owners = np.repeat(_owners(discs), 2)
+        yield Primitives(embree.DISC, [_vertices(discs), facing], owners)
     if spheres:
-        yield Primitives(
-            embree.SPHERE,
-            [_vertices(spheres)],
-            np.array([s[0] for s in spheres], np.int32),
-        )
+        yield Primitives(embree.SPHERE, [_vertices(spheres)], _owners(spheres))
+
+
+def _owners(shapes: Iterable[tuple]) -> np.ndarray:
+    return np.array([owner for owner, *_ in shapes], np.int32)
 
 
 def _cut(

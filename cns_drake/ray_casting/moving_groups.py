@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.ray_casting.ray_groups import Member, Motion, RayGroup
+from cns_drake.ray_casting.ray_groups import Motion, RayGroup
 from cns_drake.scene import surfaces
 
 
@@ -127,14 +127,9 @@ class MovingGroups:
     ) -> Placed:
         """Sets `X_OL`, `motion` and `in_sight` of groups.
 
-        Groups that are out of sight stay where they are, and so do those
-        whose frames have not moved.
-
-        Args:
-            calc_X_WF: gives the pose of a frame in the world.
-            motions: motion of each frame that moves during the turn.
-            known: poses of frames, which replace calls of `calc_X_WF`.
-            seen: the ball in which rays can meet geometry.
+        Groups that are out of sight, beyond the ball `seen`, stay where they
+        are, and so do those whose frames have not moved. Known poses replace
+        calls of `calc_X_WF`.
 
         Returns:
             The groups that were placed.
@@ -199,14 +194,8 @@ class MovingGroups:
 
 def _radius_about_F(group: RayGroup) -> float:
     """Returns the greatest distance of a group's geometry from origin F [m]."""
-    stretch = float(np.linalg.norm(group.X_FL[:3, :3], 2))
-    middle = float(np.linalg.norm(group.X_FL[:3, 3]))
-    return middle + stretch * _radius_about_L(group.members)
-
-
-def _radius_about_L(members: Iterable[Member]) -> float:
     radii = []
-    for _, X_LG, surface in members:
+    for _, X_LG, surface in group.members:
         if isinstance(surface, surfaces.TriangleSurface):
             p_LVset = surface.p_GVset @ X_LG.rotation().matrix().T
             p_LVset = p_LVset + X_LG.translation()
@@ -214,11 +203,10 @@ def _radius_about_L(members: Iterable[Member]) -> float:
             continue
         if isinstance(surface, surfaces.EllipsoidSurface):
             radius = max(surface.semi_axes)
-        elif isinstance(
-            surface, surfaces.CylinderSurface | surfaces.CapsuleSurface
-        ):
-            radius = surface.radius + surface.length / 2.0
-        else:
+        elif isinstance(surface, surfaces.HalfSpaceSurface):
             radius = np.inf
+        else:
+            radius = surface.radius + surface.length / 2.0
         radii.append(float(np.linalg.norm(X_LG.translation())) + radius)
-    return max(radii)
+    stretch = float(np.linalg.norm(group.X_FL[:3, :3], 2))
+    return float(np.linalg.norm(group.X_FL[:3, 3])) + stretch * max(radii)

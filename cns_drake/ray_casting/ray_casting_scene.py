@@ -110,11 +110,8 @@ class RayCastingScene:
     ) -> None:
         """Moves the geometry of the frames that are not anchored.
 
-        Args:
-            calc_X_WF: gives the pose of a frame in the world.
-            motions: motion of each frame that moves during the next casts.
-            known: poses of frames, which replace calls of `calc_X_WF`.
-            seen: the ball in which the next rays can meet geometry.
+        Known poses replace calls of `calc_X_WF`; rays can meet geometry only in
+        the ball `seen`.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):
@@ -196,23 +193,50 @@ class RayCastingScene:
         return RayHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
     def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
-        """Turns normals towards the rays' origins; see `_face_origins`.
+        """Makes normals unit vectors in O that face the origins of rays.
 
         Returns:
-            (N,) whether each ray has met the outside of a surface.
+            (N,) whether each ray has met the outside of a surface, by its
+            winding.
         """
-        is_outside = np.zeros(len(hits.group), bool)
         if self._normal_matrices is None:
             self._normal_matrices = _calc_normal_matrices(self._groups)
-        _face_origins(
-            hits.normals,
-            hits.group,
-            self._normal_matrices,
-            rays.R_OSset,
-            rays.d_Sset,
-            is_outside,
-        )
-        return is_outside
+        d_Oset = rays.d_Oset()
+        return _face_origins(hits, self._normal_matrices, d_Oset)
+
+
+@compiled
+def _face_origins(
+    hits: Hits, normal_matrices: np.ndarray, d_Oset: np.ndarray
+) -> np.ndarray:
+    """See `_face_rays`; normals in L are changed to those in O.
+
+    NumPy takes a quarter of a frame.
+
+    Args:
+        normal_matrices: (G, 3, 3) from a group's frame to O.
+        d_Oset: (N, 3) directions.
+    """
+    is_outside, n = np.zeros(len(hits.group), np.bool_), np.empty(3)
+    normals, group = hits.normals, hits.group
+    for ray in range(len(normals)):
+        if group[ray] < 0:
+            continue
+        M = normal_matrices[group[ray]]
+        square = along = 0.0
+        for i in range(3):
+            n[i] = (
+                M[i, 0] * normals[ray, 0]
+                + M[i, 1] * normals[ray, 1]
+                + M[i, 2] * normals[ray, 2]
+            )
+            square += n[i] * n[i]
+            along += n[i] * d_Oset[ray, i]
+        is_outside[ray] = along <= 0.0
+        scale = np.sqrt(square) if square > 0.0 else 1.0
+        for i in range(3):
+            normals[ray, i] = n[i] / (-scale if along > 0.0 else scale)
+    return is_outside
 
 
 def _cast_on_planes(
@@ -239,62 +263,6 @@ def _cast_on_planes(
         hits.group[nearer] = row
         if hits.normals.shape[1]:
             hits.normals[nearer] = (0.0, 0.0, 1.0)
-
-
-@compiled
-def _face_origins(
-    normals: np.ndarray,
-    group: np.ndarray,
-    normal_matrices: np.ndarray,
-    R_OSset: np.ndarray,
-    d_Sset: np.ndarray,
-    is_outside: np.ndarray,
-) -> None:
-    """Makes normals unit vectors that face the origins of their rays.
-
-    Args:
-        normals: (N, 3) float32 in the frame of each group, to change; zero
-            for a miss.
-        group: (N,) row of each hit's group, -1 for a miss.
-        normal_matrices: (G, 3, 3) from a group's frame to O: the inverse
-            transpose of its X_OL's linear part.
-        R_OSset: (L, 3, 3) orientations of S, taken in turn.
-        d_Sset: (N, 3) directions.
-        is_outside: (N,) bool to fill: whether the ray has met the outside of
-            the surface, by its winding.
-    """
-    n = np.empty(3)
-    turn = -1
-    for ray in range(len(normals)):
-        # Counted along: remainders would take a third of the time.
-        turn = turn + 1 if turn + 1 < len(R_OSset) else 0
-        row = group[ray]
-        if row < 0:
-            continue
-        M = normal_matrices[row]
-        R = R_OSset[turn]
-        length = 0.0
-        along = 0.0
-        for i in range(3):
-            n[i] = (
-                M[i, 0] * normals[ray, 0]
-                + M[i, 1] * normals[ray, 1]
-                + M[i, 2] * normals[ray, 2]
-            )
-            length += n[i] * n[i]
-            along += n[i] * (
-                R[i, 0] * d_Sset[ray, 0]
-                + R[i, 1] * d_Sset[ray, 1]
-                + R[i, 2] * d_Sset[ray, 2]
-            )
-        is_outside[ray] = along <= 0.0
-        scale = np.sqrt(length)
-        if along > 0.0:
-            scale = -scale
-        if scale == 0.0:
-            scale = 1.0
-        for i in range(3):
-            normals[ray, i] = n[i] / scale
 
 
 def _calc_normal_matrices(groups: Sequence[RayGroup]) -> np.ndarray:

@@ -58,10 +58,7 @@ class Motion(NamedTuple):
         return steps
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the motion of F since the start of the turn.
-
-        Args:
-            times: (N,) parts of the turn, from 0 to 1.
+        """Returns the motion of F up to (N,) parts of the turn, from 0 to 1.
 
         Returns:
             (N, 3, 3) rotations, and (N, 3) displacements of F's origin.

@@ -53,9 +53,7 @@ class ModelFinder:
     def find(self, uri: str, folder: Path) -> Path | None:
         """Returns the file or folder of a URI, None if it is not there.
 
-        Args:
-            uri: absolute, `model://<name>/...`, or relative.
-            folder: base of a relative URI.
+        It is absolute, `model://<name>/...`, or relative to the folder.
         """
         rest = uri
         for scheme in _SCHEMES:

@@ -124,9 +124,6 @@ class MeshFiles:
     def read(self, name: str, shape: Mesh | Convex) -> TriangleSurface:
         """Returns the surface of a shape in G.
 
-        Args:
-            shape: a mesh, or the convex hull of one.
-
         Raises:
             InputError: the mesh is missing, cannot be read, or is too large;
                 the geometry is named.

@@ -65,10 +65,6 @@ def referenced_files(
 ) -> dict[str, tuple[str, int]]:
     """Returns the files that a model and the files that it names refer to.
 
-    Args:
-        model: a file of any kind.
-        watch: notes the model and each of these files.
-
     Returns:
         The path relative to the model's folder, or the URI of a file elsewhere
         -> file, and its size.

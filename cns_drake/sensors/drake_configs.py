@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import dataclasses
 from enum import Enum
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, TypeAlias, get_args, get_origin
 
 from drake import lcmt_drake_signal, lcmt_point_cloud
 import numpy as np
@@ -40,7 +40,7 @@ from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.sensors.sensor_config import Section
 
 # What messages are published on.
-Interface = DrakeLcmInterface | LcmInterfaceSystem
+Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
 # Fields of a section that a struct leaves out: `X_PB` stands for the place, and
 # a layout is that of a recording.
 _LEFT_OUT = ("xyz", "rpy_deg", "layout")

@@ -107,11 +107,7 @@ class SensorConfig(Mount, abc.ABC):
 
     @abc.abstractmethod
     def make_message(self, value: Any, frame_id: str, stamp_ns: int) -> Any:
-        """Returns the ROS 2 message of a value of the port.
-
-        Args:
-            stamp_ns: the time [ns].
-        """
+        """Returns the ROS 2 message of a value of the port."""
 
 
 def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:

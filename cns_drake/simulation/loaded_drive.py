@@ -153,10 +153,6 @@ def load_stage(
 ) -> World:
     """Loads the stage of a scenario, with the vehicle in it.
 
-    Args:
-        scenario: names the stage and the passing changes.
-        trajectory: the drive, if already planned.
-
     Raises:
         InputError: the scenario's files cannot be used.
     """
@@ -311,12 +307,7 @@ def load_ways(folder: MapFolder) -> LaneFile:
 
 @functools.lru_cache(maxsize=1)
 def _ways_along(roads: Path, content: bytes) -> LaneFile:
-    """Returns the ways along roads; a ladder asks for them again and again.
-
-    Args:
-        roads: the file.
-        content: its content, since the file may change.
-    """
+    """Returns the ways along roads; a ladder asks for them again and again."""
     network = load_road_network(roads)
     graph = make_lane_graph(network)
     return LaneFile(graph, make_walkways(network, graph))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
@@ -28,9 +28,6 @@ def scan_world(
 ) -> np.ndarray:
     """Returns one scan of the world's models in their initial state.
 
-    Args:
-        returns: the model of a real unit; None for ideal returns.
-
     Returns:
         Structured array of `POINT_DTYPE`, in the sensor frame.
     """
@@ -39,11 +36,7 @@ def scan_world(
 
 
 def still_scene(world: World, pattern: BeamPattern) -> RayCastingScene:
-    """Returns the world's models in their initial state, to cast rays on.
-
-    Args:
-        world: the world; its SceneGraph is used up.
-    """
+    """Returns the world's models in their initial state, to cast rays on."""
     lidar, context = _stand(world, RigidTransform(), pattern)
     return lidar.EvalScene(context)
 
@@ -101,15 +94,10 @@ def _stand(
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
     )
-    context = _make_still_world(world, lidar).CreateDefaultContext()
-    return lidar, lidar.GetMyContextFromRoot(context)
-
-
-def _make_still_world(world: World, lidar: Lidar) -> Diagram:
-    """Makes the Diagram of a world whose models keep their initial state."""
     plant = world.plant
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
+    # The models keep their initial state.
     positions = plant.GetPositions(plant.CreateDefaultContext())
     source = builder.AddNamedSystem("position", ConstantVectorSource(positions))
     to_pose = builder.AddNamedSystem(
@@ -122,4 +110,5 @@ def _make_still_world(world: World, lidar: Lidar) -> Diagram:
         scene_graph.get_source_pose_port(plant.get_source_id()),
     )
     connect_lidar(builder, scene_graph, lidar)
-    return builder.Build()
+    context = builder.Build().CreateDefaultContext()
+    return lidar, lidar.GetMyContextFromRoot(context)

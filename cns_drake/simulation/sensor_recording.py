@@ -83,6 +83,9 @@ def add_mcap_recorder(
         X_BI = odometry.place_of(
             imu.gyroscope.body_index(), imu.gyroscope.pose()
         )
+    variances = 0.0, 0.0
+    if imu is not None and imu.noise is not None and imu.rate is not None:
+        variances = imu.noise.variances(imu.rate)
     fixed = {key: X_BS for key, X_BS in X_BSs.items() if X_BS is not None}
     topics = recording_topics(
         X_BSs,
@@ -108,7 +111,7 @@ def add_mcap_recorder(
             schedule=_make_schedule(
                 topics, _periods(period, rates or {}, lidars, cameras, imu)
             ),
-            imu_variances=_variances(imu),
+            imu_variances=variances,
             start_ns=start_ns,
         ),
     )
@@ -175,12 +178,6 @@ def _make_schedule(
         moving = [one for name, one in periods.items() if name != "imu"]
         by_topic[topic.name] = periods.get(sensor, min(moving))
     return make_schedule(by_topic)
-
-
-def _variances(imu: Imu | None) -> tuple[float, float]:
-    if imu is None or imu.noise is None or imu.rate is None:
-        return 0.0, 0.0
-    return imu.noise.variances(imu.rate)
 
 
 def _place_of(

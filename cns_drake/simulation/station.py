@@ -15,7 +15,7 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
-from cns_drake.pictures.meshcat_recording import MeshcatRecorder
+from cns_drake.pictures.drive_page import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter

@@ -57,9 +57,6 @@ class ImuSection(Mount):
 
         By default it is the rate in Kalibr's file, or else one sample a scan.
 
-        Args:
-            scan_rate: scans per second of the fastest LiDAR.
-
         Raises:
             InputError: Kalibr's file cannot be used.
         """
@@ -95,9 +92,6 @@ class ImuSection(Mount):
 
     def describe_kalibr(self, scan_rate: int) -> dict | None:
         """Returns the fields of Kalibr's file for the IMU as it is simulated.
-
-        Args:
-            scan_rate: scans per second of the fastest LiDAR.
 
         Returns:
             None if there is no such file.

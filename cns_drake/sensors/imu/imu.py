@@ -7,17 +7,14 @@ from dataclasses import dataclass, replace
 import math
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame, RigidBody
 from pydrake.systems.framework import (
-    BasicVector,
     Context,
     DiagramBuilder,
     LeafSystem,
     OutputPort,
     System,
-    ValueProducer,
 )
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
@@ -156,9 +153,6 @@ def add_described_imu(
 ) -> dict[str, OutputPort]:
     """Adds the IMU that a description describes to a diagram.
 
-    Args:
-        scan_rate: scans per second of the fastest LiDAR.
-
     Returns:
         The ports `specific_force` and `angular_velocity`; and `imu_samples`
         of an IMU with a rate or errors of its own.
@@ -198,42 +192,25 @@ class NoisyImu(LeafSystem):
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
-        """Declares the ports.
-
-        Args:
-            rate: samples per second [1/s].
-        """
+        """Declares the ports."""
         super().__init__()
         self._errors = ImuErrors(noise, rate)
         self._rate = rate
         self._inputs = [self.DeclareVectorInputPort(name, 3) for name in _NAMES]
-        # Both ports use the same sample.
-        measured = self.DeclareCacheEntry(
-            "measured",
-            ValueProducer(
-                allocate=lambda: Value(object()), calc=self._calc_measured
-            ),
-            {*(port.ticket() for port in self._inputs), self.time_ticket()},
-        )
-        self._measured = measured
-        for place, name in enumerate(_NAMES):
+        for column, name in ((0, _NAMES[0]), (3, _NAMES[1])):
             self.DeclareVectorOutputPort(
                 name,
                 3,
-                lambda context, output, place=place: self._calc(
-                    place, context, output
+                lambda context, output, column=column: output.SetFromVector(
+                    self._measure(context)[column : column + 3]
                 ),
-                {self.cache_entry_ticket(measured.cache_index())},
             )
 
-    def _calc_measured(self, context: Context, value: AbstractValue) -> None:
+    def _measure(self, context: Context) -> np.ndarray:
+        """Returns the present sample; the last block of errors is kept."""
         sample = math.floor(context.get_time() * self._rate + _SAMPLE_TOLERANCE)
         exact = [
             port.Eval(context) if port.HasValue(context) else np.zeros(3)
             for port in self._inputs
         ]
-        value.set_value(self._errors.measure(sample, np.hstack(exact)[None])[0])
-
-    def _calc(self, place: int, context: Context, output: BasicVector) -> None:
-        measured = self._measured.Eval(context)
-        output.SetFromVector(measured[3 * place : 3 * place + 3])
+        return self._errors.measure(sample, np.hstack(exact)[None])[0]

@@ -81,11 +81,7 @@ class ImuErrors:
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
-        """Prepares the errors.
-
-        Args:
-            rate: samples per second [1/s].
-        """
+        """Prepares the errors."""
         self._noise = noise
         pairs = (
             (noise.accelerometer_noise_density, noise.gyroscope_noise_density),
@@ -127,9 +123,6 @@ class ImuErrors:
 
     def of_block(self, number: int) -> np.ndarray:
         """Returns the errors of many samples.
-
-        Args:
-            number: number of a block of 1024 samples.
 
         Returns:
             (1024, 6) errors from sample 1024 * number on.

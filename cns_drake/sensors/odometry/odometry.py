@@ -53,11 +53,7 @@ class OdometrySensor(LeafSystem):
     """
 
     def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):
-        """Makes the sensor.
-
-        Args:
-            X_PB: pose of the place B on it; by default it is P itself.
-        """
+        """Makes the sensor; by default, B is the body itself."""
         super().__init__()
         self._body = body.index()
         self._X_PB = X_PB

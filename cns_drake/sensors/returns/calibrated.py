@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +14,7 @@ from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides
-from cns_drake.sensors.returns.light import BeamHits, dot, join, texture
+from cns_drake.sensors.returns.light import BeamHits, Shots, dot, join, texture
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
@@ -101,34 +100,25 @@ class CalibratedReturns:
         """
         return max_range + 8.0 * self.sheet.range_noise
 
-    @cached_property
-    def _receivers(self) -> dict[tuple[float, float], Receiver]:
-        return {}
-
-    def _receiver(self, pattern: BeamPattern) -> Receiver:
-        """Returns the receiver for a pattern; earlier ones are kept."""
-        limits = pattern.min_range, pattern.max_range
-        if limits not in self._receivers:
-            sheet, scattering = self.sheet, None
-            if not self.weather.is_clear:
-                scattering = tabulate_scattering(
-                    self.weather,
-                    sheet.budget,
-                    sheet.divergence,
-                    sheet.resolution,
-                    pattern.min_range,
-                )
-            self._receivers[limits] = Receiver(
+    def _receiver(self, min_range: float, max_range: float) -> Receiver:
+        sheet, scattering = self.sheet, None
+        if not self.weather.is_clear:
+            scattering = tabulate_scattering(
+                self.weather,
                 sheet.budget,
-                self.weather.extinction,
+                sheet.divergence,
                 sheet.resolution,
-                *limits,
-                sheet.retro_from,
-                sheet.response,
-                self.echoes,
-                scattering,
+                min_range,
             )
-        return self._receivers[limits]
+        return Receiver(
+            sheet,
+            sheet.budget,
+            self.weather.extinction,
+            min_range,
+            max_range,
+            self.echoes,
+            scattering,
+        )
 
     def measure(
         self,
@@ -193,9 +183,17 @@ class CalibratedReturns:
                 p_Wset, d_Wset, reaches, times=when, with_normals=True
             )
 
-        receiver = self._receiver(pattern)
-        divergence = self.sheet.divergence
-        sides = find_sides(key, turn.beam, turn.orders, met, divergence, reach)
+        shots = Shots(
+            key,
+            turn.beam,
+            p_WSset,
+            times,
+            self.sheet.divergence,
+            reach,
+            materials,
+            cast,
+        )
+        sides = find_sides(shots, turn.orders, met)
         # A single place for all is faster.
         origins = _taken(p_WSset, sides.row)
         when = times[sides.row % len(times)]
@@ -203,32 +201,18 @@ class CalibratedReturns:
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
         )
         rest = meet_sides(sides, side_met, met)
-        lights, ways, ways_met = start_ways(
-            key,
-            turn.beam,
-            p_WSset,
-            times,
-            rest,
-            met,
-            sides,
-            side_met,
-            materials,
-        )
-        followed = follow(
-            ways, ways_met, materials, receiver.budget, divergence, reach, cast
-        )
-        light = join([*lights, *followed])
+        lights, ways, ways_met = start_ways(shots, rest, met, sides, side_met)
+        receiver = self._receiver(pattern.min_range, pattern.max_range)
+        followed = follow(shots, ways, ways_met, receiver.budget.scale)
         light = texture(
-            light,
+            join([*lights, *followed]),
             turn.orders[1],
             np.asarray(p_WSset, float),
             met.d_Wset,
             materials,
             *scene.surface_frames(),
         )
-        return report_echoes(
-            light, receiver, key, len(turn.beam), turn.range_error, turn.gain
-        )
+        return report_echoes(light, receiver, key, turn.range_error, turn.gain)
 
     def turn(self, beams: Beams) -> CalibratedTurn:
         """Returns the beams of a turn, with the errors of the unit."""

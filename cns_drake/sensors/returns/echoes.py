@@ -1,6 +1,5 @@
 """Echoes: what a unit reports of the returning light of each beam."""
 
-from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
@@ -21,7 +20,7 @@ from cns_drake.sensors.returns.link_budget import (
     target_snr,
 )
 from cns_drake.sensors.returns.random_numbers import normal, uniform
-from cns_drake.sensors.returns.unit_sheets import Response
+from cns_drake.sensors.returns.unit_sheets import UnitSheet
 from cns_drake.sensors.returns.weather import Scattering
 
 # The index of the weather, in place of a geometry's.
@@ -39,27 +38,23 @@ _FULL_RETRO = 1e4
 _FULL_INTENSITY = 255.0
 
 
-@dataclass(frozen=True)
-class Receiver:
+class Receiver(NamedTuple):
     """The receiver of a unit.
 
     Attributes:
+        sheet: the unit's.
         budget: its link budget.
         extinction: the weather's [1/m].
-        resolution: echoes nearer to each other are one [m].
         min_range, max_range: limits of reported ranges [m].
-        retro_from, response: see `UnitSheet`.
         choice: the echoes that it reports.
         scattering: by the weather; None in clear air.
     """
 
+    sheet: UnitSheet
     budget: LinkBudget
     extinction: float
-    resolution: float
     min_range: float
     max_range: float
-    retro_from: float
-    response: Response
     choice: Echoes
     scattering: Scattering | None
 
@@ -107,7 +102,6 @@ def report_echoes(
     light: Light,
     receiver: Receiver,
     key: np.uint64,
-    num_beams: int,
     range_error: np.ndarray,
     gain: np.ndarray,
 ) -> Reported:
@@ -118,13 +112,10 @@ def report_echoes(
     has the standard deviation that belongs to that.
 
     Args:
-        light: all of the turn.
-        receiver: the unit's.
-        key: the frame's; see `frame_key`.
-        num_beams: number of beams of the turn.
-        range_error: (num_beams,) of each beam's laser [m].
-        gain: (num_beams,) of each beam's laser.
+        range_error: (N,) of each beam's laser [m].
+        gain: (N,) of each beam's laser.
     """
+    num_beams = len(gain)
     count = np.bincount(light.beam, minlength=num_beams)
     is_alone = count[light.beam] == 1
     alone = _single(
@@ -175,7 +166,7 @@ def _merge(light: Light, receiver: Receiver) -> _Pulses:
     budget = receiver.budget
     light = select(light, np.lexsort((light.distance, light.beam)))
     distance = light.distance
-    number = _number_echoes(light.beam, distance, receiver.resolution)
+    number = _number_echoes(light.beam, distance, receiver.sheet.resolution)
     kept = number < _MOST_ECHOES
     light, distance, number = select(light, kept), distance[kept], number[kept]
 
@@ -204,15 +195,7 @@ def _drops(
     key: np.uint64,
     num_beams: int,
 ) -> _Pulses:
-    """Returns the echoes of drops in front of surfaces.
-
-    Args:
-        surfaces: their echoes.
-        receiver: the unit's.
-        scattering: its detected echoes of drops.
-        key: the frame's.
-        num_beams: number of beams of the turn.
-    """
+    """Returns the echoes of drops in front of surfaces."""
     distances, counts = scattering.distances, scattering.counts
     # Drops are arrivals of a Poisson process, in units of their mean number.
     # The first one of most beams is beyond the farthest end of any.
@@ -267,14 +250,7 @@ def _fog(
     scattering: Scattering,
     key: np.uint64,
 ) -> _Pulses:
-    """Returns the echoes of fog in front of the nearest light of beams.
-
-    Args:
-        nearest: (num_beams,) distance of that light [m].
-        receiver: the unit's.
-        scattering: its echoes of fog.
-        key: the frame's.
-    """
+    """Returns the echoes of fog in front of the nearest light of beams [m]."""
     beam = np.flatnonzero(nearest > 0.0)
     share = uniform(key, beam, _FIRST_DROP_DRAW + 2 * _MOST_DROPS)
     distance = np.interp(share, scattering.fog_counts, scattering.distances)
@@ -406,7 +382,7 @@ def _intensity(
     It is a whole number: by the unit's response up to a reflectivity of 1,
     logarithmic above.
     """
-    unit, retro_from = receiver.response, receiver.retro_from
+    unit, retro_from = receiver.sheet.response, receiver.sheet.retro_from
     rest, draw = _FULL_INTENSITY - retro_from, _first_draw(pulses)
     energy = pulses.energy
     intensity, is_above = retro_from * energy, energy > 1.0

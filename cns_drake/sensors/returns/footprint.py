@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.sensors.returns.light import BeamHits, dot
+from cns_drake.sensors.returns.light import BeamHits, Shots, dot
 from cns_drake.sensors.returns.random_numbers import uniform
 
 # Numbers of a beam's draws for the rays at its sides, two each.
@@ -46,14 +46,7 @@ class Sides(NamedTuple):
     reach: np.ndarray
 
 
-def find_sides(
-    key: np.uint64,
-    beam: np.ndarray,
-    orders: np.ndarray,
-    hits: BeamHits,
-    divergence: float,
-    max_range: float,
-) -> Sides:
+def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     """Returns rays to cast where neighbours meet different surfaces.
 
     Two neighbours meet one surface, or two that touch, if one place is on the
@@ -61,14 +54,10 @@ def find_sides(
     between them: within one of their beams, or in the gap.
 
     Args:
-        key: the frame's; see `frame_key`.
-        beam: (N,) number of each beam.
-        orders: (2, N) orders of the rays in which neighbours follow.
+        orders: (2, N) orders of the beams in which neighbours follow.
         hits: by the axes of the beams.
-        divergence: half angle of a beam [rad].
-        max_range: range of the rays [m].
     """
-    farthest = _NEIGHBOURS * divergence
+    farthest = _NEIGHBOURS * shots.divergence
     edges = [_find_edges(order, hits, farthest) for order in orders]
     row = np.concatenate([pairs.ravel() for pairs in edges])
     neighbour = np.concatenate([pairs[:, ::-1].ravel() for pairs in edges])
@@ -79,19 +68,19 @@ def find_sides(
     d, d_j = hits.d_Wset[row], hits.d_Wset[neighbour]
     toward = d_j - dot(d, d_j)[:, None] * d
     toward /= np.sqrt(dot(toward, toward))[:, None]
-    share = _share(len(beam), row, number, toward)
+    share = _share(len(shots.beam), row, number, toward)
     kept = share > 0.0
     row, neighbour, number = row[kept], neighbour[kept], number[kept]
     toward, share = toward[kept], share[kept]
 
     # Random places of the sides.
     draw = _SIDE_DRAW + 2 * number
-    rest = 1.0 - uniform(key, beam[row], draw)
-    turn = uniform(key, beam[row], draw + 1) - 0.5
+    rest = 1.0 - uniform(shots.key, shots.beam[row], draw)
+    turn = uniform(shots.key, shots.beam[row], draw + 1) - 0.5
     angle = 2.0 * np.pi * share * turn
     d_Wset, reach = np.empty_like(toward), np.empty(len(row), np.float32)
     sides = Sides(row, neighbour, number, share, d_Wset, reach)
-    _aim(sides, toward, rest, angle, hits, divergence, max_range)
+    _aim(sides, toward, rest, angle, hits, shots.divergence, shots.max_range)
     return sides
 
 
@@ -112,7 +101,8 @@ def _aim(
         toward: (P, 3) unit vectors across the beams, to the neighbours.
         rest: (P,) part of a beam's light farther from its axis.
         angle: (P,) between `toward` and the way to the ray [rad].
-        hits, divergence, max_range: see `find_sides`.
+        hits: by the axes of the beams.
+        divergence, max_range: see `Shots`.
     """
     for side in range(len(rest)):
         i, j = sides.row[side], sides.neighbour[side]
@@ -210,11 +200,6 @@ def _range_on(hits: BeamHits, i: int, d_W: np.ndarray) -> float:
     """Returns a ray's range at the plane of the i-th hit [m].
 
     It is inf if the ray does not meet the plane, or there is no hit.
-
-    Args:
-        hits: all of them.
-        i: which one.
-        d_W: (3,) direction of the ray.
     """
     along = 0.0
     for axis in range(3):
@@ -257,12 +242,7 @@ def _find_edges(
 
 @compiled
 def _touch(a: BeamHits, i: int, b: BeamHits, j: int) -> bool:
-    """Returns whether the planes of two places are one, or meet in between.
-
-    Args:
-        a, i: a place: the hit of the i-th of these rays.
-        b, j: another place.
-    """
+    """Returns whether the planes of two places are one, or meet in between."""
     if a.geometry[i] < 0 or b.geometry[j] < 0:
         return False
     # -n . d for the plane of each and the direction of the other.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -69,6 +69,31 @@ class BeamHits(NamedTuple):
             hits.is_outside,
             np.clip(-dot(hits.normals_W, d_Wset), 0.0, 1.0),
         )
+
+
+class Shots(NamedTuple):
+    """The N beams of a turn, in the order of casting.
+
+    Attributes:
+        key: the frame's; see `frame_key`.
+        beam: (N,) number of each beam.
+        p_WSset: (K, 3) places of the lasers, taken in turn.
+        times: (T,) float32 parts of the turn at which they fire, taken in turn.
+        divergence: half angle of a beam [rad].
+        max_range: how far light is followed [m].
+        materials: materials of all geometries.
+        cast: casts rays of origins (N, 3), directions (N, 3) and times (N,),
+            each no farther than its own reach (N,).
+    """
+
+    key: np.uint64
+    beam: np.ndarray
+    p_WSset: np.ndarray
+    times: np.ndarray
+    divergence: float
+    max_range: float
+    materials: Materials
+    cast: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], RayHits]
 
 
 class Light(NamedTuple):

@@ -9,68 +9,21 @@ minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at 30 m) and EN 12899-1
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.structure_table import StructureTable
+from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.scene.surfaces import HalfSpaceSurface, Surface, TriangleSurface
 
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)
 
-# Class -> reflectivity of a dark and of a bright colour; equal if the colour
-# has no influence near 900 nm.
-_BY_CLASS = {
-    "unlabeled": (0.15, 0.65),
-    "outlier": (0.15, 0.65),
-    "car": (0.05, 0.80),
-    "bicycle": (0.10, 0.50),
-    "motorcycle": (0.10, 0.50),
-    "bus": (0.05, 0.80),
-    "truck": (0.05, 0.80),
-    "other-vehicle": (0.05, 0.80),
-    "person": (0.20, 0.60),
-    "bicyclist": (0.20, 0.60),
-    "motorcyclist": (0.20, 0.60),
-    "road": (0.15, 0.15),
-    "parking": (0.15, 0.15),
-    "sidewalk": (0.30, 0.30),
-    "other-ground": (0.25, 0.35),
-    "building": (0.20, 0.60),
-    "fence": (0.20, 0.50),
-    "other-structure": (0.20, 0.60),
-    "vegetation": (0.50, 0.50),
-    "trunk": (0.30, 0.30),
-    "terrain": (0.45, 0.45),
-    "pole": (0.20, 0.50),
-    "traffic-sign": (0.20, 0.50),
-    "other-object": (0.10, 0.70),
-}
-# Classes of smooth surfaces, which reflect after Lambert, and those of leaves.
-_SMOOTH = {c for c in _BY_CLASS if c.endswith("car") or "vehicle" in c} | {
-    *("bus", "truck", "motorcycle", "traffic-sign", "vegetation")
-}
-# Rough surfaces follow Oren and Nayar (1994), with slopes of 30 deg: 0.77 times
-# the cosine and 0.34 times the square of the sine, here over the first one.
-_OREN_NAYAR = 0.44
-# How far albedo differs from its mean within a surface, as a part of it, in
-# grains, and more so in patches; and how far beams end in front of it and
-# behind it [m]: in gravel, among leaves, on joints.
-_TEXTURE = {
-    "road": (0.25, 0.01),
-    "parking": (0.25, 0.01),
-    "sidewalk": (0.2, 0.015),
-    "building": (0.25, 0.02),
-    "terrain": (0.4, 0.02),
-    "vegetation": (0.4, 0.2),
-    "trunk": (0.3, 0.04),
-}
-_OTHER_TEXTURE, _SMOOTH_TEXTURE = (0.2, 0.02), (0.05, 0.0)
-# Height of tufts of rough grass, and how far courses, sills and what hangs on
-# fronts stand out [m].
-_TUFTS, _FITTINGS = {"terrain": 0.15}, {"building": 0.35}
+# Class -> its fields, which the file explains.
+_CLASSES = parse_yaml(Path(__file__).with_name("materials.yaml").read_bytes())
 # Diffuse light from dust on a pane, and from water.
 _GLASS_DUST = 0.02
 _WATER = 0.02
@@ -84,7 +37,6 @@ _LEAF_AREA_DENSITY = 1.5
 # Reflection of wet ground: a film of n = 1.33 reflects scattered light back to
 # the rough surface (Angstrom, 1925).
 _FILM_INNER = 1.0 - (1.0 - 0.066) / 1.33**2
-_WET_CLASSES = {"road", "parking", "sidewalk", "other-ground"}
 
 
 class Materials(NamedTuple):
@@ -127,67 +79,53 @@ def find_materials(
     The perception property ("lidar", "reflectivity") wins over the column
     `reflectivity` of a table of structures, and that over class and colour.
     Surfaces of a given reflectivity are even and reflect after Lambert.
-
-    Args:
-        geometries: geometries of the scene.
-        structures: structures of all geometries.
-        is_wet: whether the ground is wet.
     """
-    table = [_material(geometry, structures) for geometry in geometries]
-    if is_wet:
-        table = [
-            (kind, _wet(rho), density)
-            if structures[geometry.structure].semantic_class in _WET_CLASSES
-            and kind == LAMBERT
-            else (kind, rho, density)
-            for geometry, (kind, rho, density) in zip(
-                geometries, table, strict=True
-            )
-        ]
-    kinds, rhos, densities = zip(*table, strict=True) if table else ((),) * 3
-    surfaces = [
-        _surface(geometry, structures, kind)
-        for geometry, kind in zip(geometries, kinds, strict=True)
+    rows = [
+        _material(geometry, structures[geometry.structure], is_wet)
+        for geometry in geometries
     ]
-    surface = np.array(surfaces, np.float32).reshape(-1, 5).T
+    empty: list[tuple] = [()] * len(Materials._fields)
+    kinds, *others = zip(*rows, strict=True) if rows else empty
     return Materials(
         np.array(kinds, np.uint8),
-        np.array(rhos, np.float32),
-        np.array(densities, np.float32),
-        *np.ascontiguousarray(surface),
+        *(np.array(values, np.float32) for values in others),
     )
 
 
-def _surface(
-    geometry: PerceptionGeometry, structures: StructureTable, kind: int
+def _material(
+    geometry: PerceptionGeometry, entry: StructureEntry, is_wet: bool
 ) -> tuple[float, ...]:
-    """Returns `rough` and what follows it in `Materials`."""
-    entry = structures[geometry.structure]
+    """Returns the row of a geometry in `Materials`."""
+    kind, reflectivity, density = _reflection(geometry, entry)
+    fields = _CLASSES[entry.semantic_class]
+    if is_wet and kind == LAMBERT and fields.get("gets_wet"):
+        reflectivity = _wet(reflectivity)
     given = geometry.reflectivity, entry.reflectivity
     if kind not in (LAMBERT, LEAVES, SPRAYS) or given != (None, None):
-        return (0.0,) * 5
-    name = entry.semantic_class
-    smooth = name in _SMOOTH
-    other = _SMOOTH_TEXTURE if smooth else _OTHER_TEXTURE
-    contrast, relief = _TEXTURE.get(name, other)
-    # A volume of leaves has depth in any case.
-    if kind == LEAVES:
-        relief = 0.0
-    rough = 0.0 if smooth else _OREN_NAYAR
-    standing = _TUFTS.get(name, 0.0), _FITTINGS.get(name, 0.0)
-    return rough, contrast, relief, *standing
+        return kind, reflectivity, density, 0.0, 0.0, 0.0, 0.0, 0.0
+    return (
+        kind,
+        reflectivity,
+        density,
+        fields["rough"],
+        fields["contrast"],
+        # A volume of leaves has depth in any case.
+        0.0 if kind == LEAVES else fields["relief"],
+        fields.get("tufts", 0.0),
+        fields.get("fittings", 0.0),
+    )
 
 
-def _material(
-    geometry: PerceptionGeometry, structures: StructureTable
+def _reflection(
+    geometry: PerceptionGeometry, entry: StructureEntry
 ) -> tuple[int, float, float]:
-    entry = structures[geometry.structure]
+    """Returns kind, reflectivity and leaf area density."""
     given = geometry.reflectivity
     if given is None:
         given = entry.reflectivity
     if given is not None:
         return LAMBERT, given, 0.0
-    dark, bright = _BY_CLASS[entry.semantic_class]
+    dark, bright = _CLASSES[entry.semantic_class]["reflectivity"]
     part = geometry.name.rpartition("/")[2]
     words = set(part.split("_"))
     if words & {"glass", "panes", "windows"}:

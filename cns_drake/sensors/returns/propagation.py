@@ -9,23 +9,21 @@ equations for both of its faces. Light scattered by dust on it comes back
 directly, and so does mirrored light if the beam meets the pane at right angles.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.ray_casting.ray_casting_scene import RayHits
 from cns_drake.sensors.returns.footprint import Sides
 from cns_drake.sensors.returns.light import (
     BeamHits,
     Light,
+    Shots,
     join,
     reflect,
     reflected,
     select,
 )
-from cns_drake.sensors.returns.link_budget import LinkBudget
 from cns_drake.sensors.returns.materials import GLASS, LEAVES, SPRAYS, Materials
 from cns_drake.sensors.returns.random_numbers import uniform
 
@@ -47,10 +45,6 @@ _FAINT_SNR = 3.0
 _FLATNESS = 2e-3
 # Numbers of a beam's draws for leaves, one for each of its rays.
 _LEAF_DRAW = 8
-
-# Casts rays of origins (N, 3), directions (N, 3) and times (N,), each no
-# farther than its own reach (N,).
-Cast = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], RayHits]
 
 
 class Ways(NamedTuple):
@@ -80,32 +74,24 @@ class Ways(NamedTuple):
 
 
 def start_ways(
-    key: np.uint64,
-    beam: np.ndarray,
-    p_WSset: np.ndarray,
-    times: np.ndarray,
+    shots: Shots,
     rest: np.ndarray,
     hits: BeamHits,
     sides: Sides,
     side_hits: BeamHits,
-    materials: Materials,
 ) -> tuple[list[Light], Ways, BeamHits]:
     """Returns what opaque surfaces send back, and the rays that meet others.
 
     Args:
-        key: the frame's; see `frame_key`.
-        beam: (N,) number of each beam.
-        p_WSset: (K, 3) positions of S, taken in turn.
-        times: (T,) float32 parts of the turn, taken in turn.
         rest: (N,) part of the light that its axis represents.
         hits: by the axes of the beams.
         sides: rays at the sides of beams.
         side_hits: by those; misses do not count.
-        materials: materials of all geometries.
 
     Returns:
         The light, the rays that meet panes or leaves, and what they meet.
     """
+    beam, materials = shots.beam, shots.materials
     is_open = np.isin(materials.kind, (GLASS, LEAVES, SPRAYS))
     axes = np.flatnonzero((hits.geometry >= 0) & (rest > 0.0))
     lit = np.flatnonzero(side_hits.geometry >= 0)
@@ -131,12 +117,12 @@ def start_ways(
     met = join([select(hits, k), select(side_hits, n)])
     # The leaf area before the first leaf is exponential with a mean of 1.
     sub = np.concatenate([np.zeros_like(k), 1 + sides.number[n]])
-    depth = -np.log(1.0 - uniform(key, beam[row], _LEAF_DRAW + sub))
+    depth = -np.log(1.0 - uniform(shots.key, beam[row], _LEAF_DRAW + sub))
     ways = Ways(
         beam[row],
-        p_WSset[row % len(p_WSset)],
+        shots.p_WSset[row % len(shots.p_WSset)],
         met.d_Wset,
-        times[row % len(times)],
+        shots.times[row % len(shots.times)],
         np.zeros(len(row)),
         np.concatenate([rest[k], sides.share[n]]),
         depth,
@@ -148,11 +134,7 @@ def start_ways(
 
 @compiled
 def pane_shares(cosine: float) -> tuple[float, float]:
-    """Returns the reflected and the transmitted part of light at a pane.
-
-    Args:
-        cosine: cosine of the angle of incidence.
-    """
+    """Returns the reflected and the transmitted part of light at a pane."""
     n = _GLASS_INDEX
     sine = np.sqrt(max(1.0 - cosine**2, 0.0)) / n
     inner = np.sqrt(1.0 - sine**2)
@@ -165,34 +147,24 @@ def pane_shares(cosine: float) -> tuple[float, float]:
 
 
 def follow(
-    ways: Ways,
-    met: BeamHits,
-    materials: Materials,
-    budget: LinkBudget,
-    divergence: float,
-    max_range: float,
-    cast: Cast,
+    shots: Shots, ways: Ways, met: BeamHits, scale: float
 ) -> list[Light]:
     """Returns the light that comes back.
 
     Args:
-        ways: the rays of the beams.
+        ways: the rays of the beams that go on.
         met: their hits.
-        materials: materials of all geometries.
-        budget: the unit's.
-        divergence: half angle of a beam [rad].
-        max_range: greatest distance of followed light [m].
-        cast: casts the continued rays.
+        scale: see `LinkBudget`.
     """
     found: list[Light] = []
     for step in range(_MOST_STEPS):
         light, ways = _step(
-            ways, met, materials, budget.scale, divergence, max_range
+            ways, met, shots.materials, scale, shots.divergence, shots.max_range
         )
         found.append(light)
         if not len(ways.beam) or step + 1 == _MOST_STEPS:
             break
-        hits = cast(ways.p_Wset, ways.d_Wset, ways.time, ways.reach)
+        hits = shots.cast(ways.p_Wset, ways.d_Wset, ways.time, ways.reach)
         met = BeamHits.of(ways.d_Wset, hits)
     return found
 
@@ -209,10 +181,6 @@ def _step(
     """Takes each ray to its hit.
 
     NumPy takes ten times as long, a twelfth of a frame.
-
-    Args:
-        ways, met, materials, divergence, max_range: see `follow`.
-        scale: see `LinkBudget`.
 
     Returns:
         The returning light, and the continued rays.

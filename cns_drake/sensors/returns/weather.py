@@ -17,6 +17,7 @@ back-scatter coefficient of 0.046 / V [1/(m sr)] (Rasshofer et al., 2011).
 """
 
 from dataclasses import dataclass
+import functools
 import math
 from typing import NamedTuple
 
@@ -145,6 +146,7 @@ class Scattering(NamedTuple):
 _QUANTILES = (np.arange(16) + 0.5) / 16
 
 
+@functools.lru_cache(maxsize=8)
 def tabulate_scattering(
     weather: Weather,
     budget: LinkBudget,

@@ -30,8 +30,10 @@ def test_points_are_what_numpy_makes_of_the_beams(step, is_apart):
     label = rng.integers(0, 255, 9).astype(np.uint8)
     instance = rng.integers(0, 60_000, 9).astype(np.uint16)
     returns = Returns(beams, ranges, intensity)
-    scan = assemble_points(table, returns, met, label, instance, step)
-    assert scan.dtype == POINT_DTYPE
+    scan = np.zeros(len(beams), POINT_DTYPE)
+    assemble_points(
+        scan, table, returns, met, label, instance, np.float32(step)
+    )
     expected = table.d_Sset[beams] * ranges[:, None]
     if is_apart:
         expected += table.p_Sset[beams]
