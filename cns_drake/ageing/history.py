@@ -7,8 +7,9 @@ a shorter one does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+import itertools
 import math
 import re
 
@@ -32,7 +33,6 @@ from cns_drake.city.growth.stage_structures import (
     use_by_size,
 )
 from cns_drake.city.placement.frontage import lines_along, lot_at
-from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
 
@@ -98,12 +98,11 @@ class _Lot:
 
     Attributes:
         number: of the lot in the city.
-        plot: its ground.
         height: that of the buildings usual there [m].
         building: name of its building.
         parts: names of annexes, storeys, balconies.
-        finished: year in which the coming building will stand.
-        coming: the coming building.
+        finished, coming: the coming building, and the year in which it will
+            stand.
         old: the building that it replaces, if any.
     """
 
@@ -164,11 +163,7 @@ class City:
     ):
         """Begins today.
 
-        Args:
-            world: the city of today.
-            rates: event -> rate a year.
-            seed: the seed of all draws.
-            kept_free: the ways of drives, where nothing is put up, in W [m].
+        Nothing is put up where drives lead, the area kept free in W [m].
 
         Raises:
             InputError: the city has no lots.
@@ -240,27 +235,22 @@ class City:
         self, area: BaseGeometry, ignored: Sequence[str] = ()
     ) -> list[str]:
         """Returns the names of what stands on an area of W, but for ground."""
+        rows = sorted(self._tree.query(area, predicate="intersects"))
         found = [
-            self._names[k]
-            for k in sorted(self._tree.query(area, predicate="intersects"))
+            name
+            for name in map(self._names.__getitem__, rows)
+            if name in self.standing and name not in self._added
         ]
-        found = [name for name in found if name in self.standing]
-        found = [name for name in found if name not in self._added]
         found += [n for n, foot in self._added.items() if foot.intersects(area)]
         return [
             name
             for name in found
-            if name not in ignored and not self._is_ground(name)
+            if name not in ignored and self._class(name) not in _GROUND
         ]
 
-    def _is_ground(self, name: str) -> bool:
-        return self._class(name) in _GROUND
-
     def _class(self, name: str) -> str:
-        one = self.new.get(name)
-        if one is not None:
-            return one.semantic_class
-        return self._world.things[name].semantic_class
+        one = self.new.get(name) or self._world.things[name]
+        return one.semantic_class
 
     def _foot(self, name: str) -> BaseGeometry:
         return self._added.get(name, self._feet.get(name, Polygon()))
@@ -298,7 +288,7 @@ class City:
         A building may reach into the ground.
         """
         x0, y0, x1, _ = plot.inside(plot.area).bounds
-        at = plots.place(plot, (x0 + x1) / 2, y0 - 1.0)
+        at = plot.place((x0 + x1) / 2, y0 - 1.0)
         z = self._world.ground.heights(np.array([at]))[0]
         is_known = np.isfinite(z) and z > default - 0.5
         return round(float(z), 3) if is_known else default
@@ -323,12 +313,9 @@ class City:
         if open_ground.is_empty:
             return lots
         shapely.prepare(open_ground)
-        lines = [
-            line
-            for setback in _SETBACKS
-            for line in lines_along(streets, open_ground, setback)
-        ]
-        for line in lines:
+        for line in itertools.chain.from_iterable(
+            lines_along(streets, open_ground, setback) for setback in _SETBACKS
+        ):
             start = 0.0
             while start < line.length - _PLOT_WIDTHS[-1]:
                 area = _fitting_plot(line, start, open_ground, taken)
@@ -492,16 +479,10 @@ class City:
     def _leave_empty(self, lot: _Lot) -> None:
         """Uses an empty lot as a car park, a market, a yard or a garden."""
         name = f"lot_{self.year:03d}y_{lot.number:03d}"
-        bare = lot.plot.thing(
-            name,
-            "building",
-            replace(
-                assemble(),
-                footprint=lot.plot.inside(lot.plot.area.buffer(-0.5)),
-            ),
-        )
+        ground = lot.plot.inside(lot.plot.area.buffer(-0.5))
+        model = replace(assemble(), footprint=ground)
+        bare = lot.plot.thing(name, "building", model)
         cars = {"hatchback": 3.0, "saloon": 3.0, "estate": 2.0, "van": 1.0}
-        cars = {k: v for k, v in cars.items() if k in OBJECTS}
         rng = self._rng("lot", name)
         for one in lot_objects(bare, use_by_size(bare), cars, rng):
             if not self.near(one.footprint_W):
@@ -524,9 +505,8 @@ class City:
             self._tell("frame", coming.name, one.name)
             return
         self._put(coming)
-        plot = plots.building_plot(coming)
         lot.building, lot.coming, lot.finished = coming.name, None, 0
-        lot.plot = replace(plot, area=plot.area)
+        lot.plot = plots.building_plot(coming)
         lot.height = float(top_of(coming.model))
         if lot.old:
             self._tell("replaced", lot.old, coming.name)
@@ -570,24 +550,25 @@ class City:
         assert name is not None
         rng = self._rng("extended", name)
         triangles = self._triangles(name)
-        makers: list[Callable[[], Structure | None]] = [
-            lambda: plots.annex_to(
-                lot.plot,
-                triangles,
-                f"{name}_annex_{self.year:03d}y",
-                lambda area: self._is_free(area, name),
-                rng,
-            ),
-        ]
+        order = ["annex"]
         is_raised = any("_storey_" in part for part in lot.parts)
         if lot.height < _HIGHEST_RAISED and not is_raised:
-            makers.insert(
-                int(rng.integers(2)),
-                lambda: plots.storey_on(
-                    lot.plot, triangles, f"{name}_storey_{self.year:03d}y", rng
-                ),
-            )
-        one = next((one for make in makers if (one := make())), None)
+            order.insert(int(rng.integers(2)), "storey")
+        one = None
+        for kind in order:
+            new = f"{name}_{kind}_{self.year:03d}y"
+            if kind == "storey":
+                one = plots.storey_on(lot.plot, triangles, new, rng)
+            else:
+                one = plots.annex_to(
+                    lot.plot,
+                    triangles,
+                    new,
+                    lambda area: self._is_free(area, name),
+                    rng,
+                )
+            if one is not None:
+                break
         if one is None:
             self._tell("extended", name, detail="within its walls")
             return
@@ -596,17 +577,16 @@ class City:
         self._tell("extended", name, one.name)
 
     def _is_free(self, area: BaseGeometry, building: str) -> bool:
-        if area.intersects(self._world.streets):
-            return False
-        if area.intersects(self._kept_free):
-            return False
-        return not self.near(area, (building,))
+        return not (
+            area.intersects(self._world.streets)
+            or area.intersects(self._kept_free)
+            or self.near(area, (building,))
+        )
 
     def _triangles(self, name: str) -> np.ndarray:
         if name in self._world.things and self.standing[name] is None:
             return self._world.triangles(name)
-        one = self._structure(name)
-        return plots.structure_triangles(one)
+        return plots.structure_triangles(self._structure(name))
 
     def _renew(self, lot: _Lot) -> None:
         name = lot.building

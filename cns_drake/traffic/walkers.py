@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.traffic.lane_graph import SPACING, Walkway
+from cns_drake.traffic.lane_graph import SPACING, Walkway, length_of
 from cns_drake.traffic.overlaps import boxes_overlap
 from cns_drake.traffic.right_of_way import WALK_GROUP
 from cns_drake.traffic.streets import STEP
@@ -108,11 +108,7 @@ class Paths(NamedTuple):
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
     """Returns the number of walkers for whom sidewalks have room."""
-    length = sum(
-        np.linalg.norm(np.diff(way.points, axis=0), axis=1).sum()
-        for way in walkways
-        if way.crossing < 0
-    )
+    length = sum(length_of(way.points) for way in walkways if way.crossing < 0)
     return int(length // _WALKER_SPACE)
 
 
