@@ -179,12 +179,12 @@ def past(
     standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)
     events = []
     for name, thing in world.things.items():
-        since = None if thing.built is None else thing.built - world.today
-        if since is not None and since > year:
-            events.append(Event(since, "built", name))
+        built = world.built.get(name)
+        if built is not None and built - world.today > year:
+            events.append(Event(built - world.today, "built", name))
             del standing[name]
             lot = world.structure(name)
-            rng = np.random.default_rng(thing.built)
+            rng = np.random.default_rng(built)
             use = stage_structures.use_by_size(lot)
             for one in stage_structures.lot_objects(
                 lot, use, {"hatchback": 1}, rng

@@ -20,7 +20,7 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing import plots
-from cns_drake.ageing.old_world import OldThing, OldWorld
+from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import Plot
 from cns_drake.ageing.rates import Tally
 from cns_drake.base.errors import InputError
@@ -35,6 +35,7 @@ from cns_drake.city.growth.stage_structures import (
 from cns_drake.city.placement.frontage import lines_along, lot_at
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
+from cns_drake.transient import world_structures
 
 # Part of the demolished buildings that others replace.
 _REPLACED = 0.85
@@ -75,14 +76,9 @@ _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
 
 @dataclass(frozen=True)
 class Event:
-    """A row of `history.csv`.
+    """A row of `history.csv`: what happened to a structure in a year.
 
-    Attributes:
-        year: of the event; 0 is today.
-        event: what happened.
-        structure: to which structure.
-        successor: the structure in its place, if any.
-        detail: words.
+    Year 0 is today. The successor is the structure in its place, if any.
     """
 
     year: int
@@ -177,7 +173,7 @@ class City:
         )
         self.events: list[Event] = []
         self.new: dict[str, Structure] = {}
-        self._feet = {name: t.foot for name, t in world.things.items()}
+        self._feet = {name: t.footprint for name, t in world.things.items()}
         self._tree = shapely.STRtree(list(self._feet.values()))
         self._names = list(self._feet)
         self._added: dict[str, BaseGeometry] = {}
@@ -263,18 +259,17 @@ class City:
     def _lots_of_buildings(self) -> Iterator[_Lot]:
         world = self._world
         buildings = world.of_class("building")
-        feet = [one.foot for one in buildings]
+        feet = [one.footprint for one in buildings]
         tree = shapely.STRtree(feet)
         for number, one in enumerate(buildings):
-            others = [
-                feet[k]
-                for k in tree.query(one.foot, predicate="intersects")
-                if k != number
-            ]
-            ways = shapely.intersection(world.streets, one.foot.buffer(1.0))
+            near = tree.query(one.footprint, predicate="intersects")
+            others = [feet[k] for k in near if k != number]
+            ways = shapely.intersection(
+                world.streets, one.footprint.buffer(1.0)
+            )
             blocked = shapely.union_all([*others, ways, self._kept_free])
-            pieces = polygons_of(one.foot.difference(blocked.buffer(0.02)))
-            pieces = [p for p in pieces if p.area > 0.3 * one.foot.area]
+            pieces = polygons_of(one.footprint.difference(blocked.buffer(0.02)))
+            pieces = [p for p in pieces if p.area > 0.3 * one.footprint.area]
             if not pieces:
                 continue
             area = max(pieces, key=lambda p: p.area).simplify(0.05)
@@ -302,7 +297,7 @@ class City:
         taken: list[BaseGeometry] = []
         streets = world.streets
         solid = [
-            one.foot.buffer(plots.PARTY_WALL)
+            one.footprint.buffer(plots.PARTY_WALL)
             for one in world.things.values()
             if one.semantic_class in ("building", "other-structure")
         ]
@@ -337,7 +332,7 @@ class City:
         return lots
 
     def _trees_of_today(self) -> Iterator[_Tree]:
-        walls = [t.foot for t in self._world.of_class("building")]
+        walls = [t.footprint for t in self._world.of_class("building")]
         tree = shapely.STRtree(walls)
         for one in self._world.of_class("vegetation"):
             height = one.top - one.bottom
@@ -355,7 +350,7 @@ class City:
             if kinds and "young" in whole.model.parts[0].shape.mesh:  # type: ignore
                 low, high = 7.0, 9.0
             rng = random_generator(self._seed, "size", one.name)
-            middle = one.foot.centroid
+            middle = one.footprint.centroid
             wall = float(middle.distance(walls[int(tree.nearest(middle))]))
             reach = _reach(self._world.triangles(one.name), middle)
             fits = wall / (_CROWN_PART * reach) * height
@@ -377,7 +372,7 @@ class City:
             if lot.finished:
                 self._go_on(lot)
             elif lot.building is not None:
-                self._meet(lot)
+                self._meet(lot, lot.building)
         self._build_on_free_lots()
         self._grow_trees()
         for place in self._furniture:
@@ -391,48 +386,43 @@ class City:
                 self._rebuild_junction(name, area)
         self._paint_markings()
 
-    def _meet(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _meet(self, lot: _Lot, name: str) -> None:
         if _LISTED.search(name):
             return
-        if self._meets("demolished", name):
-            self._demolish(lot)
-        elif self._meets("extended", name):
-            self._extend(lot)
-        elif self._meets("renewed", name):
-            self._renew(lot)
+        for event, change in (
+            ("demolished", self._demolish),
+            ("extended", self._extend),
+            ("renewed", self._renew),
+        ):
+            if self._meets(event, name):
+                change(lot, name)
+                return
 
     def _clear(self, area: BaseGeometry) -> None:
         """Takes away what stands on a plot."""
         for name in self.near(area):
-            kind = self._class(name)
-            foot = self._foot(name)
+            kind, foot = self._class(name), self._foot(name)
             inside = foot.intersection(area).area > 0.5 * foot.area
             is_loose = kind in (*_PASSING, "other-object", "vegetation")
-            if kind in ("building", "other-structure"):
-                continue
-            if not inside and not is_loose:
+            is_solid = kind in ("building", "other-structure")
+            if is_solid or not (inside or is_loose):
                 continue
             self._remove(name)
-            trees = [tree for tree in self._trees if tree.name == name]
-            for tree in trees:
-                tree.height, tree.replanted = 0.0, 0
+            for tree in self._trees:
+                if tree.name == name:
+                    tree.height, tree.replanted = 0.0, 0
             event = "felled" if kind == "vegetation" else "removed"
             self._tell(event, name, detail="for a building site")
 
-    def _demolish(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _demolish(self, lot: _Lot, name: str) -> None:
         self._tell("demolished", name)
         self._remove(name)
         self._empty(lot)
-        old, lot.building = name, None
-        rng = self._rng("replaced", old)
-        banned = self._archetype(old)
+        lot.building = None
+        rng = self._rng("replaced", name)
         if rng.uniform() < _REPLACED:
             height = lot.height * float(rng.uniform(1.0, 1.7))
-            self._open_site(lot, height, banned, rng, old)
+            self._open_site(lot, height, self._archetype(name), rng, name)
         if lot.coming is None:
             self._leave_empty(lot)
 
@@ -545,9 +535,7 @@ class City:
             hit = lot.coming is not None
             self.tally.count("built", share, hit, stock if k == 0 else 0)
 
-    def _extend(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _extend(self, lot: _Lot, name: str) -> None:
         rng = self._rng("extended", name)
         triangles = self._triangles(name)
         order = ["annex"]
@@ -588,9 +576,7 @@ class City:
             return self._world.triangles(name)
         return plots.structure_triangles(self._structure(name))
 
-    def _renew(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _renew(self, lot: _Lot, name: str) -> None:
         rng = self._rng("renewed", name)
         foot = self._foot(name)
         alone = not [
@@ -753,7 +739,7 @@ class City:
 _STONE = (0.8, 0.8, 0.78)
 
 
-def _furniture_kind(one: OldThing) -> str | None:
+def _furniture_kind(one: world_structures.Structure) -> str | None:
     """Returns the event that replaces a thing of the street."""
     name = one.name.lower()
     if one.semantic_class == "traffic-sign":
@@ -761,7 +747,7 @@ def _furniture_kind(one: OldThing) -> str | None:
     if one.semantic_class == "pole":
         is_signal = "traffic_light" in name or "signal" in name
         return "signals" if is_signal else "lamps"
-    small = one.foot.area < 6.0 and one.top - one.bottom < 4.0
+    small = one.footprint.area < 6.0 and one.top - one.bottom < 4.0
     is_site = "_lot_" in name or "market" in name
     if one.semantic_class == "other-object" and small and not is_site:
         return "benches"

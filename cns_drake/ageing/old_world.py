@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 import csv
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 import re
@@ -31,24 +30,6 @@ from cns_drake.transient import world_structures
 _AROUND = 40.0
 
 
-@dataclass(frozen=True)
-class OldThing:
-    """A structure of today, of a class of `CLASS_IDS`.
-
-    Attributes:
-        foot: the convex hull of what stands near its foot, in W [m].
-        bottom, top: heights of its ends [m].
-        built: year in which it was built, if the map's file has it.
-    """
-
-    name: str
-    semantic_class: str
-    foot: BaseGeometry
-    bottom: float
-    top: float
-    built: int | None
-
-
 class OldWorld:
     """A stage of a map.
 
@@ -57,8 +38,9 @@ class OldWorld:
         path: the stage's file.
         rows: the rows of the map's table of structures, by name.
         columns: the columns of that table.
-        things: name -> thing, in the order of names.
+        things: name -> structure in W, in the order of names.
         visuals: name -> the SDF text of its visuals.
+        built: name -> year in which it was built, if the table has it.
         today: the year of the stage, where buildings have years.
     """
 
@@ -77,21 +59,14 @@ class OldWorld:
         self.visuals, self._elements = _read_visuals(self.path)
         self._world = load_world(self.path)
         self._seen = world_structures.read_structures(self._world)
-        years = {
+        self.built = {
             name: int(row[YEAR_COLUMN])
             for name, row in self.rows.items()
             if row.get(YEAR_COLUMN, "").isdecimal()
         }
-        self.today = max(years.values(), default=None)
+        self.today = max(self.built.values(), default=None)
         self.things = {
-            name: OldThing(
-                name,
-                one.semantic_class,
-                one.footprint,
-                one.bottom,
-                float(one.p_WPs[:, 2].max(initial=one.bottom)),
-                years.get(name),
-            )
+            name: one
             for name, one in self._seen.items()
             if name in self.visuals
         }
@@ -104,7 +79,7 @@ class OldWorld:
         records = read_records(path, needed)
         self.rows = {row["name"]: row for _, row in records}
 
-    def of_class(self, *classes: str) -> list[OldThing]:
+    def of_class(self, *classes: str) -> list[world_structures.Structure]:
         """Returns the things of some classes, in the order of names."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
@@ -156,7 +131,7 @@ class OldWorld:
     @cached_property
     def ground(self) -> world_structures.GroundSurface:
         """The ground below and around buildings."""
-        feet = [t.foot for t in self.of_class("building", "pole")]
+        feet = [t.footprint for t in self.of_class("building", "pole")]
         near = shapely.union_all(feet).convex_hull.buffer(_AROUND)
         return world_structures.GroundSurface(self._seen, near)
 

@@ -153,9 +153,9 @@ def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
         number, x, y, angle, slope = np.transpose(rows)
         # Angles are degrees from north, clockwise; y is north.
         yaw = np.unwrap(np.pi / 2 - np.radians(angle))
-        steps, xy = number.astype(int), np.column_stack([x, y])
+        at, xy = number.astype(int), np.column_stack([x, y])
         objects.append(
-            TracedObject(name, types[name], steps, xy, yaw, np.radians(slope))
+            TracedObject(name, types[name], at, xy, yaw, np.radians(slope))
         )
     return tuple(objects)
 

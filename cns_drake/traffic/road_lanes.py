@@ -249,9 +249,9 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
             stations = np.linspace(first, last, max(2, int(last - first)))
             line = road.evaluate(stations, side * _offset(road))[:, :3]
             line[:, 2] += road.kerb_height
-            ends = (nodes[road.name, end, side] for end in ENDS)
             width = _half_width(_walked_width(road))
-            found.append(Walkway(resampled(line), width, *ends))
+            a, b = (nodes[road.name, end, side] for end in ENDS)
+            found.append(Walkway(resampled(line), width, a, b))
     for junction in network.junctions.values():
         found += _corners(network, junction, nodes, places)
     crossed = [

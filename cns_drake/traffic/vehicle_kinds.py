@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from cns_drake.base.yaml_files import parse_yaml
 
@@ -50,17 +51,9 @@ class VehicleKind:
 # Gap to the vehicle ahead at standstill, s0 of the model [m].
 STANDSTILL_GAP = 2.0
 
-KINDS = tuple(
-    VehicleKind(
-        name,
-        **{
-            key: tuple(value) if isinstance(value, list) else value
-            for key, value in fields.items()
-        },
-    )
-    for name, fields in parse_yaml(
-        Path(__file__).with_suffix(".yaml").read_bytes()
-    ).items()
+_TABLE = parse_yaml(Path(__file__).with_suffix(".yaml").read_bytes())
+KINDS = TypeAdapter(tuple[VehicleKind, ...]).validate_python(
+    [{"name": name, **fields} for name, fields in _TABLE.items()]
 )
 LARGEST = max(KINDS, key=lambda kind: kind.size[0])
 # Box that contains every small vehicle [m].
