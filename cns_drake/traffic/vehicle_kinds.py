@@ -51,9 +51,7 @@ class VehicleKind:
 # Gap to the vehicle ahead at standstill, s0 of the model [m].
 STANDSTILL_GAP = 2.0
 
-_TABLE = parse_yaml(
-    Path(__file__).with_name("vehicle_kinds.yaml").read_bytes()
-)
+_TABLE = parse_yaml(Path(__file__).with_name("vehicle_kinds.yaml").read_bytes())
 KINDS = TypeAdapter(tuple[VehicleKind, ...]).validate_python(
     [{"name": name, **fields} for name, fields in _TABLE.items()]
 )
