@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 import os
@@ -17,38 +18,21 @@ import yaml
 from cns_drake.ageing.history import City, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
+from cns_drake.base import map_folder
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder, user_errors
-from cns_drake.base.map_folder import (
-    LANES_NAME,
-    MESH_FOLDER,
-    ROADS_NAME,
-    STRUCTURES_NAME,
-    MapFolder,
-    stage_name,
-)
+from cns_drake.base.map_folder import MapFolder, stage_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.generate import MAX_STRUCTURES, stage_sdf
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.growth.stage_structures import (
-    lot_objects,
-    use_by_size,
-    younger,
-)
-from cns_drake.imports.map_files import (
-    YEAR_COLUMN,
-    stage_size,
-    triangles_in,
-)
+from cns_drake.city.growth import stage_structures
+from cns_drake.imports.map_files import YEAR_COLUMN, stage_size, triangles_in
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import (
-    describe_scenario,
-    load_scenario,
-)
+from cns_drake.scenarios.scenario_files import describe_scenario, load_scenario
 from cns_drake.scene.semantics import CLASS_IDS
 
 HISTORY_NAME = "history.csv"
@@ -89,7 +73,7 @@ def age_map(
     progress: Callable[[str], None] = lambda line: None,
     finish: Callable[[Path, AgedMap], None] = lambda folder, aged: None,
 ) -> AgedMap:
-    """Writes the map folder of a city that ages.
+    """Writes the map folder of a city that ages; returns what was made.
 
     Args:
         source: the folder of the map; its last stage is today.
@@ -100,9 +84,6 @@ def age_map(
         output: the folder to write; it must not be there.
         progress: takes one line at a time.
         finish: completes the folder before it gets its name.
-
-    Returns:
-        What was made.
 
     Raises:
         InputError: an argument or the map cannot be used.
@@ -132,14 +113,16 @@ def age_map(
     if min(wanted) < 0 and world.today is None:
         raise InputError(
             f"{source}: --years: {min(wanted)}: no building has a year in "
-            f"column {YEAR_COLUMN} of {STRUCTURES_NAME}, as the past needs"
+            f"column {YEAR_COLUMN} of {map_folder.STRUCTURES_NAME}, as the "
+            "past needs"
         )
     progress("looking for lots")
     city = City(world, rates, seed, shapely.union_all([*map(_swept, ways)]))
     # Today comes first.
-    stages = {f"{k + 1:02d}": y for k, y in enumerate([0, *_others(wanted)])}
+    others = [year for year in wanted if year != 0]
+    stages = {f"{k:02d}": year for k, year in enumerate([0, *others], start=1)}
     with draft_folder(output) as draft:
-        (draft / MESH_FOLDER).mkdir()
+        (draft / map_folder.MESH_FOLDER).mkdir()
         _copy_inputs(folder, drives, draft)
         writing = _Writing(world, draft, seed)
         shutil.copyfile(world.path, draft / stage_name("01"))
@@ -162,24 +145,18 @@ def age_map(
         (draft / RATES_NAME).write_text(city.tally.to_csv(), "utf-8")
         _write_drives(folder, drives, draft, stages, seed)
         write_table(draft, sizes=writing.sizes)
-        counts: dict[str, int] = {}
-        for one in events:
-            counts[one.event] = counts.get(one.event, 0) + 1
+        counts = Counter(one.event for one in events)
         aged = AgedMap(
             stages,
             {stage: number for stage, (number, _) in writing.sizes.items()},
             counts,
-            _changed(city, world),
+            _changed(city),
             ways[-1],
         )
         # Pictures need the memory.
         del world, city, writing, events
         finish(draft, aged)
     return aged
-
-
-def _others(years: Iterable[int]) -> list[int]:
-    return [year for year in years if year != 0]
 
 
 def _swept(trajectory: Trajectory) -> BaseGeometry:
@@ -196,39 +173,32 @@ def past(
     """Returns what stood some years ago, and the buildings built since.
 
     Buildings of later years were not there, and their lots were in another
-    use. Trees were younger.
-
-    Args:
-        world: the city of today.
-        year: negative.
+    use. Trees were younger. The year is negative.
     """
     assert world.today is not None  # The caller has checked it.
     standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)
     events = []
     for name, thing in world.things.items():
-        since = None if thing.built is None else thing.built - world.today
-        if since is not None and since > year:
-            events.append(Event(since, "built", name))
+        built = world.built.get(name)
+        if built is not None and built - world.today > year:
+            events.append(Event(built - world.today, "built", name))
             del standing[name]
             lot = world.structure(name)
-            rng = np.random.default_rng(thing.built)
-            for one in lot_objects(
-                lot, use_by_size(lot), {"hatchback": 1}, rng
+            rng = np.random.default_rng(built)
+            use = stage_structures.use_by_size(lot)
+            for one in stage_structures.lot_objects(
+                lot, use, {"hatchback": 1}, rng
             ):
                 standing[one.name] = one
         elif thing.semantic_class == "vegetation":
             height = thing.top - thing.bottom
             if height > _LEAST_TREE and name.startswith("tree"):
                 young = max(height + _GROWTH * year, _LEAST_TREE)
-                standing[name] = younger_plant(world, name, young)
+                whole = world.structure(name)
+                model = stage_structures.younger(whole.model, young)
+                standing[name] = replace(whole, model=model)
     events.sort(key=lambda one: one.year)
     return standing, events
-
-
-def younger_plant(world: OldWorld, name: str, height: float) -> Structure:
-    """Returns a plant of today when it was lower."""
-    whole = world.structure(name)
-    return replace(whole, model=younger(whole.model, height))
 
 
 class _Writing:
@@ -300,30 +270,27 @@ class _Writing:
                 f"instance ids can count ({MAX_STRUCTURES})"
             )
         for k, one in enumerate((*new.values(), *others.values())):
+            x, y, z = (f"{value:.3f}" for value in one.xyz)
             rows.append(
                 {
                     "instance": first + k,
                     "name": one.name,
                     "class": one.semantic_class,
                     "label": CLASS_IDS[one.semantic_class],
-                    **{
-                        a: f"{v:.3f}"
-                        for a, v in zip("xyz", one.xyz, strict=True)
-                    },
-                    "yaw": f"{one.yaw:.5f}",
+                    **{"x": x, "y": y, "z": z, "yaw": f"{one.yaw:.5f}"},
                     "tags": " ".join(one.tags),
                 }
             )
         columns = world.columns
         cells = ([row.get(name, "") for name in columns] for row in rows)
-        write_csv(self._draft / STRUCTURES_NAME, columns, cells)
+        write_csv(self._draft / map_folder.STRUCTURES_NAME, columns, cells)
 
 
 def _copy_inputs(
     folder: MapFolder, drives: Iterable[Path], draft: Path
 ) -> None:
     """Copies roads, views and ways of drives."""
-    names = {ROADS_NAME, LANES_NAME, folder.views.name}
+    names = {map_folder.ROADS_NAME, map_folder.LANES_NAME, folder.views.name}
     for path in drives:
         way = load_scenario(path).waypoints
         if way is not None:
@@ -372,7 +339,7 @@ def _write_drives(
         MapFolder(draft).drive(stage).write_text(text, "utf-8")
 
 
-def _changed(city: City, world: OldWorld) -> np.ndarray:
+def _changed(city: City) -> np.ndarray:
     """Returns the (N, 3) places of new buildings and additions [m]."""
     places = [
         one.xyz

@@ -22,13 +22,8 @@ _SPACING = 25.0
 _SEEN = 60.0
 
 
-def street_views(aged: AgedMap, number: int = _STREETS) -> dict[str, View]:
-    """Returns views along the last drive where most is built.
-
-    Args:
-        aged: the city.
-        number: of views.
-    """
+def street_views(aged: AgedMap) -> dict[str, View]:
+    """Returns views along the last drive where most is built."""
     way = aged.trajectory
     times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]
     R_WBs, p_WBs = way.poses(times)
@@ -42,7 +37,7 @@ def street_views(aged: AgedMap, number: int = _STREETS) -> dict[str, View]:
     chosen: list[int] = []
     for k in np.argsort(-np.array(seen), kind="stable"):
         apart = [np.linalg.norm(p_WBs[k] - p_WBs[j]) for j in chosen]
-        if min(apart, default=np.inf) > 3 * _SPACING and len(chosen) < number:
+        if min(apart, default=np.inf) > 3 * _SPACING and len(chosen) < _STREETS:
             chosen.append(int(k))
     views = {}
     for n, k in enumerate(sorted(chosen), start=1):
@@ -70,11 +65,7 @@ def draw_pictures(
 ) -> None:
     """Writes a picture of each view for each year, and a film strip of all.
 
-    Args:
-        folder: of the map; `pictures/year_<y>_<view>.jpg` and `film.jpg` are
-            written.
-        aged: the city.
-        progress: takes one line at a time.
+    They are `pictures/year_<y>_<view>.jpg` and `film.jpg` in the map's folder.
     """
     views = {"air": air_view(aged), **street_views(aged)}
     years = sorted(aged.years, key=lambda stage: aged.years[stage])

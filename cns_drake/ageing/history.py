@@ -7,8 +7,9 @@ a shorter one does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+import itertools
 import math
 import re
 
@@ -19,7 +20,7 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing import plots
-from cns_drake.ageing.old_world import OldThing, OldWorld
+from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import Plot
 from cns_drake.ageing.rates import Tally
 from cns_drake.base.errors import InputError
@@ -32,9 +33,9 @@ from cns_drake.city.growth.stage_structures import (
     use_by_size,
 )
 from cns_drake.city.placement.frontage import lines_along, lot_at
-from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
+from cns_drake.transient import world_structures
 
 # Part of the demolished buildings that others replace.
 _REPLACED = 0.85
@@ -75,14 +76,9 @@ _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
 
 @dataclass(frozen=True)
 class Event:
-    """A row of `history.csv`.
+    """A row of `history.csv`: what happened to a structure in a year.
 
-    Attributes:
-        year: of the event; 0 is today.
-        event: what happened.
-        structure: to which structure.
-        successor: the structure in its place, if any.
-        detail: words.
+    Year 0 is today. The successor is the structure in its place, if any.
     """
 
     year: int
@@ -98,12 +94,11 @@ class _Lot:
 
     Attributes:
         number: of the lot in the city.
-        plot: its ground.
         height: that of the buildings usual there [m].
         building: name of its building.
         parts: names of annexes, storeys, balconies.
-        finished: year in which the coming building will stand.
-        coming: the coming building.
+        finished, coming: the coming building, and the year in which it will
+            stand.
         old: the building that it replaces, if any.
     """
 
@@ -164,11 +159,7 @@ class City:
     ):
         """Begins today.
 
-        Args:
-            world: the city of today.
-            rates: event -> rate a year.
-            seed: the seed of all draws.
-            kept_free: the ways of drives, where nothing is put up, in W [m].
+        Nothing is put up where drives lead, the area kept free in W [m].
 
         Raises:
             InputError: the city has no lots.
@@ -182,7 +173,7 @@ class City:
         )
         self.events: list[Event] = []
         self.new: dict[str, Structure] = {}
-        self._feet = {name: t.foot for name, t in world.things.items()}
+        self._feet = {name: t.footprint for name, t in world.things.items()}
         self._tree = shapely.STRtree(list(self._feet.values()))
         self._names = list(self._feet)
         self._added: dict[str, BaseGeometry] = {}
@@ -240,27 +231,22 @@ class City:
         self, area: BaseGeometry, ignored: Sequence[str] = ()
     ) -> list[str]:
         """Returns the names of what stands on an area of W, but for ground."""
+        rows = sorted(self._tree.query(area, predicate="intersects"))
         found = [
-            self._names[k]
-            for k in sorted(self._tree.query(area, predicate="intersects"))
+            name
+            for name in map(self._names.__getitem__, rows)
+            if name in self.standing and name not in self._added
         ]
-        found = [name for name in found if name in self.standing]
-        found = [name for name in found if name not in self._added]
         found += [n for n, foot in self._added.items() if foot.intersects(area)]
         return [
             name
             for name in found
-            if name not in ignored and not self._is_ground(name)
+            if name not in ignored and self._class(name) not in _GROUND
         ]
 
-    def _is_ground(self, name: str) -> bool:
-        return self._class(name) in _GROUND
-
     def _class(self, name: str) -> str:
-        one = self.new.get(name)
-        if one is not None:
-            return one.semantic_class
-        return self._world.things[name].semantic_class
+        one = self.new.get(name) or self._world.things[name]
+        return one.semantic_class
 
     def _foot(self, name: str) -> BaseGeometry:
         return self._added.get(name, self._feet.get(name, Polygon()))
@@ -273,18 +259,17 @@ class City:
     def _lots_of_buildings(self) -> Iterator[_Lot]:
         world = self._world
         buildings = world.of_class("building")
-        feet = [one.foot for one in buildings]
+        feet = [one.footprint for one in buildings]
         tree = shapely.STRtree(feet)
         for number, one in enumerate(buildings):
-            others = [
-                feet[k]
-                for k in tree.query(one.foot, predicate="intersects")
-                if k != number
-            ]
-            ways = shapely.intersection(world.streets, one.foot.buffer(1.0))
+            near = tree.query(one.footprint, predicate="intersects")
+            others = [feet[k] for k in near if k != number]
+            ways = shapely.intersection(
+                world.streets, one.footprint.buffer(1.0)
+            )
             blocked = shapely.union_all([*others, ways, self._kept_free])
-            pieces = polygons_of(one.foot.difference(blocked.buffer(0.02)))
-            pieces = [p for p in pieces if p.area > 0.3 * one.foot.area]
+            pieces = polygons_of(one.footprint.difference(blocked.buffer(0.02)))
+            pieces = [p for p in pieces if p.area > 0.3 * one.footprint.area]
             if not pieces:
                 continue
             area = max(pieces, key=lambda p: p.area).simplify(0.05)
@@ -298,7 +283,7 @@ class City:
         A building may reach into the ground.
         """
         x0, y0, x1, _ = plot.inside(plot.area).bounds
-        at = plots.place(plot, (x0 + x1) / 2, y0 - 1.0)
+        at = plot.place((x0 + x1) / 2, y0 - 1.0)
         z = self._world.ground.heights(np.array([at]))[0]
         is_known = np.isfinite(z) and z > default - 0.5
         return round(float(z), 3) if is_known else default
@@ -312,7 +297,7 @@ class City:
         taken: list[BaseGeometry] = []
         streets = world.streets
         solid = [
-            one.foot.buffer(plots.PARTY_WALL)
+            one.footprint.buffer(plots.PARTY_WALL)
             for one in world.things.values()
             if one.semantic_class in ("building", "other-structure")
         ]
@@ -323,12 +308,9 @@ class City:
         if open_ground.is_empty:
             return lots
         shapely.prepare(open_ground)
-        lines = [
-            line
-            for setback in _SETBACKS
-            for line in lines_along(streets, open_ground, setback)
-        ]
-        for line in lines:
+        for line in itertools.chain.from_iterable(
+            lines_along(streets, open_ground, setback) for setback in _SETBACKS
+        ):
             start = 0.0
             while start < line.length - _PLOT_WIDTHS[-1]:
                 area = _fitting_plot(line, start, open_ground, taken)
@@ -350,7 +332,7 @@ class City:
         return lots
 
     def _trees_of_today(self) -> Iterator[_Tree]:
-        walls = [t.foot for t in self._world.of_class("building")]
+        walls = [t.footprint for t in self._world.of_class("building")]
         tree = shapely.STRtree(walls)
         for one in self._world.of_class("vegetation"):
             height = one.top - one.bottom
@@ -368,7 +350,7 @@ class City:
             if kinds and "young" in whole.model.parts[0].shape.mesh:  # type: ignore
                 low, high = 7.0, 9.0
             rng = random_generator(self._seed, "size", one.name)
-            middle = one.foot.centroid
+            middle = one.footprint.centroid
             wall = float(middle.distance(walls[int(tree.nearest(middle))]))
             reach = _reach(self._world.triangles(one.name), middle)
             fits = wall / (_CROWN_PART * reach) * height
@@ -390,7 +372,7 @@ class City:
             if lot.finished:
                 self._go_on(lot)
             elif lot.building is not None:
-                self._meet(lot)
+                self._meet(lot, lot.building)
         self._build_on_free_lots()
         self._grow_trees()
         for place in self._furniture:
@@ -404,48 +386,43 @@ class City:
                 self._rebuild_junction(name, area)
         self._paint_markings()
 
-    def _meet(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _meet(self, lot: _Lot, name: str) -> None:
         if _LISTED.search(name):
             return
-        if self._meets("demolished", name):
-            self._demolish(lot)
-        elif self._meets("extended", name):
-            self._extend(lot)
-        elif self._meets("renewed", name):
-            self._renew(lot)
+        for event, change in (
+            ("demolished", self._demolish),
+            ("extended", self._extend),
+            ("renewed", self._renew),
+        ):
+            if self._meets(event, name):
+                change(lot, name)
+                return
 
     def _clear(self, area: BaseGeometry) -> None:
         """Takes away what stands on a plot."""
         for name in self.near(area):
-            kind = self._class(name)
-            foot = self._foot(name)
+            kind, foot = self._class(name), self._foot(name)
             inside = foot.intersection(area).area > 0.5 * foot.area
             is_loose = kind in (*_PASSING, "other-object", "vegetation")
-            if kind in ("building", "other-structure"):
-                continue
-            if not inside and not is_loose:
+            is_solid = kind in ("building", "other-structure")
+            if is_solid or not (inside or is_loose):
                 continue
             self._remove(name)
-            trees = [tree for tree in self._trees if tree.name == name]
-            for tree in trees:
-                tree.height, tree.replanted = 0.0, 0
+            for tree in self._trees:
+                if tree.name == name:
+                    tree.height, tree.replanted = 0.0, 0
             event = "felled" if kind == "vegetation" else "removed"
             self._tell(event, name, detail="for a building site")
 
-    def _demolish(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _demolish(self, lot: _Lot, name: str) -> None:
         self._tell("demolished", name)
         self._remove(name)
         self._empty(lot)
-        old, lot.building = name, None
-        rng = self._rng("replaced", old)
-        banned = self._archetype(old)
+        lot.building = None
+        rng = self._rng("replaced", name)
         if rng.uniform() < _REPLACED:
             height = lot.height * float(rng.uniform(1.0, 1.7))
-            self._open_site(lot, height, banned, rng, old)
+            self._open_site(lot, height, self._archetype(name), rng, name)
         if lot.coming is None:
             self._leave_empty(lot)
 
@@ -492,16 +469,10 @@ class City:
     def _leave_empty(self, lot: _Lot) -> None:
         """Uses an empty lot as a car park, a market, a yard or a garden."""
         name = f"lot_{self.year:03d}y_{lot.number:03d}"
-        bare = lot.plot.thing(
-            name,
-            "building",
-            replace(
-                assemble(),
-                footprint=lot.plot.inside(lot.plot.area.buffer(-0.5)),
-            ),
-        )
+        ground = lot.plot.inside(lot.plot.area.buffer(-0.5))
+        model = replace(assemble(), footprint=ground)
+        bare = lot.plot.thing(name, "building", model)
         cars = {"hatchback": 3.0, "saloon": 3.0, "estate": 2.0, "van": 1.0}
-        cars = {k: v for k, v in cars.items() if k in OBJECTS}
         rng = self._rng("lot", name)
         for one in lot_objects(bare, use_by_size(bare), cars, rng):
             if not self.near(one.footprint_W):
@@ -524,9 +495,8 @@ class City:
             self._tell("frame", coming.name, one.name)
             return
         self._put(coming)
-        plot = plots.building_plot(coming)
         lot.building, lot.coming, lot.finished = coming.name, None, 0
-        lot.plot = replace(plot, area=plot.area)
+        lot.plot = plots.building_plot(coming)
         lot.height = float(top_of(coming.model))
         if lot.old:
             self._tell("replaced", lot.old, coming.name)
@@ -565,29 +535,28 @@ class City:
             hit = lot.coming is not None
             self.tally.count("built", share, hit, stock if k == 0 else 0)
 
-    def _extend(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _extend(self, lot: _Lot, name: str) -> None:
         rng = self._rng("extended", name)
         triangles = self._triangles(name)
-        makers: list[Callable[[], Structure | None]] = [
-            lambda: plots.annex_to(
-                lot.plot,
-                triangles,
-                f"{name}_annex_{self.year:03d}y",
-                lambda area: self._is_free(area, name),
-                rng,
-            ),
-        ]
+        order = ["annex"]
         is_raised = any("_storey_" in part for part in lot.parts)
         if lot.height < _HIGHEST_RAISED and not is_raised:
-            makers.insert(
-                int(rng.integers(2)),
-                lambda: plots.storey_on(
-                    lot.plot, triangles, f"{name}_storey_{self.year:03d}y", rng
-                ),
-            )
-        one = next((one for make in makers if (one := make())), None)
+            order.insert(int(rng.integers(2)), "storey")
+        one = None
+        for kind in order:
+            new = f"{name}_{kind}_{self.year:03d}y"
+            if kind == "storey":
+                one = plots.storey_on(lot.plot, triangles, new, rng)
+            else:
+                one = plots.annex_to(
+                    lot.plot,
+                    triangles,
+                    new,
+                    lambda area: self._is_free(area, name),
+                    rng,
+                )
+            if one is not None:
+                break
         if one is None:
             self._tell("extended", name, detail="within its walls")
             return
@@ -596,21 +565,18 @@ class City:
         self._tell("extended", name, one.name)
 
     def _is_free(self, area: BaseGeometry, building: str) -> bool:
-        if area.intersects(self._world.streets):
-            return False
-        if area.intersects(self._kept_free):
-            return False
-        return not self.near(area, (building,))
+        return not (
+            area.intersects(self._world.streets)
+            or area.intersects(self._kept_free)
+            or self.near(area, (building,))
+        )
 
     def _triangles(self, name: str) -> np.ndarray:
         if name in self._world.things and self.standing[name] is None:
             return self._world.triangles(name)
-        one = self._structure(name)
-        return plots.structure_triangles(one)
+        return plots.structure_triangles(self._structure(name))
 
-    def _renew(self, lot: _Lot) -> None:
-        name = lot.building
-        assert name is not None
+    def _renew(self, lot: _Lot, name: str) -> None:
         rng = self._rng("renewed", name)
         foot = self._foot(name)
         alone = not [
@@ -773,7 +739,7 @@ class City:
 _STONE = (0.8, 0.8, 0.78)
 
 
-def _furniture_kind(one: OldThing) -> str | None:
+def _furniture_kind(one: world_structures.Structure) -> str | None:
     """Returns the event that replaces a thing of the street."""
     name = one.name.lower()
     if one.semantic_class == "traffic-sign":
@@ -781,7 +747,7 @@ def _furniture_kind(one: OldThing) -> str | None:
     if one.semantic_class == "pole":
         is_signal = "traffic_light" in name or "signal" in name
         return "signals" if is_signal else "lamps"
-    small = one.foot.area < 6.0 and one.top - one.bottom < 4.0
+    small = one.footprint.area < 6.0 and one.top - one.bottom < 4.0
     is_site = "_lot_" in name or "market" in name
     if one.semantic_class == "other-object" and small and not is_site:
         return "benches"

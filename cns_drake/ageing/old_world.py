@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 import csv
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 import re
@@ -18,52 +17,17 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.base.xml_elements import read_elements
+from cns_drake.city.geometry import structures
 from cns_drake.city.geometry.mesh import read_mesh
-from cns_drake.city.geometry.structures import (
-    BoxShape,
-    CylinderShape,
-    MeshShape,
-    Model,
-    Part,
-    Shape,
-    SphereShape,
-    Structure,
-    ground_footprint,
-    triple,
-)
+from cns_drake.city.geometry.structures import triple
 from cns_drake.city.geometry.upper_sides import from_above
 from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.roads.network import load_road_network
 from cns_drake.scene.world import load_world
 from cns_drake.transient import world_structures
-from cns_drake.transient.world_structures import (
-    GroundSurface,
-    read_structures,
-    triangle_corners,
-)
 
 # The ground is known this far around buildings [m].
 _AROUND = 40.0
-
-
-@dataclass(frozen=True)
-class OldThing:
-    """A structure of today.
-
-    Attributes:
-        name: its name.
-        semantic_class: a key of `CLASS_IDS`.
-        foot: the convex hull of what stands near its foot, in W [m].
-        bottom, top: heights of its ends [m].
-        built: year in which it was built, if the map's file has it.
-    """
-
-    name: str
-    semantic_class: str
-    foot: BaseGeometry
-    bottom: float
-    top: float
-    built: int | None
 
 
 class OldWorld:
@@ -74,8 +38,9 @@ class OldWorld:
         path: the stage's file.
         rows: the rows of the map's table of structures, by name.
         columns: the columns of that table.
-        things: name -> thing, in the order of names.
+        things: name -> structure in W, in the order of names.
         visuals: name -> the SDF text of its visuals.
+        built: name -> year in which it was built, if the table has it.
         today: the year of the stage, where buildings have years.
     """
 
@@ -93,22 +58,15 @@ class OldWorld:
         self._read_table()
         self.visuals, self._elements = _read_visuals(self.path)
         self._world = load_world(self.path)
-        self._seen = read_structures(self._world)
-        years = {
+        self._seen = world_structures.read_structures(self._world)
+        self.built = {
             name: int(row[YEAR_COLUMN])
             for name, row in self.rows.items()
             if row.get(YEAR_COLUMN, "").isdecimal()
         }
-        self.today = max(years.values(), default=None)
+        self.today = max(self.built.values(), default=None)
         self.things = {
-            name: OldThing(
-                name,
-                one.semantic_class,
-                one.footprint,
-                one.bottom,
-                float(one.p_WPs[:, 2].max(initial=one.bottom)),
-                years.get(name),
-            )
+            name: one
             for name, one in self._seen.items()
             if name in self.visuals
         }
@@ -121,11 +79,11 @@ class OldWorld:
         records = read_records(path, needed)
         self.rows = {row["name"]: row for _, row in records}
 
-    def of_class(self, *classes: str) -> list[OldThing]:
+    def of_class(self, *classes: str) -> list[world_structures.Structure]:
         """Returns the things of some classes, in the order of names."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
-    def structure(self, name: str) -> Structure:
+    def structure(self, name: str) -> structures.Structure:
         """Returns a structure as the city generator has it.
 
         Its footprint is the hull of what is near the ground.
@@ -143,12 +101,12 @@ class OldWorld:
             X_SP = X_SW @ RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
             rgb = visual.findtext("material/diffuse", "0.6 0.6 0.6 1").split()
             shape = _shape(visual, self.path)
-            if isinstance(shape, MeshShape):
+            if isinstance(shape, structures.MeshShape):
                 file = self.folder.path / MESH_FOLDER / f"{shape.mesh}.obj"
                 with user_errors(file):
                     meshes[shape.mesh] = read_mesh(file.resolve())
             parts.append(
-                Part(
+                structures.Part(
                     visual.attrib["name"].partition("/")[2],
                     shape,
                     triple(X_SP.translation().round(4)),
@@ -156,21 +114,26 @@ class OldWorld:
                     triple(map(float, rgb[:3])),
                 )
             )
-        model = Model(tuple(parts), meshes, ground_footprint(parts, meshes))
+        model = structures.Model(
+            tuple(parts), meshes, structures.ground_footprint(parts, meshes)
+        )
         tags = tuple(row.get("tags", "").split())
-        return Structure(name, row["class"], model, xyz, yaw, tags)
+        return structures.Structure(name, row["class"], model, xyz, yaw, tags)
 
     def triangles(self, name: str) -> np.ndarray:
         """Returns the (M, 3, 3) triangles of a structure in the world [m]."""
-        found = [triangle_corners(part) for part in self._seen[name].parts]
+        found = [
+            world_structures.triangle_corners(part)
+            for part in self._seen[name].parts
+        ]
         return np.concatenate([np.zeros((0, 3, 3)), *found])
 
     @cached_property
-    def ground(self) -> GroundSurface:
+    def ground(self) -> world_structures.GroundSurface:
         """The ground below and around buildings."""
-        feet = [t.foot for t in self.of_class("building", "pole")]
+        feet = [t.footprint for t in self.of_class("building", "pole")]
         near = shapely.union_all(feet).convex_hull.buffer(_AROUND)
-        return GroundSurface(self._seen, near)
+        return world_structures.GroundSurface(self._seen, near)
 
     @cached_property
     def streets(self) -> BaseGeometry:
@@ -189,7 +152,7 @@ class OldWorld:
     ) -> BaseGeometry:
         """Returns the area of some structures, seen from above [m]."""
         found = [
-            from_above(triangle_corners(part))
+            from_above(world_structures.triangle_corners(part))
             for one in self._seen.values()
             if wanted(one)
             for part in one.parts
@@ -244,7 +207,7 @@ def _read_visuals(
     return lines, elements
 
 
-def _shape(visual: ElementTree.Element, path: Path) -> Shape:
+def _shape(visual: ElementTree.Element, path: Path) -> structures.Shape:
     def numbers(tag: str, default: str = "") -> Sequence[float]:
         text = visual.findtext(f"geometry/{tag}", default)
         return [float(value) for value in text.split()]
@@ -252,19 +215,15 @@ def _shape(visual: ElementTree.Element, path: Path) -> Shape:
     mesh = visual.findtext("geometry/mesh/uri")
     if mesh is not None and mesh.startswith(f"{MESH_FOLDER}/"):
         scale = triple(numbers("mesh/scale", "1 1 1"))
-        return MeshShape(Path(mesh).stem, scale)
-    for kind, make in (
-        ("box", lambda: BoxShape(triple(numbers("box/size")))),
-        (
-            "cylinder",
-            lambda: CylinderShape(
-                *numbers("cylinder/radius"), *numbers("cylinder/length")
-            ),
-        ),
-        ("sphere", lambda: SphereShape(*numbers("sphere/radius"))),
-    ):
-        if visual.find(f"geometry/{kind}") is not None:
-            return make()
+        return structures.MeshShape(Path(mesh).stem, scale)
+    if visual.find("geometry/box") is not None:
+        return structures.BoxShape(triple(numbers("box/size")))
+    if visual.find("geometry/cylinder") is not None:
+        return structures.CylinderShape(
+            *numbers("cylinder/radius"), *numbers("cylinder/length")
+        )
+    if visual.find("geometry/sphere") is not None:
+        return structures.SphereShape(*numbers("sphere/radius"))
     raise InputError(
         f"{path}: {visual.get('name')}: a shape that ageing cannot change"
     )

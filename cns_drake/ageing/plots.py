@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import math
@@ -75,6 +76,7 @@ _COLOURS: tuple[Rgb, ...] = (
 )
 _GLASS: Rgb = (0.25, 0.3, 0.35)
 _CONCRETE: Rgb = (0.7, 0.69, 0.67)
+_STEEL: Rgb = (0.5, 0.52, 0.54)
 _INSULATION = 0.15
 
 
@@ -110,6 +112,14 @@ class Plot:
         yaw = round(math.atan2(along[1], along[0]), 5)
         return cls(area, xy, yaw, round(z, 3))
 
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """Returns the place in W of a place in S, in millimetres."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return (
+            round(self.xy[0] + c * x - s * y, 3),
+            round(self.xy[1] + s * x + c * y, 3),
+        )
+
     def inside(self, area: BaseGeometry) -> BaseGeometry:
         """Returns an area of W in S."""
         moved = affinity.translate(area, -self.xy[0], -self.xy[1])
@@ -130,11 +140,6 @@ class Plot:
         return Structure(name, kind, model, (*self.xy, self.z), self.yaw)
 
 
-def is_alike(structure: Structure, archetype: str) -> bool:
-    """Returns whether a structure is, by name or tags, of an archetype."""
-    return archetype in structure.tags or structure.name.startswith(archetype)
-
-
 def new_building(
     plot: Plot,
     height: float,
@@ -145,13 +150,8 @@ def new_building(
 ) -> Structure | None:
     """Draws another building for a plot; None if none fits.
 
-    Args:
-        plot: its ground.
-        height: about the height of the building [m].
-        banned: an archetype that it is not.
-        neighbours: footprints of buildings near the plot, in W [m].
-        rng: the only source of variation.
-        ending: the name begins with the archetype and ends so.
+    It has about a height [m], and is not of the banned archetype. Footprints of
+    its neighbours are in W. Its name is the archetype with an ending.
     """
     x0, y0, x1, y1 = plot.room().bounds
     names = [name for name in _BUILT_TODAY if name != banned]
@@ -178,13 +178,9 @@ def new_building(
             model = sample(name, footprint, h, rng, f"{name}_{ending}", blind)
         except ValueError:
             continue
-        c, s = math.cos(plot.yaw), math.sin(plot.yaw)
-        x = plot.xy[0] + c * middle[0] - s * middle[1]
-        y = plot.xy[1] + s * middle[0] + c * middle[1]
-        xyz = (round(x, 3), round(y, 3), plot.z)
-        return Structure(
-            f"{name}_{ending}", "building", model, xyz, plot.yaw, (name,)
-        )
+        at = replace(plot, xy=plot.place(*middle))
+        built = at.thing(f"{name}_{ending}", "building", model)
+        return replace(built, tags=(name,))
     return None
 
 
@@ -224,11 +220,11 @@ def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
         )
     ):
         fence = OBJECTS["site_fence"].build(rng, length=length)
-        moved = Plot(plot.area, place(plot, x, y), plot.yaw + turn, plot.z)
+        moved = Plot(plot.area, plot.place(x, y), plot.yaw + turn, plot.z)
         things.append(moved.thing(f"{name}_fence_{k}", "fence", fence))
     empty = plot.thing(name, "building", Model((), {}, lot.buffer(-0.8)))
     digger = OBJECTS["excavator"]
-    middle = place(plot, *lot.centroid.coords[0])
+    middle = plot.place(*lot.centroid.coords[0])
     turned = Plot(plot.area, middle, float(rng.uniform(-3.1, 3.1)), plot.z)
     model = digger.build(rng)
     digging = turned.thing(f"{name}_digger", digger.semantic_class, model)
@@ -253,19 +249,10 @@ def scaffold_before(
     """Returns a scaffold before the front of a building of a height [m]."""
     x0, y0, x1, _ = plot.inside(plot.area).bounds
     length = min(x1 - x0, _LONGEST)
-    xy = place(plot, (x0 + x1) / 2, y0)
+    xy = plot.place((x0 + x1) / 2, y0)
     moved = Plot(plot.area, xy, round(plot.yaw + math.pi, 5), plot.z)
     model = scaffold(length, min(height, _HIGHEST), rng)
     return moved.thing(name, "other-structure", model)
-
-
-def place(plot: Plot, x: float, y: float) -> tuple[float, float]:
-    """Returns the place in W of a place in S, in millimetres."""
-    c, s = math.cos(plot.yaw), math.sin(plot.yaw)
-    return (
-        round(plot.xy[0] + c * x - s * y, 3),
-        round(plot.xy[1] + s * x + c * y, 3),
-    )
 
 
 def storey_on(
@@ -273,11 +260,7 @@ def storey_on(
 ) -> Structure | None:
     """Returns a storey set on a flat roof; None if the roof is not flat.
 
-    Args:
-        plot: of the building.
-        triangles: (M, 3, 3) of the building in W [m].
-        name: of the storey.
-        rng: draws its colour.
+    The building on the plot has triangles (M, 3, 3) in W [m].
     """
     inside = plot.triangles(triangles)
     flat = inside[np.abs(unit_normals(inside)[:, 2]) > 0.99]
@@ -321,12 +304,8 @@ def annex_to(
 ) -> Structure | None:
     """Returns an annex of one storey behind a building; None without room.
 
-    Args:
-        plot: of the building.
-        triangles: (M, 3, 3) of the building in W [m].
-        name: of the annex.
-        is_free: area in W -> whether it may be built on.
-        rng: draws size and colour.
+    The building on the plot has triangles (M, 3, 3) in W [m]. Whether an area
+    in W may be built on is `is_free`.
     """
     cut = section(plot.triangles(triangles), 1.3)
     x0, _, x1, _ = plot.inside(plot.area).bounds
@@ -361,11 +340,7 @@ def balconies_on(
 ) -> Structure | None:
     """Returns new balconies on the front; None if it is not plane.
 
-    Args:
-        plot: of the building.
-        triangles: (M, 3, 3) of the building in W [m].
-        name: of the balconies.
-        rng: draws their distance.
+    The building on the plot has triangles (M, 3, 3) in W [m].
     """
     inside = plot.triangles(triangles)
     x0, y0, x1, _ = plot.inside(plot.area).bounds
@@ -386,17 +361,12 @@ def balconies_on(
             ]
             if np.ptp(walls) < 0.3 and abs(min(walls) - y0) < 1.0:
                 y = max(walls) - 0.6
-                middle = (float(x), y, float(z))
+                slab, rail = (2.5, 1.3, 0.18), (2.5, 0.06, 1.0)
+                at = (float(x), y, float(z))
+                above = (at[0], y - 0.6, at[2] + 0.6)
                 parts += [
-                    block(
-                        f"slab_{k}_{j}", (2.5, 1.3, 0.18), middle, rgb=_CONCRETE
-                    ),
-                    block(
-                        f"rail_{k}_{j}",
-                        (2.5, 0.06, 1.0),
-                        (float(x), y - 0.6, float(z) + 0.6),
-                        rgb=(0.5, 0.52, 0.54),
-                    ),
+                    block(f"slab_{k}_{j}", slab, at, rgb=_CONCRETE),
+                    block(f"rail_{k}_{j}", rail, above, rgb=_STEEL),
                 ]
     if len(parts) < 4 or z > 45.0:
         return None
@@ -408,21 +378,17 @@ def renewed(
 ) -> Structure:
     """Returns a building in another colour.
 
-    Args:
-        building: the building.
-        moves: whether insulation moves its walls outwards by 15 cm.
-        rng: draws the colour.
+    If it moves, insulation takes its walls outwards by 15 cm.
     """
     model = building.model
     walls = [p for p in model.parts if "glass" not in p.name and p.rgb]
     if not walls:
         return building
-    sizes: dict[Rgb, int] = {}
+    sizes: Counter[Rgb] = Counter()
     for part in walls:
         assert part.rgb is not None
         mesh = model.meshes.get(getattr(part.shape, "mesh", ""))
-        number = 12 if mesh is None else mesh.num_triangles
-        sizes[part.rgb] = sizes.get(part.rgb, 0) + number
+        sizes[part.rgb] += 12 if mesh is None else mesh.num_triangles
     old, new = max(sizes, key=lambda rgb: sizes[rgb]), _colour(rng)
     parts = [replace(p, rgb=new) if p.rgb == old else p for p in model.parts]
     if moves:

@@ -1,5 +1,6 @@
 """The rates of a city's events, and how often these came about."""
 
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -82,25 +83,17 @@ class Tally:
     """
 
     rates: Mapping[str, float]
-    expected: dict[str, float] = field(default_factory=dict)
-    exposure: dict[str, int] = field(default_factory=dict)
-    number: dict[str, int] = field(default_factory=dict)
+    expected: defaultdict[str, float] = field(
+        default_factory=lambda: defaultdict(float)
+    )
+    exposure: Counter[str] = field(default_factory=Counter)
+    number: Counter[str] = field(default_factory=Counter)
 
     def count(self, event: str, share: float, hit: bool, things: int) -> None:
-        """Counts a draw.
-
-        Args:
-            event: its name.
-            share: its probability.
-            hit: whether it came about.
-            things: things at risk.
-        """
-        for values, value in (
-            (self.expected, share),
-            (self.exposure, things),
-            (self.number, int(hit)),
-        ):
-            values[event] = values.get(event, 0) + value  # type: ignore
+        """Counts a draw of a probability that hits an event, or does not."""
+        self.expected[event] += share
+        self.exposure[event] += things
+        self.number[event] += hit
 
     def to_csv(self) -> str:
         """Returns the rates asked and those that came about.
@@ -110,9 +103,8 @@ class Tally:
         """
         lines = ["event,rate,exposure,expected,events,rate_came_about,p\n"]
         for event, rate in self.rates.items():
-            exposure = self.exposure.get(event, 0)
-            expected = self.expected.get(event, 0.0)
-            number = self.number.get(event, 0)
+            exposure, number = self.exposure[event], self.number[event]
+            expected = self.expected[event]
             share = number / exposure if exposure else float("nan")
             lines.append(
                 f"{event},{rate:.6g},{exposure},{expected:.3f},{number},"

@@ -45,14 +45,10 @@ def corner_setback(
 ) -> float:
     """Returns the distance from a junction at which a road must end [m].
 
-    There the kerb of the given radius between two neighbouring roads
-    touches the road's edge. The edges meet at (b + a cos(angle)) /
-    sin(angle) along the road, and the arc begins r / tan(angle / 2) behind.
-
-    Args:
-        half_width, other_half_width: a of the road, b of its neighbour [m].
-        angle: between the two roads [rad].
-        kerb_radius: r [m].
+    There the kerb of radius r between two neighbouring roads touches the road's
+    edge. The edges meet at (b + a cos(angle)) / sin(angle) along the road,
+    where a and b are half the widths of the road and its neighbour, and the arc
+    begins r / tan(angle / 2) behind.
     """
     # Roads on top of one another never part.
     if angle < 1e-6:
@@ -137,29 +133,19 @@ def _stub(road: Road, arm: Arm) -> LineString:
 def make_areas(
     roads: Mapping[str, Road], junction_areas: Mapping[str, BaseGeometry]
 ) -> Areas:
-    """Returns the areas of a whole network.
-
-    Args:
-        roads: the roads by name.
-        junction_areas: the area of each junction by name.
-    """
+    """Returns the areas of a whole network, its roads and junctions by name."""
     lanes = {name: road_strip(road) for name, road in roads.items()}
     bays = {}
     for name, road in roads.items():
         if road.parking > 0 and road.length > 2 * _BAY_CLEARANCE:
             edge, far = road.half_width, road.half_width + road.parking
-            for side, offsets in (
-                ("right", (-far, -edge)),
-                ("left", (edge, far)),
+            for side, low, high in (
+                ("right", -far, -edge),
+                ("left", edge, far),
             ):
-                bays[name, side] = _band(road, *offsets, _BAY_CLEARANCE)
-    medians = unary_union(
-        [
-            _median(road)
-            for road in roads.values()
-            if 0 < road.median < road.length
-        ]
-    )
+                bays[name, side] = _band(road, low, high, _BAY_CLEARANCE)
+    wide = [r for r in roads.values() if 0 < r.median < r.length]
+    medians = unary_union([_median(road) for road in wide])
     without_bays = _join([*lanes.values(), *junction_areas.values()])
     carriageway = _join([without_bays, *bays.values()])
     walks = [

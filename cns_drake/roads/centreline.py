@@ -41,11 +41,7 @@ class Centreline:
     """A polyline whose corners are rounded by arcs."""
 
     def __init__(self, points: ArrayLike, radii: ArrayLike) -> None:
-        """Rounds each inner corner by the arc of the given radius.
-
-        Args:
-            points: (N, 2) corners, first and last included [m].
-            radii: N - 2 radii of the inner corners [m].
+        """Rounds N - 2 inner corners, of N points, by arcs of some radii [m].
 
         Raises:
             ValueError: a corner's arc does not fit between its neighbours,
@@ -74,15 +70,14 @@ class Centreline:
         for k, straight in enumerate(np.maximum(spare, 0.0)):
             self._append(position, heading, 0.0, straight)
             if k < len(turns):
-                direction = _direction(headings[k])
-                position = points[k + 1] - tangents[k + 1] * direction
-                if tangents[k + 1] > 0:
+                corner, tangent = points[k + 1], tangents[k + 1]
+                if tangent > 0:
+                    begin = corner - tangent * _direction(heading)
                     curvature = np.sign(turns[k]) / radii[k]
                     length = abs(turns[k]) * radii[k]
-                    self._append(position, headings[k], curvature, length)
+                    self._append(begin, heading, curvature, length)
                 heading = headings[k + 1]
-                direction = _direction(heading)
-                position = points[k + 1] + tangents[k + 1] * direction
+                position = corner + tangent * _direction(heading)
         self._ends = np.cumsum([piece.length for piece in self._pieces])
 
     def _append(
@@ -115,11 +110,9 @@ class Centreline:
 
 
 def sample_stations(start: float, end: float, spacing: float) -> np.ndarray:
-    """Returns evenly spaced arc lengths from start to end, both included.
+    """Returns evenly spaced arc lengths from start to end, both included [m].
 
-    Args:
-        start, end: arc lengths [m], start < end.
-        spacing: upper bound of the distance between samples [m].
+    Their distance is at most a spacing [m].
     """
     count = max(2, int(np.ceil((end - start) / spacing - 1e-9)) + 1)
     return np.linspace(start, end, count)
@@ -143,11 +136,8 @@ def blend(
     Args:
         p_start, p_end: (2,) points [m].
         heading_start, heading_end: directions of travel [rad].
-        spacing: about the distance between the returned points [m].
+        spacing: about the distance of the (N, 2) points, ends included [m].
         max_radius: radius of the arc [m].
-
-    Returns:
-        (N, 2) points [m], both ends included.
     """
     p_start, p_end = np.asarray(p_start, float), np.asarray(p_end, float)
     d_start = _direction(heading_start)

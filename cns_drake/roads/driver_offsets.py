@@ -15,7 +15,7 @@ from shapely import STRtree
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.route import smooth_step
-from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR
+from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR, directions, outlines
 
 # Spacing of the path that `depart` needs [m].
 FINE_SPACING = 0.5
@@ -61,18 +61,18 @@ def depart(
 ) -> LanePath:
     """Returns the path of a driver who wanders and changes lanes.
 
-    Where the line has obstacles nearby, the car stays on it. Elsewhere, it
-    keeps 0.3 m from all of them, mirrors included.
+    Where the line has obstacles nearby, seen from above, the car stays on it.
+    Elsewhere, it keeps 0.3 m from all of them, mirrors included.
 
     Args:
         path: the line, with points every `FINE_SPACING`.
         spacing: distance of the points of the result [m].
-        obstacles: kerbs, walls and the like, seen from above.
+        obstacles: kerbs, walls and the like.
         source: the beginning of an error's message.
         wander: standard deviation of the offset in the lane [m].
         wander_length: distance after which its correlation is 1/e [m].
         lane_changes: rate of changes to another lane and back [1/km].
-        rng: decides.
+        rng: the only source of variation.
 
     Raises:
         InputError: the path is too short or too long for a drive.
@@ -82,23 +82,18 @@ def depart(
     if lane_changes:
         points = _change_lanes(path, obstacles, lane_changes, lane_rng)
     if wander:
-        _, left = _directions(points)
         low, high = _room(points, obstacles)
         offset = _wander(low, high, wander, wander_length, wander_rng)
-        points = _moved(points, left, offset)
+        points = _moved(points, points, offset)
     return sample_lane_path(points, path.speed_limits, spacing, source)
 
 
-def _directions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the (N, 2) directions ahead and to the left at (N, 3) points."""
-    along = np.gradient(points[:, :2], axis=0)
-    along /= np.sqrt(along[:, :1] ** 2 + along[:, 1:] ** 2)
-    return along, np.column_stack([-along[:, 1], along[:, 0]])
-
-
 def _moved(
-    points: np.ndarray, left: np.ndarray, offset: np.ndarray
+    points: np.ndarray, line: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
+    """Returns (N, 3) points moved by offsets to the left of a line (N, 3)."""
+    along = directions(line[:, :2])
+    left = np.column_stack([-along[:, 1], along[:, 0]])
     xy = points[:, :2] + offset[:, None] * left
     return np.column_stack([xy, points[:, 2]])
 
@@ -107,18 +102,11 @@ def _is_free(
     points: np.ndarray, offsets: np.ndarray, obstacles: STRtree
 ) -> np.ndarray:
     """Returns (N, K) whether a car has room at K offsets from N points."""
-    along, left = _directions(points)
-    middle = points[:, None, :2] + offsets[:, None] * left[:, None]
-    corners = [
-        middle + x * along[:, None] + y * left[:, None]
-        for x, y in (
-            (-REAR, -HALF_WIDTH),
-            (FRONT, -HALF_WIDTH),
-            (FRONT, HALF_WIDTH),
-            (-REAR, HALF_WIDTH),
-        )
-    ]
-    cars = np.asarray(shapely.polygons(np.stack(corners, axis=2))).ravel()
+    along = directions(points[:, :2])[:, None]
+    left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    middle = points[:, None, :2] + offsets[:, None] * left
+    corners = outlines(middle, along, REAR, FRONT, HALF_WIDTH)
+    cars = np.asarray(shapely.polygons(corners)).ravel()
     hit, _ = obstacles.query(cars, "dwithin", _CLEARANCE + _SLACK)
     free = np.ones(len(cars), dtype=bool)
     free[hit] = False
@@ -137,7 +125,6 @@ def _change_lanes(
     """
     assert path.beside is not None  # Lanes belong to routes alone.
     s = path.spacing * np.arange(len(path.points))
-    _, left = _directions(path.points)
     points = path.points
     half = _RAMP / 2
     ratio = math.log(LONGEST_EPISODE / SHORTEST_EPISODE)
@@ -158,7 +145,8 @@ def _change_lanes(
                 np.clip((s - begin) / _RAMP + 0.5, 0.0, 1.0)
             ) - smooth_step(np.clip((s - end) / _RAMP + 0.5, 0.0, 1.0))
             sign = 1.0 if side == 0 else -1.0
-            moved = _moved(points, left, sign * share * path.beside[:, side])
+            aside = sign * share * path.beside[:, side]
+            moved = _moved(points, path.points, aside)
             if _is_free(moved[run][::_CHECKED], np.zeros(1), obstacles).all():
                 points = moved
                 done = end + half

@@ -30,6 +30,8 @@ from cns_drake.roads.road import (
 )
 
 Turn = Literal["left", "straight", "right"]
+# x, y, z [m] and heading [rad].
+_Pose = tuple[float, float, float, float]
 
 # Beyond this change of heading a way through a junction is a turn.
 _STRAIGHT_LIMIT_DEG = 35.0
@@ -63,9 +65,7 @@ class RoadNetwork:
     def __init__(self, roads: dict[str, Road], junctions: dict[str, Junction]):
         self.roads = roads
         self.junctions = junctions
-        self._ends: dict[
-            tuple[LaneRef, str], tuple[float, float, float, float]
-        ] = {}
+        self._lane_ends: dict[tuple[LaneRef, str], _Pose] = {}
 
     def exit_junction(self, lane: LaneRef) -> str:
         """Returns the name of the junction that a lane leads to."""
@@ -82,9 +82,7 @@ class RoadNetwork:
     ) -> Connection:
         """Returns the way from one lane to another, legal or not.
 
-        Args:
-            incoming, outgoing: the lanes to join.
-            spacing: about the distance between its points [m].
+        Its points are about a spacing apart [m].
 
         Raises:
             ValueError: a lane does not exist, the lanes do not meet in a
@@ -101,8 +99,7 @@ class RoadNetwork:
             raise ValueError(
                 f"U-turn from road {incoming.road} to road {outgoing.road}"
             )
-        a = self._lane_end(incoming, "exit")
-        b = self._lane_end(outgoing, "entry")
+        a, b = self._ends(incoming, outgoing)
         place = self.junctions[junction]
         turn = _classify(_turn_deg(a, b), len(place.arms))
         # To the right, the outermost lane follows the kerb.
@@ -122,18 +119,21 @@ class RoadNetwork:
         """
         if incoming.road == outgoing.road:
             return incoming.direction != outgoing.direction
-        a = self._lane_end(incoming, "exit")
-        b = self._lane_end(outgoing, "entry")
-        return abs(_turn_deg(a, b)) > _U_TURN_LIMIT_DEG
+        return (
+            abs(_turn_deg(*self._ends(incoming, outgoing))) > _U_TURN_LIMIT_DEG
+        )
 
-    def _lane_end(
-        self, lane: LaneRef, end: str
-    ) -> tuple[float, float, float, float]:
-        """Returns what `Road.lane_end` does; each pair of lanes asks for it."""
-        if (lane, end) not in self._ends:
-            road = self.roads[lane.road]
-            self._ends[lane, end] = road.lane_end(*lane[1:], end)
-        return self._ends[lane, end]
+    def _ends(
+        self, incoming: LaneRef, outgoing: LaneRef
+    ) -> tuple[_Pose, _Pose]:
+        """Returns the end of one lane and the beginning of another."""
+        # Each pair of lanes asks for them.
+        wanted = (incoming, "exit"), (outgoing, "entry")
+        for lane, end in wanted:
+            if (lane, end) not in self._lane_ends:
+                pose = self.roads[lane.road].lane_end(*lane[1:], end)
+                self._lane_ends[lane, end] = pose
+        return self._lane_ends[wanted[0]], self._lane_ends[wanted[1]]
 
     def lanes(self) -> Iterator[LaneRef]:
         """Yields every lane of every road."""
@@ -182,8 +182,8 @@ class RoadNetwork:
     @cached_property
     def _junction_areas(self) -> dict[str, BaseGeometry]:
         return {
-            junction.name: carriageway.junction_area(self.roads, junction)
-            for junction in self.junctions.values()
+            name: carriageway.junction_area(self.roads, junction)
+            for name, junction in self.junctions.items()
         }
 
     @cached_property
@@ -215,8 +215,8 @@ class RoadNetwork:
         return self._areas.lane_area
 
 
-def _turn_deg(a: Sequence[float], b: Sequence[float]) -> float:
-    """Returns the left turn from a's heading to b's; (x, y, z, heading)."""
+def _turn_deg(a: _Pose, b: _Pose) -> float:
+    """Returns the left turn from a's heading to b's."""
     return float(np.degrees(wrapped(b[3] - a[3])))
 
 
@@ -238,25 +238,24 @@ def load_road_network(path: Path | str) -> RoadNetwork:
     """
     path = Path(path)
     file = read_roads_file(path)
-    curves = {}
-    for name, entry in file.roads.items():
-        curves[name] = _make_curve(path, file, name, entry)
+    curves = {
+        name: _make_curve(path, file, name, entry)
+        for name, entry in file.roads.items()
+    }
     junctions = {
         name: _make_junction(path, file, name, curves)
         for name in file.junctions
     }
     roads = {}
     for name, entry in file.roads.items():
+        ends = [junctions[entry.start], junctions[entry.end]]
         setbacks = [
             arm.setback
-            for junction, end in ((entry.start, "start"), (entry.end, "end"))
-            for arm in junctions[junction].arms
+            for junction, end in zip(ends, ENDS, strict=True)
+            for arm in junction.arms
             if (arm.road, arm.end) == (name, end)
         ]
-        heights = [
-            file.junctions[junction].height
-            for junction in (entry.start, entry.end)
-        ]
+        heights = [junction.height for junction in ends]
         try:
             roads[name] = Road(name, entry, curves[name], setbacks, heights)
         except ValueError as error:

@@ -171,14 +171,10 @@ class Road:
         setbacks: Sequence[float],
         heights: Sequence[float],
     ):
-        """Makes a road.
+        """Makes a road between two junctions of some heights [m].
 
-        Args:
-            name: its name in the file.
-            entry: its description.
-            curve: the whole centreline, junction to junction.
-            setbacks: distance of both ends from their junctions [m].
-            heights: heights of the start and end junctions [m].
+        The curve is its whole centreline, and setbacks are the distances of its
+        ends from their junctions [m].
 
         Raises:
             ValueError: the setbacks leave nothing of the road, or its heights
@@ -202,13 +198,14 @@ class Road:
                 f"its junctions need {sum(setbacks):.1f} m of its "
                 f"{curve.length:.1f} m"
             )
-        stations = [0.0, self.first_station]
-        z = [heights[0], heights[0]]
-        for station, height in entry.heights:
-            stations.append(station)
-            z.append(height)
-        stations += [self.last_station, curve.length]
-        z += [heights[1], heights[1]]
+        profile = [
+            (0.0, heights[0]),
+            (self.first_station, heights[0]),
+            *entry.heights,
+            (self.last_station, heights[1]),
+            (curve.length, heights[1]),
+        ]
+        stations, z = np.transpose(profile)
         if np.any(np.diff(stations) <= 0):
             raise ValueError("heights must lie between the junctions, in order")
         # Slow to import, and not needed to describe or to list drives.
@@ -236,9 +233,8 @@ class Road:
     ) -> np.ndarray:
         """Returns (N, 4): x, y, z [m] and heading of `forward` [rad].
 
-        Args:
-            stations: (N,) arc lengths along the whole centreline [m].
-            offset: lateral offset to the left, a number or (N,) [m].
+        Stations are (N,) arc lengths along the whole centreline, and the offset
+        is to the left, a number or (N,) [m].
         """
         stations = np.asarray(stations, dtype=float)
         x, y, heading = self._curve.evaluate(stations).T
@@ -253,11 +249,9 @@ class Road:
     def stations(
         self, spacing: float = 1.0, clearance: float = 0.0
     ) -> np.ndarray:
-        """Returns the (N,) evenly spaced stations of the road itself.
+        """Returns the (N,) evenly spaced stations of the road itself [m].
 
-        Args:
-            spacing: upper bound of their distance [m].
-            clearance: distance to keep from both ends of the road [m].
+        They are at most a spacing apart, and keep clear of both ends.
         """
         first = self.first_station + clearance
         last = self.last_station - clearance
@@ -298,9 +292,7 @@ class Road:
     ) -> tuple[float, float, float, float]:
         """Returns x, y, z [m] and the driving heading at a lane's end.
 
-        Args:
-            direction, lane: the lane.
-            end: "entry" where its traffic comes in, "exit" where it leaves.
+        That is its "entry", where traffic comes in, or its "exit".
         """
         at_first = (direction == "forward") == (end == "entry")
         station = self.first_station if at_first else self.last_station

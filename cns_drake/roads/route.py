@@ -96,8 +96,7 @@ def make_lane_path(
     allows.
 
     Args:
-        network: the roads.
-        route: the legs.
+        network, route: the roads, and the legs on them.
         spacing: the distance of the points, rounded so that it divides the
             length of the route [m].
         source: the file that errors name.
@@ -203,14 +202,10 @@ def _leg_points(
     end: float,
     aside: float,
 ) -> np.ndarray:
-    """Returns the (N, 3) points of a leg on its road.
+    """Returns the (N, 3) points of a leg on its road, from start to end [m].
 
-    Args:
-        network: the roads.
-        leg: the leg.
-        start, end: stretch of the leg, from the entry of the road; beyond the
-            road if the car turns round in a junction [m].
-        aside: offset to the right of the lanes' middle [m].
+    They count from the entry of the road, and are beyond it if the car turns
+    round in a junction. The path is aside to the right of the lanes' middle.
 
     Raises:
         ValueError: the leg does not fit its road.
@@ -248,9 +243,8 @@ def _turn_round(
 ) -> tuple[np.ndarray, float]:
     """Returns the turn of the car at the end of a leg.
 
-    Returns:
-        The (N, 3) points between the lanes, and the place where it leaves the
-        first lane, from the entry of the road [m].
+    That is the (N, 3) points between the lanes, and the place where it leaves
+    the first lane, from the entry of the road [m].
 
     Raises:
         ValueError: there is no room, or no such lane.
@@ -374,10 +368,7 @@ def draw_route(
 ) -> Route:
     """Draws a legal route that prefers roads that it has not seen yet.
 
-    Args:
-        network: the roads.
-        length: least length of the roads of the route [m].
-        rng: decides.
+    Its roads have a least length [m].
 
     Raises:
         InputError: the network has no route of any length.
@@ -427,9 +418,9 @@ def _successors(
     successors = {}
     for lane in network.lanes():
         road = network.roads[lane.road]
-        exits = range(lane.lane, lane.lane + 1)
+        exits = [lane.lane]
         if road.length > MIN_LANE_CHANGE_LENGTH:
-            exits = range(1, road.lanes[lane.direction] + 1)
+            exits = [*range(1, road.lanes[lane.direction] + 1)]
         successors[lane] = [
             (number, after)
             for number in exits

@@ -15,19 +15,15 @@ class StreetAreas(Protocol):
 
     def carriageway(self) -> MultiPolygon:
         """Returns the carriageway: the area where vehicles drive or park."""
-        ...
 
     def lane_area(self) -> MultiPolygon:
         """Returns the carriageway without parking bays."""
-        ...
 
     def sidewalks(self) -> MultiPolygon:
         """Returns the sidewalks: areas beside the road, a kerb higher."""
-        ...
 
     def medians(self) -> MultiPolygon:
         """Returns the medians: areas between the directions, a kerb higher."""
-        ...
 
 
 class SurfaceHeights(Protocol):
@@ -36,11 +32,9 @@ class SurfaceHeights(Protocol):
     @property
     def is_level(self) -> bool:
         """Whether they lie at z = 0 throughout."""
-        ...
 
     def heights(self, xy: ArrayLike) -> np.ndarray:
         """Returns the (N,) heights at (N, 2) places [m]."""
-        ...
 
 
 # Distance of the places on the centrelines that are searched first [m].

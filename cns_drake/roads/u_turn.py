@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 import shapely
-from shapely.geometry import Point, Polygon
+from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import cos, sin
@@ -53,23 +53,18 @@ def loop_corners(
         radius: that of the loop and of the bends at its ends [m].
         aside_in, aside_out: distance of the centre to the left of the lines, at
             most the radius [m].
-
-    Returns:
-        (N, 2) corners [m].
     """
     swing_in = math.acos(min(1.0, (radius + aside_in) / (2 * radius)))
     swing_out = math.acos(min(1.0, (radius + aside_out) / (2 * radius)))
     turn = (heading_out - heading_in) % (2 * np.pi)
     round_ = turn + swing_in + swing_out
-    parts = 3
-    share = round_ / parts
+    share = round_ / 3
     # Corners of the loop are outside it.
     first = heading_in - swing_in - np.pi / 2 + share / 2
-    angles = first + share * np.arange(parts)
+    angles = first + share * np.arange(3)
     reach = radius / math.cos(share / 2)
-    corners = [
-        np.asarray(centre) + reach * np.column_stack([cos(angles), sin(angles)])
-    ]
+    centre = np.asarray(centre)
+    corners = [centre + reach * np.column_stack([cos(angles), sin(angles)])]
     for swing, heading, aside, sign in (
         (swing_in, heading_in, aside_in, -1.0),
         (swing_out, heading_out, aside_out, 1.0),
@@ -80,15 +75,8 @@ def loop_corners(
             # The bend begins 2 r sin(a) before the centre, and its corner
             # lies r tan(a / 2) on from there.
             before = 2 * math.sin(swing) - math.tan(swing / 2)
-            corner = (
-                np.asarray(centre)
-                + sign * before * radius * along
-                + aside * right
-            )
-            if sign < 0:
-                corners.insert(0, corner[None])
-            else:
-                corners.append(corner[None])
+            corner = centre + sign * before * radius * along + aside * right
+            corners.insert(0 if sign < 0 else len(corners), corner[None])
     return np.concatenate(corners)
 
 
@@ -172,21 +160,41 @@ def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
 def swept_area(points: ArrayLike) -> BaseGeometry:
     """Returns the area that a car covers while its rear axle follows points.
 
-    Args:
-        points: (N, 2) of the middle of the axle, close to one another [m].
+    They are (N, 2), of the middle of the axle, close to one another [m].
     """
     points = np.asarray(points, dtype=float)
+    along = directions(points)
+    return shapely.union_all(
+        shapely.polygons(outlines(points, along, REAR, FRONT, HALF_WIDTH))
+    )
+
+
+def directions(points: np.ndarray) -> np.ndarray:
+    """Returns the (N, 2) directions ahead at (N, 2) points of a path."""
     along = np.gradient(points, axis=0)
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    left = np.column_stack([-along[:, 1], along[:, 0]])
+    along /= np.sqrt(along[:, :1] ** 2 + along[:, 1:] ** 2)
+    return along
+
+
+def outlines(
+    places: np.ndarray,
+    ahead: np.ndarray,
+    rear: float,
+    front: float,
+    half_width: float,
+) -> np.ndarray:
+    """Returns the (..., 4, 2) corners of cars seen from above [m].
+
+    Their frames are at (..., 2) places [m], with unit vectors ahead.
+    """
+    left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
     corners = [
-        points + x * along + y * left
+        places + x * ahead + y * left
         for x, y in (
-            (-REAR, -HALF_WIDTH),
-            (FRONT, -HALF_WIDTH),
-            (FRONT, HALF_WIDTH),
-            (-REAR, HALF_WIDTH),
+            (-rear, -half_width),
+            (front, -half_width),
+            (front, half_width),
+            (-rear, half_width),
         )
     ]
-    outlines = [Polygon(outline) for outline in np.stack(corners, axis=1)]
-    return shapely.union_all(outlines)
+    return np.stack(corners, axis=-2)

@@ -42,11 +42,8 @@ def load_waypoint_path(
     it. At a right angle the path is up to 3.3 m from the corner. The height
     follows a monotone cubic over the distance travelled.
 
-    Args:
-        path: the file.
-        spacing: distance of the points of the path [m].
-        u_turns: whether the car turns round where waypoints double back, in its
-            tightest loop, whose far end is the waypoint.
+    Its points are a spacing apart [m]. With `u_turns` the car turns round where
+    waypoints double back, in its tightest loop, whose far end is the waypoint.
 
     Raises:
         InputError: naming file, line and fault, or that the file is too short
@@ -54,13 +51,8 @@ def load_waypoint_path(
     """
     path = Path(path)
     points, lines = read_waypoints(path)
-    return make_waypoint_path(
-        points,
-        spacing,
-        [f"{path}: line {line}" for line in lines],
-        path,
-        u_turns=u_turns,
-    )
+    names = [f"{path}: line {line}" for line in lines]
+    return make_waypoint_path(points, spacing, names, path, u_turns=u_turns)
 
 
 def make_waypoint_path(
@@ -171,12 +163,9 @@ def _loop_length(turns: np.ndarray) -> np.ndarray:
 
 
 def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
-    """Returns the corners of a loop whose far end is a waypoint.
+    """Returns the corners of a loop whose far end is a waypoint, (2,) [m].
 
-    Args:
-        place: (2,) the waypoint [m].
-        heading: towards it [rad].
-        turn: its angle there, positive to the left [rad].
+    The car turns there from a heading by an angle, positive to the left [rad].
     """
     if turn < 0:
         mirror = np.array([1.0, -1.0])

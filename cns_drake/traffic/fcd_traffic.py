@@ -43,11 +43,9 @@ _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 
 @dataclass(frozen=True)
 class TracedObject:
-    """A vehicle or a person of a trace.
+    """A vehicle or a person of a trace, its type "" if it has none.
 
     Attributes:
-        name: its id.
-        type_name: name of its type, "" if it has none.
         steps: (M,) numbers of the times at which it is there, ascending.
         xy: (M, 2) of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
@@ -148,32 +146,18 @@ def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
                     f"line {one.line}: {tag} {name[:40]!r} is there twice"
                 )
             types.setdefault(name, one.value("type", ""))
-            rows.append(
-                (
-                    number,
-                    one.number("x"),
-                    one.number("y"),
-                    one.number("angle"),
-                    one.number("slope", 0.0),
-                )
-            )
-    return tuple(
-        _object(name, types[name], np.array(rows))
-        for name, rows in found.items()
-    )
-
-
-def _object(name: str, type_name: str, rows: np.ndarray) -> TracedObject:
-    # Angles are degrees from north, clockwise; y is north.
-    yaw = np.pi / 2 - np.radians(rows[:, 3])
-    return TracedObject(
-        name,
-        type_name,
-        rows[:, 0].astype(int),
-        rows[:, 1:3],
-        np.unwrap(yaw),
-        np.radians(rows[:, 4]),
-    )
+            place = [one.number(key) for key in ("x", "y", "angle")]
+            rows.append((number, *place, one.number("slope", 0.0)))
+    objects = []
+    for name, rows in found.items():
+        number, x, y, angle, slope = np.transpose(rows)
+        # Angles are degrees from north, clockwise; y is north.
+        yaw = np.unwrap(np.pi / 2 - np.radians(angle))
+        at, xy = number.astype(int), np.column_stack([x, y])
+        objects.append(
+            TracedObject(name, types[name], at, xy, yaw, np.radians(slope))
+        )
+    return tuple(objects)
 
 
 def play_trace(
@@ -196,13 +180,10 @@ def play_trace(
     Args:
         trace: to play.
         path: its file, for errors.
-        graph: lanes of the map, which give heights.
-        walkways: strips of the map; likewise.
+        graph, walkways: those of the map, which give heights.
         seed: seed of the kinds of cars.
-        duration: time to the last frame [s].
-        end: time at which the ego car arrives [s].
-        ego: place of the ego car.
-        ego_box: its size.
+        duration, end: time to the last frame, and when the ego car arrives [s].
+        ego, ego_box: its motion and size.
 
     Raises:
         InputError: the trace is shorter than the drive, or is of another map.
@@ -217,22 +198,16 @@ def play_trace(
     _check_place(trace, path, lanes)
     kinds = [_kind(one, seed) for one in trace.vehicles]
     heights = _Heights(lanes)
-    vehicles = _make_tracks(
-        trace,
-        trace.vehicles,
-        [
-            _vehicle_rows(*pair, heights)
-            for pair in zip(trace.vehicles, kinds, strict=True)
-        ],
-    )
+    rows = [
+        _vehicle_rows(*pair, heights)
+        for pair in zip(trace.vehicles, kinds, strict=True)
+    ]
+    vehicles = _make_tracks(trace, trace.vehicles, rows)
     heights = _Heights(
         np.concatenate([lanes, *(walkway.points for walkway in walkways)])
     )
-    walkers = _make_tracks(
-        trace,
-        trace.persons,
-        [_person_rows(one, heights, trace.dt) for one in trace.persons],
-    )
+    rows = [_person_rows(one, heights, trace.dt) for one in trace.persons]
+    walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
     # Steps are short enough to notice all that cross the car's way.
     step = min(trace.dt, 0.1)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 import json
+import math
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -12,7 +13,6 @@ from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
 from cns_drake.traffic.lane_graph import (
-    Crossing,
     LaneGraph,
     Piece,
     Walkway,
@@ -71,11 +71,8 @@ class _File(_Model):
 class LaneFile(NamedTuple):
     """The content of a file of lanes.
 
-    Attributes:
-        graph: lanes, their signals, and crossings.
-        walkways: strips for the walkers.
-        in_the_way: names of structures, such as parked cars, that stand where
-            vehicles drive; a drive with traffic is without them.
+    Structures that are `in_the_way`, such as parked cars, stand where vehicles
+    drive: a drive with traffic is without them.
     """
 
     graph: LaneGraph
@@ -97,8 +94,7 @@ def lane_text(
                 "way": piece.is_way,
                 "after": list(piece.after),
                 "junction": piece.junction,
-                **_unless(-1, left=piece.left, right=piece.right),
-                **_unless(-1, phase=piece.phase),
+                **_known(piece, "left", "right", "phase"),
             }
             for piece in graph.pieces
         ],
@@ -108,7 +104,7 @@ def lane_text(
                 "half_width": round(way.half_width, 3),
                 "start": way.start,
                 "end": way.end,
-                **_unless(-1, crossing=way.crossing),
+                **_known(way, "crossing"),
             }
             for way in walkways
         ],
@@ -117,7 +113,10 @@ def lane_text(
         content["crossings"] = [
             {
                 "line": np.round(crossing.line, 3).tolist(),
-                "width": round(_width(crossing), 3),
+                # That of the rectangle about its line.
+                "width": round(
+                    crossing.area.area / math.dist(*crossing.line[:, :2]), 3
+                ),
             }
             for crossing in graph.crossings
         ]
@@ -126,14 +125,10 @@ def lane_text(
     return json.dumps(content, separators=(",", ":")) + "\n"
 
 
-def _unless(usual: int, **values: int) -> dict[str, int]:
-    return {key: value for key, value in values.items() if value != usual}
-
-
-def _width(crossing: Crossing) -> float:
-    """Returns the width of the rectangle about a crossing's line [m]."""
-    length = float(np.linalg.norm(np.diff(crossing.line[:, :2], axis=0)))
-    return crossing.area.area / length
+def _known(one: Piece | Walkway, *names: str) -> dict[str, int]:
+    """Returns the numbers of some names, without those that are -1."""
+    values = {name: getattr(one, name) for name in names}
+    return {name: value for name, value in values.items() if value != -1}
 
 
 def read_lanes(path: Path) -> LaneFile:
@@ -172,13 +167,9 @@ def read_lanes(path: Path) -> LaneFile:
     pieces = tuple(
         Piece(
             resampled(np.array(lane.points)),
-            lane.limit,
-            lane.way,
-            tuple(lane.after),
-            lane.left,
-            lane.right,
-            lane.junction,
-            lane.phase,
+            is_way=lane.way,
+            after=tuple(lane.after),
+            **lane.model_dump(exclude={"points", "way", "after"}),
         )
         for lane in found.lanes
     )
@@ -187,10 +178,7 @@ def read_lanes(path: Path) -> LaneFile:
     walkways = [
         Walkway(
             resampled(np.array(way.points)),
-            way.half_width,
-            way.start,
-            way.end,
-            way.crossing,
+            **way.model_dump(exclude={"points"}),
         )
         for way in found.walkways
     ]

@@ -61,8 +61,7 @@ class Piece:
 
     @property
     def length(self) -> float:
-        steps = np.diff(self.points, axis=0)
-        return float(np.linalg.norm(steps, axis=1).sum())
+        return length_of(self.points)
 
 
 @dataclass(frozen=True)
@@ -134,12 +133,8 @@ def kept_clear(
 ) -> list[Walkway]:
     """Returns walkways that pass things, and end where these bar the way.
 
-    Args:
-        walkways: without regard to things.
-        things: what stands there, seen from above [m].
-
-    Returns:
-        The rest of them; no crossing without a walkway at both ends.
+    The things are seen from above [m]. No crossing stays without a walkway at
+    both ends.
     """
     tree, found = shapely.STRtree(things), []
     num_nodes = 1 + max(
@@ -250,12 +245,7 @@ def with_unmarked_crossings(
     """Adds places between crossings where walkers may cross narrow streets.
 
     Each is as near to the middle of a lane as there is a walkway on both sides
-    and nothing stands in between. A walkway has one at most.
-
-    Args:
-        graph: lanes and crossings.
-        walkways: along its lanes and over its crossings.
-        things: what stands there, seen from above [m].
+    and nothing stands in between, seen from above. A walkway has one at most.
 
     Returns:
         The graph with more crossings; the walkways, cut there, and more.
@@ -358,19 +348,26 @@ def with_unmarked_crossings(
 def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
     """Returns evenly spaced points (N, 3) along a polyline (M, 3) [m].
 
-    Args:
-        points: corners; those that coincide with the one before are dropped.
-        spacing: upper bound of the distance [m].
+    Their distance is at most a spacing [m]. Corners that coincide with the one
+    before are dropped.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    kept = np.concatenate([[True], steps > 1e-6])
-    points = points[kept]
-    along = np.concatenate(
-        [[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
-    )
+    points = points[np.append(True, steps > 1e-6)]
+    along = distances_along(points)
     count = max(2, int(np.ceil(along[-1] / spacing)) + 1)
     wanted = np.linspace(0.0, along[-1], count)
     return np.column_stack([np.interp(wanted, along, x) for x in points.T])
+
+
+def length_of(points: np.ndarray) -> float:
+    """Returns the length of a line through points (N, 2 or 3) [m]."""
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def distances_along(points: np.ndarray) -> np.ndarray:
+    """Returns the (N,) distances of points (N, 2 or 3) along their line [m]."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.append(0.0, np.cumsum(steps))
 
 
 def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:

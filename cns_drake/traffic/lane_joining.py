@@ -41,16 +41,16 @@ def join_lanes(
     links: Iterable[tuple[int, int]],
     right_of: Mapping[int, int] | None = None,
 ) -> LaneGraph:
-    """Returns lanes with ways between them.
+    """Returns the graph of lanes of a map, cut at its own places.
 
     Args:
-        lanes: all of a map, cut at its own places.
+        lanes: all of them.
         links: pairs of lane numbers; the second lane follows the first.
         right_of: number of a lane -> that of the lane on its right, in the
             same direction; without it, vehicles do not change lanes.
 
     Returns:
-        A graph without signals and crossings. It is empty if vehicles cannot
+        A graph without signals and crossings; it is empty if vehicles cannot
         drive for ever anywhere.
     """
     merged, after, beside = _merge(lanes, links, right_of or {})
@@ -62,7 +62,14 @@ def join_lanes(
     ]
     number = {k: row for row, k in enumerate(long)}
     left_of = {right: left for left, right in beside.items()}
-    clusters = _Clusters()
+    # Places that are in one junction, as trees: place -> its parent.
+    parents: dict[tuple[int, str], tuple[int, str]] = {}
+
+    def cluster(place: tuple[int, str]) -> tuple[int, str]:
+        while (parent := parents.get(place, place)) != place:
+            place = parent
+        return place
+
     ways = []
     for k in long:
         for short, last in _ways(k, after, set(long)):
@@ -75,13 +82,12 @@ def join_lanes(
             )
             limit = min(merged[one].limit for one in (k, *short, last))
             ways.append((k, last, line, limit))
-            clusters.join((k, "end"), (last, "start"))
-            for one in short:
-                clusters.join((k, "end"), (one, "whole"))
+            for place in ((last, "start"), *((one, "whole") for one in short)):
+                parents[cluster(place)] = cluster((k, "end"))
     junctions = {
         key: row
         for row, key in enumerate(
-            dict.fromkeys(clusters.of((k, "end")) for k in long)
+            dict.fromkeys(cluster((k, "end")) for k in long)
         )
     }
     pieces = [
@@ -94,7 +100,7 @@ def join_lanes(
             ),
             left=number.get(left_of.get(k, -1), -1),
             right=number.get(beside.get(k, -1), -1),
-            junction=junctions[clusters.of((k, "end"))],
+            junction=junctions[cluster((k, "end"))],
         )
         for k in long
     ]
@@ -104,7 +110,7 @@ def join_lanes(
             limit,
             True,
             (number[last],),
-            junction=junctions[clusters.of((k, "end"))],
+            junction=junctions[cluster((k, "end"))],
         )
         for k, last, line, limit in ways
     ]
@@ -187,19 +193,3 @@ def _ways(
                     found += 1
             elif k not in short and len(short) < _MOST_SHORT:
                 waiting.append((*short, k))
-
-
-class _Clusters:
-    """Places that belong together."""
-
-    def __init__(self) -> None:
-        self._parent: dict[tuple[int, str], tuple[int, str]] = {}
-
-    def of(self, key: tuple[int, str]) -> tuple[int, str]:
-        """Returns the representative of a place's cluster."""
-        while (parent := self._parent.get(key, key)) != key:
-            key = parent
-        return key
-
-    def join(self, one: tuple[int, str], other: tuple[int, str]) -> None:
-        self._parent[self.of(other)] = self.of(one)

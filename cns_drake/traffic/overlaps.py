@@ -1,19 +1,18 @@
 """Finds overlapping boxes."""
 
+from typing import Any
+
 import numpy as np
 
 from cns_drake.base.compiled import compiled
 
 
 @compiled
-def boxes_overlap(
-    a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
-) -> bool:
+def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
     """Returns whether two rectangles overlap: along all their axes.
 
-    Args:
-        a, b: (3,) x, y of the middle [m] and heading [rad].
-        half_a, half_b: (2,) half length and half width [m].
+    They have (3,) x, y of the middle [m] and heading [rad], and (2,) half the
+    length and the width [m].
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2

@@ -151,13 +151,8 @@ def grant_ways(traffic: Traffic, k: int) -> None:
     for i in range(num_cars):
         if cars[i].held >= 0:
             last = max(last, cars[i].order)
-            _take(
-                streets,
-                taken,
-                cars[i].held,
-                cars[i].large,
-                rear_on_way(streets, cars[i]),
-            )
+            rear = rear_on_way(streets, cars[i])
+            _take(streets, taken, cars[i].held, cars[i].large, rear)
     for c in range(len(crossings)):
         last = max(last, crossings[c].order)
         _take_crossing(traffic, taken, c)
@@ -337,12 +332,10 @@ def _take(
 
     What small and what large vehicles must not enter is `taken`, (2, P).
     """
+    size = int(is_large)
     for other in range(taken.shape[1]):
-        is_near = rear < streets.clear[1, place, other]
-        taken[1, other] |= is_near
-        taken[0, other] |= (
-            is_near if is_large else rear < streets.clear[0, place, other]
-        )
+        taken[1, other] |= rear < streets.clear[1, place, other]
+        taken[0, other] |= rear < streets.clear[size, place, other]
 
 
 @compiled

@@ -16,6 +16,8 @@ from cns_drake.traffic.lane_graph import (
     LaneGraph,
     Piece,
     Walkway,
+    distances_along,
+    length_of,
     make_crossing,
     resampled,
     without_dead_ends,
@@ -94,13 +96,15 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
         junction = clusters[network.exit_junction(ref)]
         phase = -1
         if _has_signals(network, clusters, junction):
-            heading = _exit_heading(network, ref)
-            phase = _phase(heading - axes[junction])
+            # 0 along the junction's first arm, either way, and 1 across.
+            heading = network.roads[ref.road].lane_end(*ref[1:], "exit")[3]
+            across = abs(np.sin(heading - axes[junction]))
+            phase = int(across > np.sin(np.pi / 4))
         for way, last in _ways(onward, ref, long):
             tail_length = _trims_of(ref, trims)[1]
-            tail = _cut(lines[ref], _length(lines[ref]) - tail_length, 0)
+            tail = _cut(lines[ref], length_of(lines[ref]) - tail_length, 0)
             head_length = _trims_of(last, trims)[0]
-            head = _cut(lines[last], 0, _length(lines[last]) - head_length)
+            head = _cut(lines[last], 0, length_of(lines[last]) - head_length)
             between = [
                 piece
                 for connection in way
@@ -145,14 +149,9 @@ def _trims_of(
     return (start, end) if ref.direction == "forward" else (end, start)
 
 
-def _length(line: np.ndarray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-
-
 def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
     """Returns a line (N, 3) shortened at both ends [m]."""
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
+    along = distances_along(line)
     low, high = start, along[-1] - end
     inside = along[(along > low + 1e-3) & (along < high - 1e-3)]
     wanted = np.concatenate([[low], inside, [high]])
@@ -184,15 +183,6 @@ def _has_signals(
         for name, junction in network.junctions.items()
         if clusters[name] == number
     )
-
-
-def _exit_heading(network: RoadNetwork, ref: LaneRef) -> float:
-    return network.roads[ref.road].lane_end(*ref[1:], "exit")[3]
-
-
-def _phase(angle: float) -> int:
-    """Returns 0 along the junction's first arm, either way, and 1 across."""
-    return int(abs(np.sin(angle)) > np.sin(np.pi / 4))
 
 
 def _ways(
@@ -229,22 +219,19 @@ def _crossings(
 
 def _crossing_line(road: Road, end: End) -> np.ndarray:
     """Returns where walkers cross at a road's end, (2, 3), left first [m]."""
-    station = (
-        road.first_station + _CROSSING_PLACE
-        if end == "start"
-        else road.last_station - _CROSSING_PLACE
-    )
     offsets = np.array([road.half_width, -road.half_width])
-    return road.evaluate([station, station], offsets)[:, :3]
+    return road.evaluate([_station(road, end)] * 2, offsets)[:, :3]
+
+
+def _station(road: Road, end: End) -> float:
+    """Returns the station of the crossing at a road's end [m]."""
+    if end == "start":
+        return road.first_station + _CROSSING_PLACE
+    return road.last_station - _CROSSING_PLACE
 
 
 def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
-    """Returns the walkways along the roads of a network.
-
-    Args:
-        network: the roads.
-        graph: lanes of the same network; gives the crossings.
-    """
+    """Returns the walkways of a network, with the crossings of its lanes."""
     nodes: dict[tuple[str, End, int], int] = {}
     for road in network.roads.values():
         if _is_walked(road):
@@ -258,19 +245,13 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
         if not _is_walked(road):
             continue
         for side in (1, -1):
-            first = road.first_station + _CROSSING_PLACE
-            last = road.last_station - _CROSSING_PLACE
+            first, last = (_station(road, end) for end in ENDS)
             stations = np.linspace(first, last, max(2, int(last - first)))
             line = road.evaluate(stations, side * _offset(road))[:, :3]
             line[:, 2] += road.kerb_height
-            found.append(
-                Walkway(
-                    resampled(line),
-                    _half_width(_walked_width(road)),
-                    nodes[road.name, "start", side],
-                    nodes[road.name, "end", side],
-                )
-            )
+            width = _half_width(_walked_width(road))
+            a, b = (nodes[road.name, end, side] for end in ENDS)
+            found.append(Walkway(resampled(line), width, a, b))
     for junction in network.junctions.values():
         found += _corners(network, junction, nodes, places)
     crossed = [
@@ -292,22 +273,16 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                         part = 1.0 - _BEFORE_KERB / distance
                         stop = np.append(start[:2] + part * ahead, start[2])
                         node, number = number, 2 * len(nodes) + len(found)
+                        spur = resampled(np.array([start, stop]))
                         found.append(
-                            Walkway(
-                                resampled(np.array([start, stop])),
-                                _CROSSING_HALF_WIDTH,
-                                node,
-                                number,
-                            )
+                            Walkway(spur, _CROSSING_HALF_WIDTH, node, number)
                         )
                         start = stop
                     ends.append((number, start))
                 (left, one), (right, other) = ends
-                line = np.array([one, *crossing.line, other])
+                line = resampled(np.array([one, *crossing.line, other]))
                 found.append(
-                    Walkway(
-                        resampled(line), _CROSSING_HALF_WIDTH, left, right, k
-                    )
+                    Walkway(line, _CROSSING_HALF_WIDTH, left, right, k)
                 )
     # At unusual junctions, not every corner has a sidewalk.
     lanes = network.lane_area()
@@ -350,12 +325,7 @@ def _offset(road: Road) -> float:
 
 def _place(road: Road, end: End, side: int) -> np.ndarray:
     """Returns x, y, z and heading towards the junction of a sidewalk's end."""
-    station = (
-        road.first_station + _CROSSING_PLACE
-        if end == "start"
-        else road.last_station - _CROSSING_PLACE
-    )
-    place = road.evaluate([station], side * _offset(road))[0]
+    place = road.evaluate([_station(road, end)], side * _offset(road))[0]
     place[2] += road.kerb_height
     if end == "start":
         place[3] += np.pi
@@ -386,7 +356,7 @@ def _corners(
         z = np.linspace(p[2], q[2], len(line))
         width = min(_walked_width(network.roads[key[0]]) for key in (a, b))
         points = np.column_stack([line, z])
-        if np.linalg.norm(np.diff(points, axis=0), axis=1).sum() < _SHORTEST:
+        if length_of(points) < _SHORTEST:
             continue
         found.append(
             Walkway(resampled(points), _half_width(width), nodes[a], nodes[b])

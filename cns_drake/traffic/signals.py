@@ -46,9 +46,7 @@ class Signals(NamedTuple):
 def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
     """Returns the program of all signals.
 
-    Args:
-        graph: lanes and ways, with their phases.
-        begin: (P + C, P + C) see `find_conflicts`.
+    Where ways begin to meet crossings is (P + C, P + C), see `find_conflicts`.
     """
     pieces = graph.pieces
     flow = _flows(graph)
@@ -134,14 +132,9 @@ def _offsets(
 ) -> np.ndarray:
     """Returns the (J,) offsets of the junctions' cycles [s].
 
-    One junction after the other takes the offset with which vehicles wait
-    least.
-
-    Args:
-        graph: lanes and ways.
-        flow: (P,) of vehicles.
-        owner: (P + C,) the junction whose signal each has, -1 for none.
-        signals: their program without offsets.
+    One junction after the other takes the offset with which the (P,) flow of
+    vehicles waits least. The junction whose signal each place has is (P + C,),
+    -1 for none.
     """
     cycle, green_from, green_for = signals
     # Behind a way are a lane and its first way.

@@ -1,5 +1,6 @@
 """Lanes, and the ego car's way over them, as arrays for loops over time."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,8 @@ import shapely
 
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import arctan2, cos, sin
-from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.roads.u_turn import outlines
+from cns_drake.traffic.lane_graph import LaneGraph, Piece, distances_along
 from cns_drake.traffic.signals import Signals, make_signals, way_shares
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 
@@ -115,18 +117,8 @@ class EgoBox(NamedTuple):
 
     def corners(self, xy: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns (N, 4, 2) corners at (N, 2) places and (N,) headings."""
-        c, s = cos(yaw), sin(yaw)
-        outline = (
-            (self.rear, -self.half_width),
-            (self.front, -self.half_width),
-            (self.front, self.half_width),
-            (self.rear, self.half_width),
-        )
-        corners = [
-            (xy[:, 0] + x * c - y * s, xy[:, 1] + x * s + y * c)
-            for x, y in outline
-        ]
-        return np.array(corners).transpose(2, 0, 1)
+        ahead = np.column_stack([cos(yaw), sin(yaw)])
+        return outlines(xy, ahead, -self.rear, self.front, self.half_width)
 
 
 def make_streets(
@@ -279,16 +271,15 @@ def swept_hulls(
         (N + 1,) places of its front bumper [m], and (N,) areas between two.
     """
     line = piece.points[:, :2]
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
+    along = distances_along(line)
     length = along[-1]
 
     def at(s: np.ndarray) -> np.ndarray:
         """Returns places on the way, continued straight beyond its ends."""
         inside = np.clip(s, 0.0, length)
         xy = np.column_stack([np.interp(inside, along, x) for x in line.T])
-        first = (line[1] - line[0]) / steps[0]
-        last = (line[-1] - line[-2]) / steps[-1]
+        first = (line[1] - line[0]) / math.dist(line[1], line[0])
+        last = (line[-1] - line[-2]) / math.dist(line[-1], line[-2])
         xy += np.minimum(s, 0.0)[:, None] * first
         return xy + np.maximum(s - length, 0.0)[:, None] * last
 
@@ -298,21 +289,9 @@ def swept_hulls(
     rear_axle, front_axle = at(middle + axles[0]), at(middle + axles[1])
     ahead = front_axle - rear_axle
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
-    left = np.column_stack([-ahead[:, 1], ahead[:, 0]])
     centre = rear_axle - axles[0] * ahead
     reach, half = size[0] / 2, size[1] / 2 + _CLEARANCE
-    corners = np.stack(
-        [
-            centre + x * ahead + y * left
-            for x, y in (
-                (reach, half),
-                (reach, -half),
-                (-reach, -half),
-                (-reach, half),
-            )
-        ],
-        axis=1,
-    )
+    corners = outlines(centre, ahead, reach, reach, half)
     points = np.concatenate([corners[:-1], corners[1:]], axis=1)
     return front, np.array(shapely.convex_hull(shapely.multipoints(points)))
 
@@ -368,14 +347,9 @@ def _find_ego(
 def places_on(
     streets: Streets, pieces: np.ndarray, s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns x, y and z at distances along pieces [m].
+    """Returns x, y and z (...) at distances (...) along pieces (...) [m].
 
     Before its beginning and after its end a piece goes straight on.
-
-    Args:
-        streets: the pieces.
-        pieces: (...) their numbers.
-        s: (...) distances [m].
     """
     rows = streets.pieces[pieces]
     at = s / rows["step"]
@@ -401,12 +375,8 @@ def is_ego_far(
 ) -> bool:
     """Returns whether a vehicle can leave a lane before the ego car is there.
 
-    Args:
-        streets: the lanes, and the ego car.
-        k: number of the time.
-        lane: the lane.
-        s: distance of the vehicle along it [m].
-        wait: its possible wait at the lane's end [s].
+    At the k-th time it is at a distance s along the lane [m]. It may have to
+    wait at the lane's end [s].
     """
     until = streets.until[k, lane]
     if until == 0.0:

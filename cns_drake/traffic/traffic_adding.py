@@ -4,16 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import (
-    FrameId,
-    GeometryFrame,
-    GeometryInstance,
-    IllustrationProperties,
-    PerceptionProperties,
-    Rgba,
-    SceneGraph,
-    SourceId,
-)
+from pydrake import geometry
+from pydrake.geometry import FrameId, SceneGraph, SourceId
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.base.errors import InputError
@@ -62,13 +54,13 @@ def make_traffic(
     """Adds vehicles and walkers to a SceneGraph; returns the moving system.
 
     Args:
-        scene_graph: takes their geometry, on frames of a source of its own.
-        plan: the traffic.
+        scene_graph, plan: takes the geometry of the traffic, on frames of a
+            source of its own.
         seed: seed of colours and sizes.
         structures: has an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: duration of a LiDAR's turn with motion distortion [s].
-        name: name of the source.
+        name: that of the source.
     """
     if structures is None:
         structures = traffic_structures(plan)
@@ -100,15 +92,8 @@ def add_traffic(
 ) -> TrafficMotion:
     """Adds vehicles and walkers to a diagram.
 
-    Args:
-        builder: builder of the diagram that holds `scene_graph`.
-        scene_graph: takes their geometry.
-        plan: the traffic.
-        name: name of the system, and of the source of geometry.
-        options: further arguments of `make_traffic`.
-
-    Returns:
-        The system; its port `geometry_pose` is connected.
+    Options are further arguments of `make_traffic`. The system has the name of
+    the source of geometry, and its port `geometry_pose` is connected.
 
     Example:
         from cns_drake import add_traffic
@@ -116,22 +101,12 @@ def add_traffic(
         traffic = add_traffic(builder, scene_graph, plan)
     """
     traffic = make_traffic(scene_graph, plan, name=name, **options)
-    place_traffic(builder, scene_graph, traffic, name)
-    return traffic
-
-
-def place_traffic(
-    builder: DiagramBuilder,
-    scene_graph: SceneGraph,
-    traffic: TrafficMotion,
-    name: str = "traffic",
-) -> None:
-    """Adds the system of `make_traffic` to the diagram of its SceneGraph."""
     builder.AddNamedSystem(name, traffic)
     builder.Connect(
         traffic.GetOutputPort("geometry_pose"),
         scene_graph.get_source_pose_port(traffic.source_id),
     )
+    return traffic
 
 
 def connect_traffic(
@@ -153,29 +128,25 @@ def connect_traffic(
 
 
 def _register(
-    scene_graph: SceneGraph,
-    source: SourceId,
-    name: str,
-    limbs: Sequence[Limb],
+    scene_graph: SceneGraph, source: SourceId, name: str, limbs: Sequence[Limb]
 ) -> tuple[FrameId, ...]:
+    """Registers limbs; returns their frames."""
     frames = []
     for limb in limbs:
-        frame = scene_graph.RegisterFrame(
-            source, GeometryFrame(f"{name}_{limb.name}")
-        )
-        frames.append(frame)
+        frame = geometry.GeometryFrame(f"{name}_{limb.name}")
+        frames.append(scene_graph.RegisterFrame(source, frame))
         for one in limb.shapes:
-            geometry = scene_graph.RegisterGeometry(
+            label = f"{name}/{limb.name}_{one.name}"
+            number = scene_graph.RegisterGeometry(
                 source,
-                frame,
-                GeometryInstance(
-                    one.X_LS, one.shape, f"{name}/{limb.name}_{one.name}"
-                ),
+                frames[-1],
+                geometry.GeometryInstance(one.X_LS, one.shape, label),
             )
             for properties in (
-                PerceptionProperties(),
-                IllustrationProperties(),
+                geometry.PerceptionProperties(),
+                geometry.IllustrationProperties(),
             ):
-                properties.AddProperty("phong", "diffuse", Rgba(*one.rgb, 1.0))
-                scene_graph.AssignRole(source, geometry, properties)
+                rgba = geometry.Rgba(*one.rgb, 1.0)
+                properties.AddProperty("phong", "diffuse", rgba)
+                scene_graph.AssignRole(source, number, properties)
     return tuple(frames)

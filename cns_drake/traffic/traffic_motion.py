@@ -122,15 +122,7 @@ class LimbTable:
 
 
 class TrafficBody(NamedTuple):
-    """A vehicle or a walker.
-
-    Attributes:
-        instance: its id in points and tables.
-        name: that of its structure.
-        semantic_class: a key of `CLASS_IDS`.
-        limbs: its rigid parts.
-        frames: one for each limb.
-    """
+    """A vehicle or a walker, with a frame for each of its rigid limbs."""
 
     instance: int
     name: str
@@ -179,9 +171,10 @@ class TrafficMotion(LeafSystem):
         super().__init__()
         self.source_id = source_id
         self._plan = plan
-        self._bodies = tuple(bodies)
+        # The vehicles, then the walkers.
+        self.bodies = tuple(bodies)
         self._limbs = LimbTable([body.limbs for body in bodies])
-        frames = (frame for body in self._bodies for frame in body.frames)
+        frames = (frame for body in self.bodies for frame in body.frames)
         # Limb's frame -> its row in the ports of all limbs.
         self.moving_frames: dict[FrameId, int] = {
             frame: row for row, frame in enumerate(frames)
@@ -216,11 +209,6 @@ class TrafficMotion(LeafSystem):
         ):
             self.DeclareAbstractOutputPort(name, model.Clone, calc, now)
 
-    @property
-    def bodies(self) -> tuple[TrafficBody, ...]:
-        """The vehicles, then the walkers."""
-        return self._bodies
-
     def _calc_frame_poses(
         self, context: Context, output: AbstractValue
     ) -> None:
@@ -253,7 +241,7 @@ class TrafficMotion(LeafSystem):
     def _calc_objects(self, context: Context, output: AbstractValue) -> None:
         states: BodyStates = self._states.Eval(context)
         here = np.flatnonzero(states.present)
-        bodies = [self._bodies[k] for k in here]
+        bodies = [self.bodies[k] for k in here]
         p_WO = states.p_WB + states.up_W * self._sizes[:, 2:] / 2
         output.set_value(
             RecordedObjects(

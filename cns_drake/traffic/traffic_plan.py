@@ -85,13 +85,10 @@ class Tracks:
         return value + beyond * rate, rate / self.dt
 
     def _there(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates at rows of times, and whether bodies are there.
+        """Returns coordinates at (...) times, and whether bodies are there.
 
-        Args:
-            k: (...) rows; there is no body before the first and after the last.
-
-        Returns:
-            (..., N, D), and bool that fit it.
+        They are (..., N, D), and bool that fit it. There is no body before the
+        first time and after the last.
         """
         row = np.clip(k, 0, len(self.values) - 1)
         there = (k == row)[..., None]
@@ -149,17 +146,13 @@ class TrafficPlan:
 
 
 class _Task(NamedTuple):
-    """What all trials of a plan have in common.
+    """What all trials of a plan have in common; see `plan_traffic`.
 
     Attributes:
-        graph: lanes of the vehicles.
-        walkways: strips for the walkers.
         streets: the graph, and the ego car at K steps, which begin before the
             drive.
         ego_track: (2 K - 1, 3) x, y [m], heading [rad] of the middle of the
             ego car's box at half steps.
-        ego_box: its size.
-        vehicles, walkers: wanted numbers.
         drive: the ego car's, if it follows other vehicles; it then stands in
             `streets` and `ego_track`.
     """
@@ -189,13 +182,11 @@ def plan_traffic(
     """Plans traffic for a drive; equal arguments give an equal plan.
 
     Args:
-        graph: lanes of the vehicles.
-        walkways: strips for the walkers.
+        graph, walkways: lanes of the vehicles, and strips for the walkers.
         vehicles, walkers: wanted numbers.
         seed: seed of all draws.
         duration: length of the drive [s].
-        ego: the ego car's motion.
-        ego_box: its size.
+        ego, ego_box: the ego car's motion and size.
         drive: the ego car's, if it follows other vehicles; `ego` then stands at
             its first place, and `duration` is the longest.
 
@@ -340,18 +331,14 @@ class Trial:
         u = self._follower.u
         return self._follower.arrived and u[num_steps - _AFTER] == u[-1]
 
-    def _kept(self) -> tuple[list[int], list[int]]:
+    def _kept(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns the vehicles and the walkers that meet no other body."""
-        out = set(whom_to_leave_out(self._overlaps, 1))
-        first_walker = 1 + len(self._kinds)
-        kept = (
-            [k - first for k in range(first, end) if k not in out]
-            for first, end in (
-                (1, first_walker),
-                (first_walker, len(self._half_sizes)),
-            )
+        kept = np.ones(len(self._half_sizes), bool)
+        kept[whom_to_leave_out(self._overlaps, 1)] = False
+        vehicles, walkers = (
+            np.flatnonzero(part)
+            for part in np.split(kept[1:], [len(self._kinds)])
         )
-        vehicles, walkers = kept
         return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
 
     def left_out(self) -> int:
@@ -369,8 +356,8 @@ class Trial:
         vehicles, walkers = self._kept()
         return TrafficPlan(
             tuple(self._kinds[k] for k in vehicles),
-            Tracks(STEP, _smooth(vehicles_at[:, np.array(vehicles, int)])),
-            Tracks(STEP, _smooth(walkers_at[:, np.array(walkers, int)])),
+            Tracks(STEP, _smooth(vehicles_at[:, vehicles])),
+            Tracks(STEP, _smooth(walkers_at[:, walkers])),
             self.left_out(),
             self._follower.positions()
             if self._follower is not None and self._follower.arrived
@@ -381,11 +368,8 @@ class Trial:
 def _smooth(values: np.ndarray) -> np.ndarray:
     """Returns a uniform cubic B-spline's values (K - F, N, D) at its knots.
 
-    A spline through them has accelerations that do not exceed those of the F
-    steps before the drive and of the drive's.
-
-    Args:
-        values: (K, N, D) the points that control it, at all steps.
+    It is controlled by points (K, N, D) at all steps, of which F are before the
+    drive. A spline through its values has no greater accelerations than those.
     """
     before, here, after = (
         values[_FIRST + k : len(values) - 1 + k] for k in (-1, 0, 1)
@@ -410,18 +394,16 @@ def _at_half_steps(values: np.ndarray) -> np.ndarray:
 def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
     """Returns the bodies to remove until none overlap, the most involved first.
 
-    Args:
-        overlaps: (N, N) symmetric bool.
-        kept: number of first bodies that always stay.
+    Which ones overlap is a symmetric (N, N) bool. The first ones are kept.
     """
     overlaps = overlaps.copy()
     out: list[int] = []
     while True:
         involved = overlaps.sum(axis=0)
         involved[:kept] = 0
-        worst = int(involved.argmax()) if len(involved) else 0
-        if not len(involved) or involved[worst] == 0:
+        if not involved.any():
             return sorted(out)
+        worst = int(involved.argmax())
         out.append(worst)
         overlaps[worst] = overlaps[:, worst] = False
 
@@ -436,14 +418,8 @@ def plan_queues(
 ) -> TrafficPlan:
     """Returns vehicles that stand in queues in all lanes between junctions.
 
-    A vehicle is not there while the ego car is at its place.
-
-    Args:
-        graph: the lanes.
-        seed: seed of kinds and gaps.
-        duration: length of the drive [s].
-        ego: the ego car's motion.
-        ego_box: its size.
+    A vehicle is not there while the ego car is at its place. For arguments, see
+    `plan_traffic`.
     """
     rng = np.random.default_rng(seed)
     kinds, rows = [], []

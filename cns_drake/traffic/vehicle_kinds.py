@@ -1,8 +1,12 @@
 """Kinds of vehicles in traffic: sizes, shares and driving parameters."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
+
+from cns_drake.base.yaml_files import parse_yaml
 
 
 @dataclass(frozen=True)
@@ -47,52 +51,9 @@ class VehicleKind:
 # Gap to the vehicle ahead at standstill, s0 of the model [m].
 STANDSTILL_GAP = 2.0
 
-KINDS = (
-    VehicleKind("city_car", "car", 0.14, (3.66, 1.88, 1.53), (-1.18, 1.17)),
-    VehicleKind("hatchback", "car", 0.16, (4.25, 2.0, 1.48), (-1.32, 1.3)),
-    VehicleKind("saloon", "car", 0.12, (4.8, 2.05, 1.46), (-1.4, 1.42)),
-    VehicleKind("estate", "car", 0.1, (4.75, 2.04, 1.49), (-1.38, 1.4)),
-    VehicleKind("suv", "car", 0.12, (4.65, 2.11, 1.71), (-1.36, 1.36)),
-    VehicleKind("van", "car", 0.1, (5.55, 2.24, 2.46), (-1.6, 1.75)),
-    VehicleKind(
-        "box_truck",
-        "truck",
-        0.07,
-        (6.6, 2.34, 3.05),
-        (-1.75, 2.15),
-        speed_factor=0.85,
-        acceleration=1.0,
-        headway=1.6,
-    ),
-    VehicleKind(
-        "bus",
-        "bus",
-        0.04,
-        (11.26, 2.72, 3.06),
-        (-2.9, 2.9),
-        speed_factor=0.8,
-        acceleration=0.9,
-        headway=1.6,
-    ),
-    VehicleKind(
-        "motorcycle",
-        "motorcyclist",
-        0.06,
-        (2.2, 0.9, 1.75),
-        (-0.75, 0.7),
-        acceleration=2.0,
-    ),
-    VehicleKind(
-        "bicycle",
-        "bicyclist",
-        0.09,
-        (1.8, 0.7, 1.85),
-        (-0.52, 0.52),
-        top_speed=5.5,
-        acceleration=1.0,
-        deceleration=1.5,
-        headway=1.0,
-    ),
+_TABLE = parse_yaml(Path(__file__).with_name("vehicle_kinds.yaml").read_bytes())
+KINDS = TypeAdapter(tuple[VehicleKind, ...]).validate_python(
+    [{"name": name, **fields} for name, fields in _TABLE.items()]
 )
 LARGEST = max(KINDS, key=lambda kind: kind.size[0])
 # Box that contains every small vehicle [m].

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.traffic.lane_graph import SPACING, Walkway
+from cns_drake.traffic.lane_graph import SPACING, Walkway, length_of
 from cns_drake.traffic.overlaps import boxes_overlap
 from cns_drake.traffic.right_of_way import WALK_GROUP
 from cns_drake.traffic.streets import STEP
@@ -108,11 +108,7 @@ class Paths(NamedTuple):
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
     """Returns the number of walkers for whom sidewalks have room."""
-    length = sum(
-        np.linalg.norm(np.diff(way.points, axis=0), axis=1).sum()
-        for way in walkways
-        if way.crossing < 0
-    )
+    length = sum(length_of(way.points) for way in walkways if way.crossing < 0)
     return int(length // _WALKER_SPACE)
 
 
@@ -562,19 +558,17 @@ def _is_free(
 
     It would be at a place with a heading, and stop elsewhere if it braked then.
     """
-    half = np.array([WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2])
-    a, b = np.array([0.0, 0.0, yaw]), np.zeros(3)
+    half = (WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2)
     for j in range(len(walkers)):
         other = walkers[j]
         x, y = other.xy[0], other.xy[1]
         if j == i or (x - place[0]) ** 2 + (y - place[1]) ** 2 > _NEAR**2:
             continue
-        b[2] = other.yaw
-        a[0], a[1], b[0], b[1] = place[0], place[1], x, y
+        a, b = (place[0], place[1], yaw), (x, y, other.yaw)
         if boxes_overlap(a, b, half, half):
             return False
-        a[0], a[1] = stop
-        b[0], b[1] = _stop(x, y, other.velocity[0], other.velocity[1])
+        x, y = _stop(x, y, other.velocity[0], other.velocity[1])
+        a, b = (stop[0], stop[1], yaw), (x, y, other.yaw)
         if boxes_overlap(a, b, half, half):
             return False
     return True

@@ -43,14 +43,10 @@ _WAVES = (9.0, 3.7)
 
 
 def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
-    """Lays snow near a drive, except on roads, plants and thin things.
+    """Lays snow of a depth [m], except on roads, plants and thin things.
 
-    Ground is raised. Roads are cleared, with banks along their kerbs.
-
-    Args:
-        around: the structures, with earlier changes.
-        ground: near the drive, without them.
-        depth: thickness of the snow [m].
+    Ground, which is that before earlier changes, is raised. Roads are cleared,
+    with banks along their kerbs.
     """
     editing = around.editing
     for thing in around.things.values():
@@ -95,11 +91,7 @@ def _cover(
     depth: float,
     is_ground: bool,
 ) -> bool:
-    """Puts a slab on the faces of a part below the sky, if it has any.
-
-    Returns:
-        Whether there were any.
-    """
+    """Puts a slab on a part's faces below the sky; returns if it has any."""
     corners = triangle_corners(part)
     if is_ground:
         corners = turned_up(corners)

@@ -22,17 +22,11 @@ from cns_drake.city.geometry.upper_sides import (
     turned_up,
     unit_normals,
 )
+from cns_drake.scene import surfaces
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
     structure_name,
-)
-from cns_drake.scene.surfaces import (
-    CapsuleSurface,
-    CylinderSurface,
-    EllipsoidSurface,
-    HalfSpaceSurface,
-    TriangleSurface,
 )
 from cns_drake.scene.world import World
 
@@ -65,17 +59,19 @@ class StructurePart:
     def p_WPs(self) -> np.ndarray:
         """(N, 3) points in the world whose hull holds the part [m]."""
         surface = self.geometry.surface
-        if isinstance(surface, TriangleSurface):
+        if isinstance(surface, surfaces.TriangleSurface):
             p_GPs = surface.p_GVset
-        elif isinstance(surface, EllipsoidSurface):
+        elif isinstance(surface, surfaces.EllipsoidSurface):
             p_GPs = _BOX * surface.semi_axes
-        elif isinstance(surface, CylinderSurface | CapsuleSurface):
+        elif isinstance(
+            surface, surfaces.CylinderSurface | surfaces.CapsuleSurface
+        ):
             r, half = surface.radius, surface.length / 2
-            if isinstance(surface, CapsuleSurface):
+            if isinstance(surface, surfaces.CapsuleSurface):
                 half += r
             p_GPs = _BOX * (r, r, half)
         else:
-            assert isinstance(surface, HalfSpaceSurface)
+            assert isinstance(surface, surfaces.HalfSpaceSurface)
             p_GPs = np.zeros((0, 3))
         R, p = self.X_WG.rotation().matrix(), self.X_WG.translation()
         return product(p_GPs, R.T) + p
@@ -98,6 +94,11 @@ class Structure:
     def bottom(self) -> float:
         """Height of its lowest point [m]."""
         return float(self.p_WPs[:, 2].min(initial=np.inf))
+
+    @cached_property
+    def top(self) -> float:
+        """Height of its highest point [m]."""
+        return float(self.p_WPs[:, 2].max(initial=self.bottom))
 
     @cached_property
     def outline(self) -> BaseGeometry:
@@ -221,17 +222,14 @@ class GroundSurface:
         """Takes all structures, and the area [m]."""
         shapely.prepare(near)
         self.near = near
-        corners, is_road = [np.zeros((0, 3, 3))], [np.zeros(0, bool)]
+        corners = {of_road: [np.zeros((0, 3, 3))] for of_road in (False, True)}
         for thing in things.values():
             if thing.semantic_class in GROUND_CLASSES:
-                for part in thing.parts:
-                    found = self._upward(part)
-                    corners.append(found)
-                    road = thing.semantic_class == "road"
-                    is_road.append(np.full(len(found), road))
-        triangles, of_road = np.concatenate(corners), np.concatenate(is_road)
-        self._roads = triangles[of_road]
-        self._sides = {k: UpperSides(triangles[of_road == k]) for k in (0, 1)}
+                own = corners[thing.semantic_class == "road"]
+                own += map(self._upward, thing.parts)
+        triangles = {k: np.concatenate(found) for k, found in corners.items()}
+        self._roads = triangles[True]
+        self._sides = {k: UpperSides(found) for k, found in triangles.items()}
 
     def _upward(self, part: StructurePart) -> np.ndarray:
         corners = turned_up(triangle_corners(part))
@@ -303,20 +301,17 @@ def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
         return
     first = int(np.argmin(inside))
     order = np.roll(np.arange(len(xy)), -first)
-    edges = np.flatnonzero(np.diff(inside[order].astype(int)))
-    for begin, end in zip(edges[::2] + 1, edges[1::2] + 1, strict=False):
-        if end - begin >= 2:
-            run = order[begin:end]
+    cuts = np.flatnonzero(np.diff(inside[order])) + 1
+    # The first run is outside.
+    for run in np.split(order, cuts)[1::2]:
+        if len(run) >= 2:
             yield Kerb(xy[run], outwards[run])
-    if len(edges) % 2 and len(order) - edges[-1] > 2:
-        run = order[edges[-1] + 1 :]
-        yield Kerb(xy[run], outwards[run])
 
 
 def triangle_corners(part: StructurePart) -> np.ndarray:
     """Returns the (M, 3, 3) corners of a part's triangles in the world [m]."""
     surface = part.geometry.surface
-    if not isinstance(surface, TriangleSurface):
+    if not isinstance(surface, surfaces.TriangleSurface):
         return np.zeros((0, 3, 3))
     return part.p_WPs[surface.triangles]
 

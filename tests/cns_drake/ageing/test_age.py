@@ -153,11 +153,11 @@ def test_new_things_stand_on_the_ground(long):
     world = OldWorld(MapFolder(long))
     checked = 0
     for name, thing in world.things.items():
-        if not re.search(r"\d{3}y", name) or thing.foot.is_empty:
+        if not re.search(r"\d{3}y", name) or thing.footprint.is_empty:
             continue
         if re.search("balconies|storey|_frame|kerb|scaffold", name):
             continue
-        at = np.array(thing.foot.centroid.coords[0])
+        at = np.array(thing.footprint.centroid.coords[0])
         z = world.ground.heights(at[None])[0]
         if np.isfinite(z):
             assert -1.6 < thing.bottom - z < 0.35, name

@@ -15,9 +15,9 @@ from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_adding import (
+    add_traffic,
     connect_traffic,
     make_traffic,
-    place_traffic,
     traffic_structures,
 )
 from cns_drake.traffic.traffic_motion import (
@@ -100,8 +100,8 @@ def make_diagram(plan, goes_on, is_posed=True):
     builder = DiagramBuilder()
     scene_graph = builder.AddSystem(SceneGraph())
     structures = traffic_structures(plan, 101)
-    traffic = make_traffic(
-        scene_graph, plan, seed=4, structures=structures, turn=0.05
+    traffic = add_traffic(
+        builder, scene_graph, plan, seed=4, structures=structures, turn=0.05
     )
     X_WS = RigidTransform(
         RotationMatrix.MakeZRotation(0.4), np.array([0.5, 0.2, 1.4])
@@ -116,7 +116,6 @@ def make_diagram(plan, goes_on, is_posed=True):
             moving_bodies=traffic.moving_frames if goes_on else None,
         ),
     )
-    place_traffic(builder, scene_graph, traffic)
     connect_lidar(builder, scene_graph, lidar)
     if is_posed:
         connect_traffic(builder, traffic, lidar, goes_on)
