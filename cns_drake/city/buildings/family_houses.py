@@ -85,7 +85,7 @@ def garage_wing(
             "hip": 0.25 * span}[kind]  # fmt: skip
     shape = Roof(kind, True, 0.3, 0.25, ROOF_M)
     top = min(wall_top + ROOF_M + rise, most)
-    return Wing.at(x0, y0, x1, min(y1, y0 + 6.5), wall_top, top, shape)
+    return Wing.at((x0, y0, x1, min(y1, y0 + 6.5)), wall_top, top, shape)
 
 
 def add_garage(out: Assembly, garage: Wing, boxes: Sequence[Wing]) -> None:
@@ -148,7 +148,7 @@ class DetachedHouse(Building):
         slope = 2 * (self.height - wall_top - ROOF_M) / deep
         roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
         area = (left, front, split, main_back)
-        boxes = [Wing.at(*area, wall_top, self.height, roof)]
+        boxes = [Wing.at(area, wall_top, self.height, roof)]
         wide = max(3.2, self.wing_width * (split - left))
         drop = STOREY_M * (n > 1 and self.low_wing)
         top = min(wall_top + ROOF_M + slope * wide / 2, self.height - 0.25)
@@ -163,7 +163,7 @@ class DetachedHouse(Building):
                 a = left + 0.4 * (split - left - wide)
                 area = (a, middle, a + wide, min(back, main_back + 3.0))
             if end == "front" or back - main_back > 1.0:
-                boxes.append(Wing.at(*area, wall_top - drop, top - drop, shape))
+                boxes.append(Wing.at(area, wall_top - drop, top - drop, shape))
         if has_garage:
             boxes.append(garage_wing(
                 self.garage, split - 0.06, right, front + 0.6,
@@ -298,7 +298,7 @@ class Bungalow(Building):
             self.floor + 2.75, top - ROOF_M - 0.1 * deep, 0.8 * (top - ROOF_M)
         )
         shape = Roof(self.roof, eaves=0.6, verge=0.4, thickness=ROOF_M)
-        main = Wing.at(left, front, right, front + deep, wall_top, top, shape)
+        main = Wing.at((left, front, right, front + deep), wall_top, top, shape)
         slope = 2 * (top - main.wall_top - ROOF_M) / deep
         wide = max(3.4, self.wing_width * (right - left))
         end = min(top - 0.2, main.wall_top + ROOF_M + slope * wide / 2)
@@ -307,7 +307,7 @@ class Bungalow(Building):
         for k in range(count):
             a = left - 0.02 if k == 0 else right - wide
             area = (a, front - reach, a + wide + 0.02, front + deep / 2)
-            boxes.append(Wing.at(*area, main.wall_top, end, cross))
+            boxes.append(Wing.at(area, main.wall_top, end, cross))
             taken[k] = a + wide if k == 0 else a
         if self.mirrored:
             both = x0 + x1
@@ -367,10 +367,8 @@ class SemiDetached(Building):
         n = storeys_for(self.height, self.floor, deep, self.pitch_deg)
         wall_top = wall_top_for(self.height, self.floor, deep, n)
         shape = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
-        main = Wing.at(
-            left + side, front, right - side, front + deep, wall_top,
-            self.height, shape,
-        )  # fmt: skip
+        area = (left + side, front, right - side, front + deep)
+        main = Wing.at(area, wall_top, self.height, shape)
         bays = _gabled_bays(self, main) if self.bay == "gabled" else ()
         garages = []
         if has_garages:
@@ -415,7 +413,8 @@ def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
     )
     y0 = main.y0 - p.bay_reach
     return tuple(
-        Wing.at(a, y0, b, middle, main.wall_top, top, shape) for a, b in fronts
+        Wing.at((a, y0, b, middle), main.wall_top, top, shape)
+        for a, b in fronts
     )
 
 

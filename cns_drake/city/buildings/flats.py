@@ -312,7 +312,7 @@ class GardenFlats(Building):
                 top = min(wall_top + ROOF_M + slope * run, self.height - 0.1)
             shape = Roof(self.roof, cross, 0.4, 0.35, ROOF_M)
             area = (bounds[k] - 0.05 * (k > 0), y, bounds[k + 1], y + deep)
-            boxes.append(Wing.at(*area, wall_top, top, shape))
+            boxes.append(Wing.at(area, wall_top, top, shape))
         for k, wing in enumerate(boxes):
             _add_house(self, wing, boxes, storeys, k)
 

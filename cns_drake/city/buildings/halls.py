@@ -47,7 +47,7 @@ class Barn(Building):
             # A vault is at most half a circle.
             eaves, wall_top = 0.0, max(wall_top, top - 0.8 * half)
         roof = Roof(self.roof, along_y, eaves, 0.35, 0.18)
-        main = Wing.at(a, low, b, high, wall_top, top, roof)
+        main = Wing.at((a, low, b, high), wall_top, top, roof)
         boxes = [main]
         if self.aisle > 1.5:
             boxes.append(_aisle(self, main, (left, right, back)))
@@ -91,7 +91,7 @@ def _aisle(p: Barn, main: Wing, limits: tuple[float, float, float]) -> Wing:
         area = (a, main.y0 + 0.8, b, main.y1 - 0.8)
     falling = not (along_y and p.aisle_left)
     roof = Roof("shed", along_y, 0.3, 0.25, 0.15, falling=falling)
-    return Wing.at(*area, low, high, roof)
+    return Wing.at(area, low, high, roof)
 
 
 def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
@@ -201,7 +201,7 @@ def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
     if p.roof != "butterfly":
         eaves = 0.0 if p.roof == "barrel" else 0.4
         roof = Roof(p.roof, along_y, eaves, 0.4, 0.3)
-        return [Wing.at(x0, y0, x1, y1, wall, top, roof)]
+        return [Wing.at((x0, y0, x1, y1), wall, top, roof)]
     low, high = area, area
     if along_y:
         middle = (x0 + x1) / 2
@@ -212,8 +212,8 @@ def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
     falling = Roof("shed", along_y, 0.0, 0.4, 0.3, falling=True)
     rising = Roof("shed", along_y, 0.0, 0.4, 0.3)
     return [
-        Wing.at(*low, wall, top, falling),
-        Wing.at(*high, wall, top, rising),
+        Wing.at(low, wall, top, falling),
+        Wing.at(high, wall, top, rising),
     ]
 
 
@@ -267,7 +267,7 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
     x0, x1 = min(w.x0 for w in halls), max(w.x1 for w in halls)
     margin, h = 0.06 * (x1 - x0), p.annex_height
     area = (x0 + margin, y0 + 1.6, x1 - margin, halls[0].y0 + 0.05)
-    annex = Wing.flat(*area, h, 0.4)
+    annex = Wing.flat(area, h, 0.4)
     openings = Openings(annex, halls)
     small = bays.window(1.6, 1.5, 2.5, _SPORTS_HALL_RECESS)
     openings.row((0, 1, 3), 1.0, 3.6, [small], 0.8)
@@ -356,7 +356,7 @@ def _dock(
     vertices = np.array([(x, y, z) for x in (a, b) for y, z in section])
     faces = [(k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4) for k in range(4)]
     faces += [(0, 1, 2, 3), (7, 6, 5, 4)]
-    pieces.append(Mesh(vertices, tuple(f[::-1] for f in faces)))
+    pieces.append(Mesh(vertices, tuple(faces)).turned())
     for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
         post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
         pieces.append(massing.box(*post, high - 0.1, eaves - 0.2))

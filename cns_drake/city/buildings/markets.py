@@ -33,7 +33,7 @@ class ShopStrip(Building):
             back = y1 - _BACK_M - self.uniform(0.0, 0.12) * (y1 - y0)
             area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
             roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
-            wing = Wing.at(*area, top - 0.1, top, roof, blind)
+            wing = Wing.at(area, top - 0.1, top, roof, blind)
             _add_unit(self, wing, tall)
             if k % 3 == 0:
                 part = f"unit_{k}_"
@@ -133,7 +133,7 @@ def _stalls(p: KioskRow, left: float, right: float, front: float) -> list[Wing]:
         high = top - (0.25 * (k % 2) if k != count // 2 else 0.0)
         wall = max(2.2, high - 0.32 * min(width, p.depth))
         area = (x, front, x + width, front + p.depth)
-        boxes.append(Wing.at(*area, min(wall, high - 0.35), high, roof))
+        boxes.append(Wing.at(area, min(wall, high - 0.35), high, roof))
         x += width + p.gap * ((k + 1) % p.group == 0)
     return boxes
 
@@ -197,7 +197,7 @@ class Supermarket(Building):
         left = x0 + 0.3 + self.dock_depth * self.dock_left
         right = x1 - 0.3 - self.dock_depth * (not self.dock_left)
         area = (left, y0 + self.canopy + 1.2, right, y1 - 0.3)
-        hall = Wing.flat(*area, self.eaves, 0.9, rim=0.2)
+        hall = Wing.flat(area, self.eaves, 0.9, rim=0.2)
         openings = Openings(hall)
         glazing = bays.window(
             self.pitch - 0.9, 0.4, 3.3, _RECESS, mullions=2, transom=2.4
@@ -255,7 +255,7 @@ def _add_entrance(p: Supermarket, hall: Wing) -> None:
     wall_top = max(top - rise - 0.2, p.eaves - 0.5)
     roof = Roof(kind, True, 0.0, 0.25, 0.2, parapet=0.6)
     area = (hall.x0 + x - w / 2, y0, hall.x0 + x + w / 2, hall.y0 + 5.0)
-    porch = Wing.at(*area, wall_top, top, roof)
+    porch = Wing.at(area, wall_top, top, roof)
     openings = Openings(porch, (hall,))
     doors = bays.window(w - 2.4, 0.05, 2.6, _RECESS, mullions=3)
     openings.put(0, w / 2, w - 1.6, doors)

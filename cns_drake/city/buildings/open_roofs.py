@@ -91,7 +91,7 @@ def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     wash = 5.2 if p.wash else 0.0
     wide = min(x1 - x0 - wash - (0.6 if wash else 0.0), 18.0)
     start = x1 - wide if p.mirrored else x0
-    shop = Wing.flat(start, ys[0], start + wide, ys[1], p.shop_height, 0.5)
+    shop = Wing.flat((start, ys[0], start + wide, ys[1]), p.shop_height, 0.5)
     openings = Openings(shop)
     glazing = bays.shop_front(2.7, _RECESS, door=False)
     openings.row((0,), 1.0, 3.4, [glazing], 0.4)
@@ -109,7 +109,7 @@ def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
 
 def _add_wash(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     """Adds a car wash: a gate in front and one behind."""
-    box = Wing.flat(xs[0], ys[0], xs[1], ys[1], p.shop_height - 0.2, 0.3)
+    box = Wing.flat((xs[0], ys[0], xs[1], ys[1]), p.shop_height - 0.2, 0.3)
     openings = Openings(box)
     for edge in (0, 2):
         openings.put(edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5))

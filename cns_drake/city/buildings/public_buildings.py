@@ -70,7 +70,7 @@ def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
     x = float(np.clip(x, half + 0.4, wall.length - half - 0.4))
     high = p.height if p.roof == "flat" else min(top + 0.5, p.height)
     x0, y0 = wall.point(x - half, 1.2)
-    hall = Wing.flat(x0, y0, x0 + 2 * half, bar[0, 1] + 4.0, high, 0.4)
+    hall = Wing.flat((x0, y0, x0 + 2 * half, bar[0, 1] + 4.0), high, 0.4)
     openings = Openings(hall)
     glazing = bays.window(
         2 * half - 0.9, 2.9, high - 0.9, _RECESS, mullions=2, transom=3.0
@@ -96,7 +96,7 @@ def _add_back_wing(p: School, bar: np.ndarray, back: float, top: float) -> None:
     x0 = b - wide - 0.3 if p.mirrored else a + 0.3
     high = min(top, 4.2 if p.storeys < 3 else 7.6)
     area = (x0, y - 0.05, x0 + wide, min(back, y + 22.0))
-    openings = Openings(Wing.flat(*area, high, 0.4, rim=0.6))
+    openings = Openings(Wing.flat(area, high, 0.4, rim=0.6))
     for k in range(2 if high > 6.0 else 1):
         z = 3.4 * k
         pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
@@ -115,12 +115,14 @@ def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
     wall = max(top - drop, 0.55 * top)
     eaves = 0.0 if p.gym_roof == "barrel" else 0.4
     roof = Roof(p.gym_roof, True, eaves, 0.4, 0.25, parapet=0.5)
-    gym = Wing.at(x0, y0, x1, y1, wall, top, roof)
+    gym = Wing.at((x0, y0, x1, y1), wall, top, roof)
     link_y = min(bar[2, 1], y1) - 3.4
     ends = (bar[1, 0] - 0.1, x0 + 0.1)
     if p.mirrored:
         ends = (min(x1, bar[1, 0]) - 0.1, bar[0, 0] + 0.1)
-    link = Wing.flat(ends[0], link_y, ends[1], link_y + 3.0, 3.4, 0.2, rim=0.3)
+    link = Wing.flat(
+        (ends[0], link_y, ends[1], link_y + 3.0), 3.4, 0.2, rim=0.3
+    )
     boxes = (gym, link)
     openings = Openings(gym, boxes)
     high = bays.window(2.6, wall - 2.2, wall - 0.7, _RECESS, mullions=1)
@@ -200,7 +202,7 @@ def _nave(p: Chapel, width: float, length: float) -> Wing:
     wall_top = max(top - rise - _THICK, 0.35 * top)
     roof = Roof("gable", True, 0.35, 0.25, _THICK)
     back = min(length - _CHAPEL_MARGIN, ahead + 2.6 * wide)
-    return Wing.at(x, min(ahead, 0.3 * length), x + wide, back, wall_top, top,
+    return Wing.at((x, min(ahead, 0.3 * length), x + wide, back), wall_top, top,
                    roof)  # fmt: skip
 
 
@@ -213,7 +215,7 @@ def _tower(p: Chapel, nave: Wing) -> Wing:
     if p.belfry == "side":
         x0 = nave.x1 - 0.1 if p.mirrored else nave.x0 + 0.1 - side
         y0 = nave.y0 + 0.8
-    return Wing.at(x0, y0, x0 + side, y0 + side, top, top, Roof("flat"))
+    return Wing.at((x0, y0, x0 + side, y0 + side), top, top, Roof("flat"))
 
 
 def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
@@ -345,7 +347,7 @@ def _porch(nave: Wing) -> Wing:
     roof = Roof("gable", True, 0.25, 0.25, 0.15)
     area = (middle - half, nave.y0 - 1.7, middle + half, nave.y0 + 0.1)
     top = min(4.2, nave.wall_top + 0.8)
-    return Wing.at(*area, min(2.6, nave.wall_top - 0.2), top, roof)
+    return Wing.at(area, min(2.6, nave.wall_top - 0.2), top, roof)
 
 
 def _annex(nave: Wing, width: float) -> Wing | None:
@@ -364,7 +366,7 @@ def _annex(nave: Wing, width: float) -> Wing | None:
     roof = Roof("shed", True, 0.25, 0.2, 0.15, falling=side == 0)
     if high - low < 0.3 or y0 < nave.y0 + 1.0:
         return None
-    return Wing.at(a, y0, b, nave.y1 - 0.4, low, high, roof)
+    return Wing.at((a, y0, b, nave.y1 - 0.4), low, high, roof)
 
 
 def _cross(x: float, y: float, z0: float, z1: float) -> list[Mesh]:

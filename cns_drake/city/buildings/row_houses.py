@@ -92,7 +92,7 @@ def _unit_box(
     kind = "gable" if across else p.roof
     eaves, verge = 0.0 if across else 0.35, 0.0 if p.roof == "stepped" else 0.3
     roof = Roof(kind, across, eaves, verge, _ROOF_M, parapet=0.45)
-    return Wing.at(x0, y0, x1, y1, wall_top, top, roof, blind), storeys
+    return Wing.at((x0, y0, x1, y1), wall_top, top, roof, blind), storeys
 
 
 def _add_entrance(
@@ -247,7 +247,7 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     wall_top = min(p.annex_height, top - 0.4)
     area = (x0, main.y1 - 0.06, x0 + width, back)
     roof = Roof("shed", True, 0.0, 0.2, 0.18)
-    openings = Openings(Wing.at(*area, wall_top, top, roof, blind), (main,))
+    openings = Openings(Wing.at(area, wall_top, top, roof, blind), (main,))
     openings.row((1, 2, 3), 0.9, 2.6, [house_walls.sash(1.1, 0.1, 0.9, 2.1)])
     openings.enclose(p, (house_walls.GLASS_M,))
 

@@ -73,36 +73,22 @@ class Wing:
 
     @staticmethod
     def at(
-        x0: float,
-        y0: float,
-        x1: float,
-        y1: float,
-        wall_top: float,
-        top: float,
-        roof: Roof,
+        area: massing.Area, wall_top: float, top: float, roof: Roof,
         blind: Collection[int] = (),
-    ) -> Wing:
+    ) -> Wing:  # fmt: skip
         """Returns a wing with its walls on whole centimetres.
 
         Whole centimetres keep the meshes' text short.
         """
-        a, b, c, d, e = (round(float(v), 2) for v in (x0, y0, x1, y1, wall_top))
+        a, b, c, d, e = (round(float(v), 2) for v in (*area, wall_top))
         return Wing(a, b, c, d, e, round(float(top), 3), roof, frozenset(blind))
 
     @staticmethod
     def flat(
-        x0: float,
-        y0: float,
-        x1: float,
-        y1: float,
-        top: float,
-        parapet: float,
-        rim: float = 0.1,
-        blind: Collection[int] = (),
+        area: massing.Area, top: float, parapet: float, rim: float = 0.1
     ) -> Wing:
         """Returns a wing under a flat roof; its walls end `rim` below."""
-        roof = Roof("flat", parapet=parapet)
-        return Wing.at(x0, y0, x1, y1, top - rim, top, roof, blind)
+        return Wing.at(area, top - rim, top, Roof("flat", parapet=parapet))
 
     def mirrored(self, width: float) -> Wing:
         """Returns the wing with x replaced by `width` - x."""

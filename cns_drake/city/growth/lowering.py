@@ -213,11 +213,10 @@ def _add_roof(assembly: Assembly, plan: MultiPolygon, height: float) -> None:
     top = round(height + _PARAPET, 3)
     outer = snap(_offset(plan, _BAND_REACH))
     inner = snap(_offset(plan, -_PARAPET_WIDTH))
-    band = wall_mesh(outer, height - _BAND, top)
     assembly.add(
         "new_roof",
         # Seen from outside, not from within.
-        Mesh(band.vertices, tuple(face[::-1] for face in band.faces)),
+        wall_mesh(outer, height - _BAND, top).turned(),
         surface_mesh(outer.difference(inner), top),
         wall_mesh(inner, height, top),
         surface_mesh(inner, height),
