@@ -4,12 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, house_walls, massing, wings
+from cns_drake.city.facades import bays, details, massing, wings
 from cns_drake.city.facades.assembly import Assembly, Building
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney
 from cns_drake.city.facades.walls import Band
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 
 STOREY_M = 2.65
 ROOF_M = 0.2
@@ -67,9 +66,9 @@ def close_box(
     """
     openings.add_casings(out, edges, casing)
     bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()
-    openings.add_walls(out, (house_walls.GLASS_M,), bands)
+    openings.add_walls(out, (wings.GLASS_M,), bands)
     low = wing.wall_top + 0.4
-    attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M)
+    attic = wings.attic_window(0.9, low, low + 1.0, wings.GLASS_M)
     wings.add_roof(out, wing, attic)
 
 
@@ -93,8 +92,8 @@ def add_garage(out: Assembly, garage: Wing, boxes: Sequence[Wing]) -> None:
     openings = Openings(garage, boxes)
     length = garage.x1 - garage.x0
     openings.add_garage_door(out, 0, length / 2, min(length - 0.7, 4.9))
-    openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
-    openings.add_walls(out, (house_walls.GLASS_M,))
+    openings.row((1, 3), 1.0, 3.4, [wings.sash(0.9, 0.0, 1.1, 2.0)])
+    openings.add_walls(out, (wings.GLASS_M,))
     wings.add_roof(out, garage)
 
 
@@ -325,7 +324,7 @@ def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
     door = a + 0.3 * (b - a)
     if b - door > p.picture + 1.6:
         x = (door + 0.6 + b) / 2
-        pane = house_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
+        pane = wings.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
         openings.put(0, x, p.picture + 0.7, pane)
     openings.add_door(p, 0, door, p.floor, lights=0.3)
     close_box(p, main, openings, p.floor, p.casing)

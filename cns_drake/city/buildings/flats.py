@@ -6,20 +6,11 @@ import numpy as np
 
 from cns_drake.city.buildings import family_houses
 from cns_drake.city.buildings.family_houses import ROOF_M
-from cns_drake.city.facades import (
-    bays,
-    details,
-    house_walls,
-    massing,
-    roofs,
-    tiers,
-    wings,
-)
+from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.facades.walls import Band, Facade, Layout, Relief
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 
@@ -329,7 +320,7 @@ def _add_house(
         )  # fmt: skip
     wall = wing.wall(0)
     middle = wall.length / 2
-    glass = house_walls.GLASS_M
+    glass = wings.GLASS_M
     openings.clear(0, middle - 1.1, middle + 1.1, 0.0, wing.wall_top)
     if wing.wall_top > 6.0:
         stair = bays.window(1.8, _FLOOR + 2.6, wing.wall_top - 0.7, glass)

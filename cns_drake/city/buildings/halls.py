@@ -6,7 +6,6 @@ import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import (
     Band,
@@ -15,7 +14,7 @@ from cns_drake.city.facades.walls import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _MARGIN = 0.5

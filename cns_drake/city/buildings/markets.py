@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, house_walls, massing, roofs
+from cns_drake.city.facades import bays, details, massing, roofs, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Patch
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 
 # Kept free in front for canopies and behind for gutters [m].
 _FRONT_M, _BACK_M = 0.4, 0.1
@@ -64,9 +63,9 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
     openings.add_shops(p, 0, 0.2, wall.length - 0.2, p.ground,
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
-    back = [bays.gate(2.0, 2.2, 0.2), house_walls.sash(1.0, 0.0, 1.6, 2.3)]
+    back = [bays.gate(2.0, 2.2, 0.2), wings.sash(1.0, 0.0, 1.6, 2.3)]
     openings.row((2,), 0.5, 3.6, back, 0.7)
-    glass = (house_walls.GLASS_M, *house_walls.SHOP_GLASS_M)
+    glass = (wings.GLASS_M, *wings.SHOP_GLASS_M)
     openings.enclose(p, glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
         z, reach = p.ground - 0.95, p.canopy_reach

@@ -4,10 +4,9 @@ import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
 from cns_drake.city.geometry.mesh import Mesh
 
 _MARGIN = 0.6

@@ -6,19 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.city.facades import (
-    bays,
-    details,
-    house_walls,
-    massing,
-    roofs,
-    wings,
-)
+from cns_drake.city.facades import bays, details, massing, roofs, wings
 from cns_drake.city.facades.assembly import Assembly, Building
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.facades.walls import Band, Patch
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
 
 _ROOF_M = 0.2
@@ -60,7 +52,7 @@ def _add_unit(
     if p.roof == "flat":
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.22))
-    openings.add_walls(p, (house_walls.GLASS_M,), bands)
+    openings.add_walls(p, (wings.GLASS_M,), bands)
     _add_roof(p, wing)
     if p.chimney:
         _add_stack(p, wing, f"{part}chimney")
@@ -147,7 +139,7 @@ def _add_bay(
 def _add_roof(p: Building, wing: Wing) -> None:
     """Adds a roof with its dormers, firewalls or steps."""
     low = wing.wall_top + 0.45
-    attic = wings.attic_window(0.8, low, low + 1.1, house_walls.GLASS_M)
+    attic = wings.attic_window(0.8, low, low + 1.1, wings.GLASS_M)
     wings.add_roof(p, wing, None if p.roof == "stepped" else attic)
     if p.roof == "stepped":
         for edge in (0, 2):
@@ -184,7 +176,7 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
     for edge in (0, 2):
         wall = wing.wall(edge)
         for u in spots:
-            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, house_walls.GLASS_M)
+            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wings.GLASS_M)
             frame = details.casings([pane], (pane.depth,), "frame", 0.12)
             glass = details.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
             out.add_to("trim", *(wall.place(piece) for piece in frame))
@@ -248,8 +240,8 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     area = (x0, main.y1 - 0.06, x0 + width, back)
     roof = Roof("shed", True, 0.0, 0.2, 0.18)
     openings = Openings(Wing.at(area, wall_top, top, roof, blind), (main,))
-    openings.row((1, 2, 3), 0.9, 2.6, [house_walls.sash(1.1, 0.1, 0.9, 2.1)])
-    openings.enclose(p, (house_walls.GLASS_M,))
+    openings.row((1, 2, 3), 0.9, 2.6, [wings.sash(1.1, 0.1, 0.9, 2.1)])
+    openings.enclose(p, (wings.GLASS_M,))
 
 
 _DOORS = ("accent", "trim", "roof")
@@ -320,7 +312,7 @@ class ShopHouse(Building):
         if self.roof == "flat" and room > 0.8:
             z = round(wing.wall_top - 0.45, 2)
             bands.append(Band(z, wing.wall_top, -0.25))
-        glass = (house_walls.GLASS_M, *house_walls.SHOP_GLASS_M)
+        glass = (wings.GLASS_M, *wings.SHOP_GLASS_M)
         openings.add_walls(self, glass, bands)
         _add_roof(self, wing)
         if self.roof == "flat":
@@ -341,7 +333,7 @@ def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
     if door:
         x = 0.9 if left else length - 0.9
         openings.add_door(p, 0, x, 0.0, height=2.3)
-    back = [house_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
+    back = [wings.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
     openings.row((2,), 0.5, 4.5, back, 0.8)
 
 

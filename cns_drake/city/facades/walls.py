@@ -468,9 +468,9 @@ def _panel(
     def place(corner: Corner) -> np.ndarray:
         x, _, depth, row = corner
         if x == 0.0:
-            x = _shift(*directions[:2], depth, ends[0, row + 1])
+            x = _shift(directions[0], along, depth, ends[0, row + 1])
         elif x == grid.xs[-1]:
-            x -= _shift(*directions[1:], depth, ends[1, row + 1])
+            x -= _shift(along, directions[2], depth, ends[1, row + 1])
         return points[edge] + x * along + depth * inward
 
     return grid, place

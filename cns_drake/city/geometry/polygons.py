@@ -291,7 +291,8 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
 def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
     """Yields the pieces of polygons in squares of a world-anchored grid."""
     _, squares = _squares(geometry, size)
-    for piece in snap(geometry.intersection(squares)):
+    pieces = shapely.intersection(geometry, squares)
+    for piece in shapely.set_precision(pieces, _GRID):
         if polygons := polygons_of(piece):
             yield MultiPolygon(polygons)
 
@@ -367,7 +368,8 @@ def _cut_into_squares(
     corners, squares = _squares(geometry, size)
     is_whole = shapely.contains_properly(geometry, squares)
     pieces = np.full(len(squares), None)
-    pieces[~is_whole] = snap(geometry.intersection(squares[~is_whole]))
+    cut = shapely.intersection(geometry, squares[~is_whole])
+    pieces[~is_whole] = shapely.set_precision(cut, _GRID)
     ring = size * np.array([(1, 0), (1, 1), (0, 1), (0, 0)])
     return corners[is_whole][:, None] + ring, list(pieces)
 
@@ -424,12 +426,6 @@ def _heights(xy: np.ndarray, height: HeightMap | float) -> np.ndarray:
     return np.full(len(xy), float(height))
 
 
-def _counter_clockwise(ring: np.ndarray) -> np.ndarray:
-    x, y = ring[:, 0], ring[:, 1]
-    area = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
-    return ring if area > 0 else ring[::-1]
-
-
 def _quad(polygon: Polygon) -> np.ndarray | None:
     """Returns the (4, 2) corners of a polygon that is an upright rectangle.
 
@@ -442,8 +438,8 @@ def _quad(polygon: Polygon) -> np.ndarray | None:
         or polygon.area <= 0.999999 * (x1 - x0) * (y1 - y0)
     ):
         return None
-    ring = np.array(shapely.normalize(polygon).exterior.coords[:4])
-    return _counter_clockwise(ring)
+    # A normalized ring is clockwise.
+    return np.array(shapely.normalize(polygon).exterior.coords[3::-1])
 
 
 def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:

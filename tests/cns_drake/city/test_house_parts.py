@@ -5,9 +5,14 @@ from shapely.geometry import box
 from cns_drake.city.buildings import family_houses
 from cns_drake.city.facades import bays, massing, wings
 from cns_drake.city.facades.assembly import Assembly, Site
-from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.walls import Arch, Patch
-from cns_drake.city.facades.wings import Roof, Wing, add_roof
+from cns_drake.city.facades.wings import (
+    Openings,
+    Roof,
+    Wing,
+    add_roof,
+    free_stretches,
+)
 from cns_drake.city.geometry.mesh import box_mesh
 
 HALL = Wing.at((0, 0, 20, 8), 6.0, 9.0, Roof())
