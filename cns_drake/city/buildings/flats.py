@@ -311,7 +311,7 @@ class GardenFlats(Building):
 def _add_house(
     p: GardenFlats, wing: Wing, boxes: list[Wing], storeys: int, number: int
 ) -> None:
-    openings = Openings(wing, boxes)
+    openings = Openings(p, wing, boxes)
     storey = (wing.wall_top - 0.15 - _FLOOR) / storeys
     head = min(2.2, storey - 0.4)
     for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 4.5)):
@@ -325,17 +325,17 @@ def _add_house(
     if wing.wall_top > 6.0:
         stair = bays.window(1.8, _FLOOR + 2.6, wing.wall_top - 0.7, glass)
         openings.put(0, middle, 2.6, stair)
-    openings.add_door(p, 0, middle, _FLOOR, width=1.2, lights=0.4)
+    openings.add_door(0, middle, _FLOOR, width=1.2, lights=0.4)
     area = (middle - 1.4, middle + 1.4, -0.05, 1.3)
     p.add_to("trim", wall.box(*area, _FLOOR + 2.3, _FLOOR + 2.5))
     p.add_to("base", wall.standing(*area, _FLOOR, bottom=True))
     _add_verandas(p, wing, storeys, storey, number)
-    openings.add_casings(p, (0,), p.casing)
+    openings.add_casings((0,), p.casing)
     z = round(_FLOOR + storey, 2)
     bands = (Band(0.0, _FLOOR, -0.05), Band(z - 0.2, z, -0.05))
     low = wing.wall_top + 0.4
     attic = wings.attic_window(0.9, low, low + 1.0, glass, 2)
-    openings.enclose(p, (glass,), bands, attic=attic)
+    openings.enclose((glass,), bands, attic=attic)
     if not wing.roof.along_y:
         x, y = wing.x0 + 0.3 * wall.length, wing.center[1]
         spot, brick = (x, y, wing.top - 1.3), p.kind.choices["bricks"][0]

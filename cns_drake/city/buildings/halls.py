@@ -59,7 +59,7 @@ class Barn(Building):
 
 def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
     """Adds the barn itself, with its doors, or the lean-to."""
-    openings = Openings(wing, boxes)
+    openings = Openings(p, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
     openings.row(
         range(4), 1.0, 3.2, [bays.window(0.9, 1.1, head, _RECESS)], 0.8
@@ -69,7 +69,7 @@ def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
             _add_doors(p, wing, openings, edge)
     low = wing.wall_top + 0.5
     attic = wings.attic_window(1.0, low, low + 1.3, _RECESS)
-    openings.enclose(p, (_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
+    openings.enclose((_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
     for edge in range(4):
         _add_battens(p, wing, boxes, openings, edge)
 
@@ -210,14 +210,11 @@ def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
         low, high = (x0, y0, x1, middle + 0.02), (x0, middle - 0.02, x1, y1)
     falling = Roof("shed", along_y, 0.0, 0.4, 0.3, falling=True)
     rising = Roof("shed", along_y, 0.0, 0.4, 0.3)
-    return [
-        Wing.at(low, wall, top, falling),
-        Wing.at(high, wall, top, rising),
-    ]
+    return [Wing.at(low, wall, top, falling), Wing.at(high, wall, top, rising)]
 
 
 def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
-    openings = Openings(hall, halls)
+    openings = Openings(p, hall, halls)
     high, width = hall.wall_top, p.bay - 0.9
     band = bays.window(
         width, high - 2.4, high - 0.6, _SPORTS_HALL_RECESS, mullions=1
@@ -236,7 +233,7 @@ def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
     openings.row(sides, high - 1.0, p.bay, [band], 0.5)
     openings.row(ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9)
     openings.put(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
-    openings.enclose(p, (_SPORTS_HALL_RECESS,), (Band(0.0, 0.5, -0.08),))
+    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.5, -0.08),))
     _add_frames(p, hall, halls)
 
 
@@ -267,7 +264,7 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
     margin, h = 0.06 * (x1 - x0), p.annex_height
     area = (x0 + margin, y0 + 1.6, x1 - margin, halls[0].y0 + 0.05)
     annex = Wing.flat(area, h, 0.4)
-    openings = Openings(annex, halls)
+    openings = Openings(p, annex, halls)
     small = bays.window(1.6, 1.5, 2.5, _SPORTS_HALL_RECESS)
     openings.row((0, 1, 3), 1.0, 3.6, [small], 0.8)
     middle, wide = annex.width / 2, min(7.0, 0.35 * annex.width)
@@ -275,7 +272,7 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
         wide - 0.6, 0.05, h - 0.8, _SPORTS_HALL_RECESS, mullions=3
     )
     openings.put(0, middle, wide, glazing)
-    openings.enclose(p, (_SPORTS_HALL_RECESS,), (Band(0.0, 0.3, -0.05),))
+    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.3, -0.05),))
     z, half = h - 0.65, wide / 2 + 1.0
     lid = (middle - half, middle + half, -0.02, 1.5, z, z + 0.25)
     p.add_to("frames", annex.wall(0).box(*lid))

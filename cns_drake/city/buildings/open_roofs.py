@@ -91,13 +91,13 @@ def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     wide = min(x1 - x0 - wash - (0.6 if wash else 0.0), 18.0)
     start = x1 - wide if p.mirrored else x0
     shop = Wing.flat((start, ys[0], start + wide, ys[1]), p.shop_height, 0.5)
-    openings = Openings(shop)
+    openings = Openings(p, shop)
     glazing = bays.shop_front(2.7, _RECESS, door=False)
     openings.row((0,), 1.0, 3.4, [glazing], 0.4)
     doors = bays.window(2.0, 0.0, 2.5, _RECESS, mullions=1)
     openings.put(0, 0.55 * wide, 2.6, doors)
     openings.row((1, 2, 3), 1.0, 4.5, [bays.window(1.0, 1.6, 2.3, _RECESS)])
-    openings.enclose(p, (_RECESS,), (Band(0.0, 0.25, -0.05),))
+    openings.enclose((_RECESS,), (Band(0.0, 0.25, -0.05),))
     sign = (0.3, wide - 0.3, -0.02, 0.3, 2.85, p.shop_height + 0.02)
     p.add_to("brand", shop.wall(0).box(*sign))
     equip_roof(p, shop.outline, shop.floor, p.roof_items)
@@ -109,11 +109,11 @@ def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
 def _add_wash(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     """Adds a car wash: a gate in front and one behind."""
     box = Wing.flat((xs[0], ys[0], xs[1], ys[1]), p.shop_height - 0.2, 0.3)
-    openings = Openings(box)
+    openings = Openings(p, box)
     for edge in (0, 2):
         openings.put(edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5))
     openings.row((1, 3), 1.0, 3.0, [bays.window(2.2, 1.0, 2.4, _RECESS)])
-    openings.enclose(p, (_RECESS,))
+    openings.enclose((_RECESS,))
 
 
 def _add_sign(p: GasStation, xs: bays.Span, y0: float) -> None:

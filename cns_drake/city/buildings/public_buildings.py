@@ -70,14 +70,14 @@ def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
     high = p.height if p.roof == "flat" else min(top + 0.5, p.height)
     x0, y0 = wall.point(x - half, 1.2)
     hall = Wing.flat((x0, y0, x0 + 2 * half, bar[0, 1] + 4.0), high, 0.4)
-    openings = Openings(hall)
+    openings = Openings(p, hall)
     glazing = bays.window(
         2 * half - 0.9, 2.9, high - 0.9, _RECESS, mullions=2, transom=3.0
     )
     openings.put(0, half, 2 * half - 0.4, glazing)
     doors = bays.window(2 * half - 1.4, 0.05, 2.5, _RECESS, mullions=3)
     openings.add(0, doors(0.2, 2 * half - 0.2))
-    openings.enclose(p, (_RECESS,), material="accent")
+    openings.enclose((_RECESS,), material="accent")
     front = hall.wall(0)
     a, b = -0.8, 2 * half + 0.8
     posts = (
@@ -95,12 +95,12 @@ def _add_back_wing(p: School, bar: np.ndarray, back: float, top: float) -> None:
     x0 = b - wide - 0.3 if p.mirrored else a + 0.3
     high = min(top, 4.2 if p.storeys < 3 else 7.6)
     area = (x0, y - 0.05, x0 + wide, min(back, y + 22.0))
-    openings = Openings(Wing.flat(area, high, 0.4, rim=0.6))
+    openings = Openings(p, Wing.flat(area, high, 0.4, rim=0.6))
     for k in range(2 if high > 6.0 else 1):
         z = 3.4 * k
         pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
         openings.row((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
-    openings.enclose(p, (_RECESS,), material="gym")
+    openings.enclose((_RECESS,), material="gym")
 
 
 def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
@@ -123,7 +123,7 @@ def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
         (ends[0], link_y, ends[1], link_y + 3.0), 3.4, 0.2, rim=0.3
     )
     boxes = (gym, link)
-    openings = Openings(gym, boxes)
+    openings = Openings(p, gym, boxes)
     high = bays.window(2.6, wall - 2.2, wall - 0.7, _RECESS, mullions=1)
     openings.row((1, 2, 3), 3.5, 3.6, [high], 0.9)
     openings.put(0, (x1 - x0) / 2, 3.4, bays.gate(2.4, 2.6, 0.3))
@@ -132,10 +132,10 @@ def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
         for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist():
             pier = side.box(u - 0.2, u + 0.2, -0.02, 0.25, 0.0, wall - 0.3)
             p.add_to("accent", pier)
-    openings.enclose(p, (_RECESS,), material="gym")
-    passage = Openings(link, boxes)
+    openings.enclose((_RECESS,), material="gym")
+    passage = Openings(p, link, boxes)
     passage.row((0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3)
-    passage.enclose(p, (_RECESS,), material="trim")
+    passage.enclose((_RECESS,), material="trim")
 
 
 _CHAPEL_MARGIN = 0.45
@@ -218,7 +218,7 @@ def _tower(p: Chapel, nave: Wing) -> Wing:
 
 
 def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
-    openings = Openings(nave, boxes)
+    openings = Openings(p, nave, boxes)
     high = nave.wall_top
     spring = max(1.6, high - 1.5)
     lancet = bays.arched(1.0, 1.2, spring, _CHAPEL_RECESS, rise=0.7)
@@ -232,9 +232,7 @@ def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
             openings.put(0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4))
     low = high + 0.2 * (nave.top - high)
     rose = wings.attic_window(1.3, low, low + 1.6, _CHAPEL_RECESS)
-    openings.enclose(
-        p, (_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose
-    )
+    openings.enclose((_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose)
 
 
 def _add_buttresses(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
@@ -253,7 +251,7 @@ def _add_buttresses(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
 
 def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
     """Adds the shaft, its bell chamber and the spire with a cross."""
-    openings = Openings(tower, boxes)
+    openings = Openings(p, tower, boxes)
     side, top = tower.width, tower.wall_top
     width = round(min(1.2, 0.4 * side), 2)
     louvre = bays.arched(width, top - 2.6, top - 1.3, _CHAPEL_RECESS)
@@ -268,7 +266,7 @@ def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
         openings.put(0, side / 2, width + 0.6, door)
     bands = (Band(0.0, 0.45, -0.1), Band(top - 3.1, top - 2.9, -0.08),
              Band(top - 0.3, top, -0.18))  # fmt: skip
-    openings.add_walls(p, (_CHAPEL_RECESS,), bands)
+    openings.add_walls((_CHAPEL_RECESS,), bands)
     p.add_to("roof", *_spire(p, tower))
     p.add_to("trim", *_cross(*tower.center, p.height - 1.3, p.height))
 
@@ -329,7 +327,7 @@ def _add_small(
     p: Chapel, wing: Wing, boxes: list[Wing], *, is_porch: bool
 ) -> None:
     """Adds the porch or the vestry."""
-    openings = Openings(wing, boxes)
+    openings = Openings(p, wing, boxes)
     if is_porch:
         arch = bays.window(1.5, 0.0, wing.wall_top - 0.3, 0.9)
         openings.put(0, wing.width / 2, 2.2, arch)
@@ -338,7 +336,7 @@ def _add_small(
         openings.row(
             range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _CHAPEL_RECESS)]
         )
-    openings.enclose(p, (_CHAPEL_RECESS,))
+    openings.enclose((_CHAPEL_RECESS,))
 
 
 def _porch(nave: Wing) -> Wing:

@@ -248,9 +248,7 @@ def tent(eaves: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
 
 
 def revolved(
-    profile: Sequence[Point],
-    count: int,
-    center: ArrayLike = (0.0, 0.0),
+    profile: Sequence[Point], count: int, center: ArrayLike = (0.0, 0.0)
 ) -> Mesh:
     """Returns the surface that a profile sweeps around an upright axis.
 

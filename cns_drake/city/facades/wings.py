@@ -401,9 +401,10 @@ def free_stretches(
 class Openings:
     """The windows and doors of a wing, by edge."""
 
-    def __init__(self, wing: Wing, others: Sequence[Wing] = ()) -> None:
-        self._wing = wing
-        self._others = others
+    def __init__(
+        self, out: Assembly, wing: Wing, others: Sequence[Wing] = ()
+    ) -> None:
+        self._out, self._wing, self._others = out, wing, others
         self._reliefs: dict[int, list[Relief]] = {k: [] for k in range(4)}
 
     def row(
@@ -470,7 +471,6 @@ class Openings:
 
     def add_walls(
         self,
-        out: Assembly,
         glass: Sequence[float],
         bands: Sequence[Band] = (),
         material: str = "walls",
@@ -483,14 +483,13 @@ class Openings:
         bands, glass = tuple(bands), tuple(glass)
         facade = Facade(wing.wall_top, bands, self.layout, glass, wing.blind)
         outline = wing.outline
-        out.add_to(
+        self._out.add_to(
             material, massing.foundation(outline), facade_mesh(outline, facade)
         )
-        out.add_to("glass", glass_mesh(outline, facade))
+        self._out.add_to("glass", glass_mesh(outline, facade))
 
     def enclose(
         self,
-        out: Assembly,
         glass: Sequence[float],
         bands: Sequence[Band] = (),
         material: str = "walls",
@@ -500,8 +499,8 @@ class Openings:
 
         `attic` gives the windows of its gables.
         """
-        self.add_walls(out, glass, bands, material)
-        add_roof(out, self._wing, attic, material)
+        self.add_walls(glass, bands, material)
+        add_roof(self._out, self._wing, attic, material)
 
     def add_rows(
         self,
@@ -527,7 +526,6 @@ class Openings:
 
     def add_door(
         self,
-        out: Assembly,
         edge: int,
         x: float,
         floor: float,
@@ -552,17 +550,12 @@ class Openings:
 
         self.put(edge, x, width + 2 * lights + 0.5, bay)
         leaf = _leaf(x - half, x + half, floor, top)
-        out.add_to(
+        self._out.add_to(
             material, *(self._wing.wall(edge).place(part) for part in leaf)
         )
 
     def add_garage_door(
-        self,
-        out: Assembly,
-        edge: int,
-        x: float,
-        width: float,
-        height: float = 2.15,
+        self, edge: int, x: float, width: float, height: float = 2.15
     ) -> None:
         """Adds a sectional door with ribs, as `trim`."""
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
@@ -577,11 +570,9 @@ class Openings:
             )
             panel = details.board(a, b, low, high, 0.06)
             panel = panel.moved((0.0, -DOOR_M, 0.0))
-            out.add_to("trim", self._wing.wall(edge).place(panel))
+            self._out.add_to("trim", self._wing.wall(edge).place(panel))
 
-    def add_casings(
-        self, out: Assembly, edges: Sequence[int], style: str
-    ) -> None:
+    def add_casings(self, edges: Sequence[int], style: str) -> None:
         """Frames the windows of some walls, see `details.casings`."""
         material = "accent" if style == "shutters" else "trim"
         for edge in edges:
@@ -589,11 +580,10 @@ class Openings:
             boards = details.casings(
                 self.layout(edge, wall.length), (GLASS_M,), style
             )
-            out.add_to(material, *(wall.place(board) for board in boards))
+            self._out.add_to(material, *(wall.place(board) for board in boards))
 
     def add_shops(
         self,
-        out: Assembly,
         edge: int,
         start: float,
         end: float,
@@ -616,23 +606,23 @@ class Openings:
             if x1 - x0 < 2.4:
                 continue
             shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
-            if out.chance(0.5):
+            if self._out.chance(0.5):
                 shop = _reversed(shop)
             self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
-            z, tall = head + 0.08, out.uniform(0.55, 0.8, 2)
+            z, tall = head + 0.08, self._out.uniform(0.55, 0.8, 2)
             fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
-            out.add_to("sign", fascia)
-            if out.chance(awnings):
+            self._out.add_to("sign", fascia)
+            if self._out.chance(awnings):
                 shade = details.awning(
                     x0 + 0.3, x1 - 0.3, reach, max(2.4, head - 0.8), head + 0.05
                 )
-                out.add_to("awning", wall.place(shade))
-            if out.chance(0.4):
-                x = x0 + 0.25 if out.chance(0.5) else x1 - 0.25
+                self._out.add_to("awning", wall.place(shade))
+            if self._out.chance(0.4):
+                x = x0 + 0.25 if self._out.chance(0.5) else x1 - 0.25
                 # Blades hang above heads, like awnings.
                 z = max(2.4, head + 0.1)
                 blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
-                out.add_to("trim", blade)
+                self._out.add_to("trim", blade)
 
 
 # Depths of windows and of the leaves of doors behind the wall [m].

@@ -47,7 +47,7 @@ def test_blind_walls_have_no_free_part():
 
 
 def test_a_row_keeps_off_hidden_walls_and_a_door_replaces_windows():
-    openings = Openings(HALL, (HALL, PORCH))
+    openings = Openings(assembly("h"), HALL, (HALL, PORCH))
     openings.row((0,), 1.0, 2.0, [bays.window(1.0, 1.0, 2.0, 0.1)])
     row = openings.layout(0, 20.0)
     assert len(row) == 6
@@ -62,7 +62,7 @@ def test_a_row_keeps_off_hidden_walls_and_a_door_replaces_windows():
 
 
 def test_flat_wall_comes_below_an_arch():
-    openings = Openings(HALL)
+    openings = Openings(assembly("h"), HALL)
     arch = Arch(2.0, 3.0, 0.0, 2.0, 2.5, 0.3)
     openings.add(0, [arch])
     assert openings.layout(0, 20.0) == [Patch(2.0, 3.0, 0.0, 2.5, 0.0), arch]
