@@ -1,15 +1,12 @@
 """Houses for a family or two: wings under gables or hips, porches, garages."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from cns_drake.city.facades import bays, details, house_walls, massing, wings
-from cns_drake.city.facades.assembly import Assembly, Building
-from cns_drake.city.facades.house_walls import Openings
+from cns_drake.city.facades import bays, details, massing, wings
+from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.roofs import add_chimney
 from cns_drake.city.facades.walls import Band
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 
 STOREY_M = 2.65
 ROOF_M = 0.2
@@ -38,42 +35,24 @@ def wall_top_for(
     return min(wanted, height - ROOF_M - 0.08 * span)
 
 
-def window_rows(
-    wing: Wing,
-    boxes: Sequence[Wing],
-    floor: float,
-    storeys: int,
-    pitch: float,
-    width: float,
-) -> Openings:
+def _window_rows(p: Building, wing: Wing, storeys: int) -> Openings:
     """Returns a box's windows, the sides' further apart."""
-    openings = Openings(wing, boxes)
-    for edges, step in (((0, 2), pitch), ((1, 3), _SIDE_PITCH_M)):
-        openings.add_rows(edges, floor, STOREY_M, storeys, step, width)
+    openings, width = Openings(p, wing, p.boxes), p.window_width
+    for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
+        openings.add_rows(edges, p.floor, STOREY_M, storeys, step, width)
     return openings
 
 
-def close_box(
-    out: Assembly,
-    wing: Wing,
-    openings: Openings,
-    plinth: float,
-    casing: str,
-    edges: Sequence[int] = (0,),
-) -> None:
-    """Adds the walls and the roof around a box's openings.
-
-    A `plinth` of the foundation shows [m]; windows on `edges` have a casing.
-    """
-    openings.add_casings(out, edges, casing)
-    bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()
-    openings.add_walls(out, (house_walls.GLASS_M,), bands)
+def _close_box(p: Building, wing: Wing, openings: Openings) -> None:
+    """Adds the walls and the roof around a box's openings."""
+    openings.add_casings((0,), p.casing)
+    bands = (Band(0.0, p.floor, -0.04),) if p.floor > 0 else ()
     low = wing.wall_top + 0.4
-    attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M)
-    wings.add_roof(out, wing, attic)
+    attic = wings.attic_window(0.9, low, low + 1.0, wings.GLASS_M)
+    openings.enclose((wings.GLASS_M,), bands, attic=attic)
 
 
-def garage_wing(
+def _garage_wing(
     kind: str, x0: float, x1: float, y0: float, y1: float, most: float
 ) -> Wing:
     """Returns a garage no deeper than 6.5 m and no higher than `most`.
@@ -85,17 +64,16 @@ def garage_wing(
             "hip": 0.25 * span}[kind]  # fmt: skip
     shape = Roof(kind, True, 0.3, 0.25, ROOF_M)
     top = min(wall_top + ROOF_M + rise, most)
-    return Wing.at(x0, y0, x1, min(y1, y0 + 6.5), wall_top, top, shape)
+    return Wing.at((x0, y0, x1, min(y1, y0 + 6.5)), wall_top, top, shape)
 
 
-def add_garage(out: Assembly, garage: Wing, boxes: Sequence[Wing]) -> None:
+def _add_garage(p: Building, garage: Wing) -> None:
     """Adds a garage, its door in front."""
-    openings = Openings(garage, boxes)
+    openings = Openings(p, garage, p.boxes)
     length = garage.x1 - garage.x0
-    openings.add_garage_door(out, 0, length / 2, min(length - 0.7, 4.9))
-    openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
-    openings.add_walls(out, (house_walls.GLASS_M,))
-    wings.add_roof(out, garage)
+    openings.add_garage_door(0, length / 2, min(length - 0.7, 4.9))
+    openings.row((1, 3), 1.0, 3.4, [wings.sash(0.9, 0.0, 1.1, 2.0)])
+    openings.enclose((wings.GLASS_M,))
 
 
 # Kept free around the walls, for eaves and chimneys [m].
@@ -123,7 +101,7 @@ class DetachedHouse(Building):
         for wing in self.wings:
             _add_wing(self, wing)
         if self.garage_box is not None:
-            add_garage(self, self.garage_box, self.boxes)
+            _add_garage(self, self.garage_box)
         _add_chimney(self)
 
     def _lay_out(self) -> None:
@@ -134,7 +112,7 @@ class DetachedHouse(Building):
         """
         x0, y0, x1, y1 = self.site.bounds
         left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
-        ahead = self.porch_reach + 0.3 + 1.8 * self.deck
+        ahead = self.porch_reach + 0.3 + 1.8 * self.floor
         self.ahead = min(ahead, 0.3 * (back - y0))
         front = y0 + self.ahead
         main_back = front + min(back - front, 10.0)
@@ -143,12 +121,12 @@ class DetachedHouse(Building):
         has_garage = self.garage != "none" and garage_width > 2.9
         split = right - garage_width * has_garage
         pitch_deg = 48.0 if self.roof == "gambrel" else self.pitch_deg
-        n = storeys_for(self.height, self.deck, deep, pitch_deg)
-        wall_top = wall_top_for(self.height, self.deck, deep, n)
+        n = storeys_for(self.height, self.floor, deep, pitch_deg)
+        wall_top = wall_top_for(self.height, self.floor, deep, n)
         slope = 2 * (self.height - wall_top - ROOF_M) / deep
         roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
         area = (left, front, split, main_back)
-        boxes = [Wing.at(*area, wall_top, self.height, roof)]
+        boxes = [Wing.at(area, wall_top, self.height, roof)]
         wide = max(3.2, self.wing_width * (split - left))
         drop = STOREY_M * (n > 1 and self.low_wing)
         top = min(wall_top + ROOF_M + slope * wide / 2, self.height - 0.25)
@@ -163,9 +141,9 @@ class DetachedHouse(Building):
                 a = left + 0.4 * (split - left - wide)
                 area = (a, middle, a + wide, min(back, main_back + 3.0))
             if end == "front" or back - main_back > 1.0:
-                boxes.append(Wing.at(*area, wall_top - drop, top - drop, shape))
+                boxes.append(Wing.at(area, wall_top - drop, top - drop, shape))
         if has_garage:
-            boxes.append(garage_wing(
+            boxes.append(_garage_wing(
                 self.garage, split - 0.06, right, front + 0.6,
                 main_back - 0.4, self.height,
             ))  # fmt: skip
@@ -180,14 +158,12 @@ class DetachedHouse(Building):
 
 
 def _add_main(p: DetachedHouse) -> None:
-    openings = window_rows(
-        p.main, p.boxes, p.deck, p.storeys, p.window_pitch, p.window_width
-    )
+    openings = _window_rows(p, p.main, p.storeys)
     a, b = (x - p.main.x0 for x in p.free)
     door = a + 0.5 * (b - a)
-    openings.add_door(p, 0, door, p.deck, lights=0.3)
+    openings.add_door(0, door, p.floor, lights=0.3)
     _add_porch(p, (a, b))
-    close_box(p, p.main, openings, p.deck, p.casing)
+    _close_box(p, p.main, openings)
     if p.roof in ("gable", "gambrel"):
         wings.add_dormers(p, p.main, a, b, p.dormers, p.dormer, 3.0)
 
@@ -198,36 +174,34 @@ def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
     a, b = free
     door = (a + b) / 2
     reach = min(p.porch_reach, p.ahead - 0.3)
-    eaves = p.deck + 2.3
+    eaves = p.floor + 2.3
     top = eaves + (0.9 if p.porch == "gable" else 0.45)
     if p.storeys == 1:
         top = min(top, p.main.wall_top + 0.1)
     full = p.porch == "full" and b - a > 3.5
     x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
     details.add_porch(
-        p, wall, x0, x1, reach, p.deck, eaves, top,
+        p, wall, x0, x1, reach, p.floor, eaves, top,
         roof="shed" if p.porch == "full" else p.porch,
         posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
     )  # fmt: skip
     room = p.ahead - reach - 0.02
-    details.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.deck, room)
-    if full and p.deck > 0.3:
+    details.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.floor, room)
+    if full and p.floor > 0.3:
         y, rgb = reach - 0.15, p.colours["trim"]
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
         for k, (a, b) in enumerate(runs):
             part = f"railing_{k}"
-            details.add_railing(p, part, wall, (a, y), (b, y), p.deck, rgb)
+            details.add_railing(p, part, wall, (a, y), (b, y), p.floor, rgb)
 
 
 def _add_wing(p: DetachedHouse, wing: Wing) -> None:
-    count = max(1, round((wing.wall_top - p.deck) / STOREY_M))
-    openings = window_rows(
-        wing, p.boxes, p.deck, count, p.window_pitch, p.window_width
-    )
-    close_box(p, wing, openings, p.deck, p.casing)
+    count = max(1, round((wing.wall_top - p.floor) / STOREY_M))
+    openings = _window_rows(p, wing, count)
+    _close_box(p, wing, openings)
     is_front = wing.y0 < p.main.y0
     if p.bay_window and is_front and wing.width > 3.0:
-        size = (wing.width / 2, 2.2, 0.4, 0.0, p.deck + 2.3)
+        size = (wing.width / 2, 2.2, 0.4, 0.0, p.floor + 2.3)
         details.add_bay_window(p, wing.wall(0), *size)
 
 
@@ -257,15 +231,14 @@ class Bungalow(Building):
         """Builds the bungalow along the front of a rectangle."""
         self._lay_out()
         main, *fronts = self.boxes
-        size = (self.floor, 1, self.window_pitch, self.window_width)
-        openings = window_rows(main, self.boxes, *size)
+        openings = _window_rows(self, main, 1)
         _add_bungalow_main(self, main, openings)
         for k, wing in enumerate(fronts):
-            openings = window_rows(wing, self.boxes, *size)
+            openings = _window_rows(self, wing, 1)
             if self.parking == "garage" and k == 0:
                 width = min(wing.width - 0.8, 4.8)
-                openings.add_garage_door(self, 0, wing.width / 2, width)
-            close_box(self, wing, openings, self.floor, self.casing)
+                openings.add_garage_door(0, wing.width / 2, width)
+            _close_box(self, wing, openings)
         if self.carport is not None:
             _add_carport(self, self.carport)
         x = main.x0 + self.chimney_at * main.width
@@ -298,7 +271,7 @@ class Bungalow(Building):
             self.floor + 2.75, top - ROOF_M - 0.1 * deep, 0.8 * (top - ROOF_M)
         )
         shape = Roof(self.roof, eaves=0.6, verge=0.4, thickness=ROOF_M)
-        main = Wing.at(left, front, right, front + deep, wall_top, top, shape)
+        main = Wing.at((left, front, right, front + deep), wall_top, top, shape)
         slope = 2 * (top - main.wall_top - ROOF_M) / deep
         wide = max(3.4, self.wing_width * (right - left))
         end = min(top - 0.2, main.wall_top + ROOF_M + slope * wide / 2)
@@ -307,7 +280,7 @@ class Bungalow(Building):
         for k in range(count):
             a = left - 0.02 if k == 0 else right - wide
             area = (a, front - reach, a + wide + 0.02, front + deep / 2)
-            boxes.append(Wing.at(*area, main.wall_top, end, cross))
+            boxes.append(Wing.at(area, main.wall_top, end, cross))
             taken[k] = a + wide if k == 0 else a
         if self.mirrored:
             both = x0 + x1
@@ -325,10 +298,10 @@ def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
     door = a + 0.3 * (b - a)
     if b - door > p.picture + 1.6:
         x = (door + 0.6 + b) / 2
-        pane = house_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
+        pane = wings.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
         openings.put(0, x, p.picture + 0.7, pane)
-    openings.add_door(p, 0, door, p.floor, lights=0.3)
-    close_box(p, main, openings, p.floor, p.casing)
+    openings.add_door(0, door, p.floor, lights=0.3)
+    _close_box(p, main, openings)
     reach = min(1.6, main.y0 - p.site.bounds[1] - 0.4)
     if p.veranda and b - a > 4.0 and reach > 0.9:
         eaves = min(p.floor + 2.25, main.wall_top - 0.35)
@@ -367,28 +340,24 @@ class SemiDetached(Building):
         n = storeys_for(self.height, self.floor, deep, self.pitch_deg)
         wall_top = wall_top_for(self.height, self.floor, deep, n)
         shape = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
-        main = Wing.at(
-            left + side, front, right - side, front + deep, wall_top,
-            self.height, shape,
-        )  # fmt: skip
+        area = (left + side, front, right - side, front + deep)
+        main = Wing.at(area, wall_top, self.height, shape)
         bays = _gabled_bays(self, main) if self.bay == "gabled" else ()
         garages = []
         if has_garages:
             for a, b in ((left, main.x0 + 0.06), (main.x1 - 0.06, right)):
                 area = (a, b, front + 1.5, main.y1 - 0.3)
-                garages.append(garage_wing(self.garages, *area, self.height))
-        boxes = (main, *bays, *garages)
-        openings = window_rows(
-            main, boxes, self.floor, n, self.window_pitch, self.window_width
-        )
+                garages.append(_garage_wing(self.garages, *area, self.height))
+        self.boxes = (main, *bays, *garages)
+        openings = _window_rows(self, main, n)
         _add_entrances(self, main, openings, y0)
-        close_box(self, main, openings, self.floor, self.casing)
+        _close_box(self, main, openings)
         for wing in bays:
-            rows = Openings(wing, boxes)
+            rows = Openings(self, wing, self.boxes)
             rows.add_rows((0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2)
-            close_box(self, wing, rows, self.floor, self.casing)
+            _close_box(self, wing, rows)
         for garage in garages:
-            add_garage(self, garage, boxes)
+            _add_garage(self, garage)
         _add_chimneys(self, main)
 
 
@@ -415,7 +384,8 @@ def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
     )
     y0 = main.y0 - p.bay_reach
     return tuple(
-        Wing.at(a, y0, b, middle, main.wall_top, top, shape) for a, b in fronts
+        Wing.at((a, y0, b, middle), main.wall_top, top, shape)
+        for a, b in fronts
     )
 
 
@@ -431,7 +401,7 @@ def _add_entrances(
     eaves = p.floor + 2.35
     size = (reach, p.floor, eaves, eaves + 0.4)
     for x in (half - offset, half + offset):
-        openings.add_door(p, 0, x, p.floor)
+        openings.add_door(0, x, p.floor)
         if not p.doors_inside:
             details.add_porch(p, wall, x - 0.85, x + 0.85, *size)
     if p.doors_inside:

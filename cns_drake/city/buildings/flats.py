@@ -6,20 +6,11 @@ import numpy as np
 
 from cns_drake.city.buildings import family_houses
 from cns_drake.city.buildings.family_houses import ROOF_M
-from cns_drake.city.facades import (
-    bays,
-    details,
-    house_walls,
-    massing,
-    roofs,
-    tiers,
-    wings,
-)
+from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.facades.walls import Band, Facade, Layout, Relief
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 
@@ -312,7 +303,7 @@ class GardenFlats(Building):
                 top = min(wall_top + ROOF_M + slope * run, self.height - 0.1)
             shape = Roof(self.roof, cross, 0.4, 0.35, ROOF_M)
             area = (bounds[k] - 0.05 * (k > 0), y, bounds[k + 1], y + deep)
-            boxes.append(Wing.at(*area, wall_top, top, shape))
+            boxes.append(Wing.at(area, wall_top, top, shape))
         for k, wing in enumerate(boxes):
             _add_house(self, wing, boxes, storeys, k)
 
@@ -320,7 +311,7 @@ class GardenFlats(Building):
 def _add_house(
     p: GardenFlats, wing: Wing, boxes: list[Wing], storeys: int, number: int
 ) -> None:
-    openings = Openings(wing, boxes)
+    openings = Openings(p, wing, boxes)
     storey = (wing.wall_top - 0.15 - _FLOOR) / storeys
     head = min(2.2, storey - 0.4)
     for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 4.5)):
@@ -329,22 +320,22 @@ def _add_house(
         )  # fmt: skip
     wall = wing.wall(0)
     middle = wall.length / 2
-    glass = house_walls.GLASS_M
+    glass = wings.GLASS_M
     openings.clear(0, middle - 1.1, middle + 1.1, 0.0, wing.wall_top)
     if wing.wall_top > 6.0:
         stair = bays.window(1.8, _FLOOR + 2.6, wing.wall_top - 0.7, glass)
         openings.put(0, middle, 2.6, stair)
-    openings.add_door(p, 0, middle, _FLOOR, width=1.2, lights=0.4)
+    openings.add_door(0, middle, _FLOOR, width=1.2, lights=0.4)
     area = (middle - 1.4, middle + 1.4, -0.05, 1.3)
     p.add_to("trim", wall.box(*area, _FLOOR + 2.3, _FLOOR + 2.5))
     p.add_to("base", wall.standing(*area, _FLOOR, bottom=True))
     _add_verandas(p, wing, storeys, storey, number)
-    openings.add_casings(p, (0,), p.casing)
+    openings.add_casings((0,), p.casing)
     z = round(_FLOOR + storey, 2)
     bands = (Band(0.0, _FLOOR, -0.05), Band(z - 0.2, z, -0.05))
     low = wing.wall_top + 0.4
     attic = wings.attic_window(0.9, low, low + 1.0, glass, 2)
-    openings.enclose(p, (glass,), bands, attic=attic)
+    openings.enclose((glass,), bands, attic=attic)
     if not wing.roof.along_y:
         x, y = wing.x0 + 0.3 * wall.length, wing.center[1]
         spot, brick = (x, y, wing.top - 1.3), p.kind.choices["bricks"][0]

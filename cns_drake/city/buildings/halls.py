@@ -6,7 +6,6 @@ import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import (
     Band,
@@ -15,7 +14,7 @@ from cns_drake.city.facades.walls import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _MARGIN = 0.5
@@ -47,7 +46,7 @@ class Barn(Building):
             # A vault is at most half a circle.
             eaves, wall_top = 0.0, max(wall_top, top - 0.8 * half)
         roof = Roof(self.roof, along_y, eaves, 0.35, 0.18)
-        main = Wing.at(a, low, b, high, wall_top, top, roof)
+        main = Wing.at((a, low, b, high), wall_top, top, roof)
         boxes = [main]
         if self.aisle > 1.5:
             boxes.append(_aisle(self, main, (left, right, back)))
@@ -60,7 +59,7 @@ class Barn(Building):
 
 def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
     """Adds the barn itself, with its doors, or the lean-to."""
-    openings = Openings(wing, boxes)
+    openings = Openings(p, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
     openings.row(
         range(4), 1.0, 3.2, [bays.window(0.9, 1.1, head, _RECESS)], 0.8
@@ -70,7 +69,7 @@ def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
             _add_doors(p, wing, openings, edge)
     low = wing.wall_top + 0.5
     attic = wings.attic_window(1.0, low, low + 1.3, _RECESS)
-    openings.enclose(p, (_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
+    openings.enclose((_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
     for edge in range(4):
         _add_battens(p, wing, boxes, openings, edge)
 
@@ -91,7 +90,7 @@ def _aisle(p: Barn, main: Wing, limits: tuple[float, float, float]) -> Wing:
         area = (a, main.y0 + 0.8, b, main.y1 - 0.8)
     falling = not (along_y and p.aisle_left)
     roof = Roof("shed", along_y, 0.3, 0.25, 0.15, falling=falling)
-    return Wing.at(*area, low, high, roof)
+    return Wing.at(area, low, high, roof)
 
 
 def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
@@ -201,7 +200,7 @@ def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
     if p.roof != "butterfly":
         eaves = 0.0 if p.roof == "barrel" else 0.4
         roof = Roof(p.roof, along_y, eaves, 0.4, 0.3)
-        return [Wing.at(x0, y0, x1, y1, wall, top, roof)]
+        return [Wing.at((x0, y0, x1, y1), wall, top, roof)]
     low, high = area, area
     if along_y:
         middle = (x0 + x1) / 2
@@ -211,14 +210,11 @@ def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
         low, high = (x0, y0, x1, middle + 0.02), (x0, middle - 0.02, x1, y1)
     falling = Roof("shed", along_y, 0.0, 0.4, 0.3, falling=True)
     rising = Roof("shed", along_y, 0.0, 0.4, 0.3)
-    return [
-        Wing.at(*low, wall, top, falling),
-        Wing.at(*high, wall, top, rising),
-    ]
+    return [Wing.at(low, wall, top, falling), Wing.at(high, wall, top, rising)]
 
 
 def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
-    openings = Openings(hall, halls)
+    openings = Openings(p, hall, halls)
     high, width = hall.wall_top, p.bay - 0.9
     band = bays.window(
         width, high - 2.4, high - 0.6, _SPORTS_HALL_RECESS, mullions=1
@@ -237,7 +233,7 @@ def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
     openings.row(sides, high - 1.0, p.bay, [band], 0.5)
     openings.row(ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9)
     openings.put(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
-    openings.enclose(p, (_SPORTS_HALL_RECESS,), (Band(0.0, 0.5, -0.08),))
+    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.5, -0.08),))
     _add_frames(p, hall, halls)
 
 
@@ -267,8 +263,8 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
     x0, x1 = min(w.x0 for w in halls), max(w.x1 for w in halls)
     margin, h = 0.06 * (x1 - x0), p.annex_height
     area = (x0 + margin, y0 + 1.6, x1 - margin, halls[0].y0 + 0.05)
-    annex = Wing.flat(*area, h, 0.4)
-    openings = Openings(annex, halls)
+    annex = Wing.flat(area, h, 0.4)
+    openings = Openings(p, annex, halls)
     small = bays.window(1.6, 1.5, 2.5, _SPORTS_HALL_RECESS)
     openings.row((0, 1, 3), 1.0, 3.6, [small], 0.8)
     middle, wide = annex.width / 2, min(7.0, 0.35 * annex.width)
@@ -276,7 +272,7 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
         wide - 0.6, 0.05, h - 0.8, _SPORTS_HALL_RECESS, mullions=3
     )
     openings.put(0, middle, wide, glazing)
-    openings.enclose(p, (_SPORTS_HALL_RECESS,), (Band(0.0, 0.3, -0.05),))
+    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.3, -0.05),))
     z, half = h - 0.65, wide / 2 + 1.0
     lid = (middle - half, middle + half, -0.02, 1.5, z, z + 0.25)
     p.add_to("frames", annex.wall(0).box(*lid))
@@ -356,7 +352,7 @@ def _dock(
     vertices = np.array([(x, y, z) for x in (a, b) for y, z in section])
     faces = [(k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4) for k in range(4)]
     faces += [(0, 1, 2, 3), (7, 6, 5, 4)]
-    pieces.append(Mesh(vertices, tuple(f[::-1] for f in faces)))
+    pieces.append(Mesh(vertices, tuple(faces)).turned())
     for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
         post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
         pieces.append(massing.box(*post, high - 0.1, eaves - 0.2))

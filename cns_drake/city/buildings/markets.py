@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, house_walls, massing, roofs
+from cns_drake.city.facades import bays, details, massing, roofs, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Patch
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 
 # Kept free in front for canopies and behind for gutters [m].
 _FRONT_M, _BACK_M = 0.4, 0.1
@@ -33,7 +32,7 @@ class ShopStrip(Building):
             back = y1 - _BACK_M - self.uniform(0.0, 0.12) * (y1 - y0)
             area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
             roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
-            wing = Wing.at(*area, top - 0.1, top, roof, blind)
+            wing = Wing.at(area, top - 0.1, top, roof, blind)
             _add_unit(self, wing, tall)
             if k % 3 == 0:
                 part = f"unit_{k}_"
@@ -51,7 +50,7 @@ def _top(p: ShopStrip, tall: bool) -> float:
 
 
 def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
-    openings = Openings(wing)
+    openings = Openings(p, wing)
     wall = wing.wall(0)
     cladding = "walls" if p.chance(0.5) else "facing"
     upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
@@ -61,13 +60,13 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
         (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
         head=min(2.3, storey - 0.4),
     )  # fmt: skip
-    openings.add_shops(p, 0, 0.2, wall.length - 0.2, p.ground,
+    openings.add_shops(0, 0.2, wall.length - 0.2, p.ground,
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
-    back = [bays.gate(2.0, 2.2, 0.2), house_walls.sash(1.0, 0.0, 1.6, 2.3)]
+    back = [bays.gate(2.0, 2.2, 0.2), wings.sash(1.0, 0.0, 1.6, 2.3)]
     openings.row((2,), 0.5, 3.6, back, 0.7)
-    glass = (house_walls.GLASS_M, *house_walls.SHOP_GLASS_M)
-    openings.enclose(p, glass, (Band(0.0, 0.3, -0.05),), cladding)
+    glass = (wings.GLASS_M, *wings.SHOP_GLASS_M)
+    openings.enclose(glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
         z, reach = p.ground - 0.95, p.canopy_reach
         lid = (0.05, wall.length - 0.05, -0.02, reach, z, z + 0.22)
@@ -133,14 +132,14 @@ def _stalls(p: KioskRow, left: float, right: float, front: float) -> list[Wing]:
         high = top - (0.25 * (k % 2) if k != count // 2 else 0.0)
         wall = max(2.2, high - 0.32 * min(width, p.depth))
         area = (x, front, x + width, front + p.depth)
-        boxes.append(Wing.at(*area, min(wall, high - 0.35), high, roof))
+        boxes.append(Wing.at(area, min(wall, high - 0.35), high, roof))
         x += width + p.gap * ((k + 1) % p.group == 0)
     return boxes
 
 
 def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
     """Adds a stall: a counter under an awning, or closed shutters."""
-    openings = Openings(wing, boxes)
+    openings = Openings(p, wing, boxes)
     wall, material = wing.wall(0), ("stalls", "others")[k % 2]
     a, b = 0.3, wall.length - 0.3
     head = min(2.15, wing.wall_top - 0.25)
@@ -159,7 +158,7 @@ def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
     sign = details.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
     p.add_to("awning", wall.place(sign))
     bands = (Band(0.0, 0.25, -0.05),)
-    openings.enclose(p, (0.12,), bands, material)
+    openings.enclose((0.12,), bands, material)
 
 
 def _add_lantern(p: KioskRow, wing: Wing) -> None:
@@ -197,8 +196,8 @@ class Supermarket(Building):
         left = x0 + 0.3 + self.dock_depth * self.dock_left
         right = x1 - 0.3 - self.dock_depth * (not self.dock_left)
         area = (left, y0 + self.canopy + 1.2, right, y1 - 0.3)
-        hall = Wing.flat(*area, self.eaves, 0.9, rim=0.2)
-        openings = Openings(hall)
+        hall = Wing.flat(area, self.eaves, 0.9, rim=0.2)
+        openings = Openings(self, hall)
         glazing = bays.window(
             self.pitch - 0.9, 0.4, 3.3, _RECESS, mullions=2, transom=2.4
         )
@@ -216,7 +215,7 @@ class Supermarket(Building):
             Band(0.0, 0.4, -0.06),
             Band(self.eaves - 0.7, self.eaves - 0.2, -0.08),
         )
-        openings.enclose(self, (_RECESS,), bands)
+        openings.enclose((_RECESS,), bands)
         piers = details.pilasters(
             hall.outline, self.pitch, 0.6, 1, 0.5, 0.2, 0.0, self.eaves - 0.5
         )
@@ -255,14 +254,14 @@ def _add_entrance(p: Supermarket, hall: Wing) -> None:
     wall_top = max(top - rise - 0.2, p.eaves - 0.5)
     roof = Roof(kind, True, 0.0, 0.25, 0.2, parapet=0.6)
     area = (hall.x0 + x - w / 2, y0, hall.x0 + x + w / 2, hall.y0 + 5.0)
-    porch = Wing.at(*area, wall_top, top, roof)
-    openings = Openings(porch, (hall,))
+    porch = Wing.at(area, wall_top, top, roof)
+    openings = Openings(p, porch, (hall,))
     doors = bays.window(w - 2.4, 0.05, 2.6, _RECESS, mullions=3)
     openings.put(0, w / 2, w - 1.6, doors)
     if wall_top > 5.0:
         light = bays.window(w - 2.4, 2.95, wall_top - 1.5, _RECESS, mullions=3)
         openings.add(0, light(0.8, w - 0.8))
-    openings.enclose(p, (_RECESS,), material="brand")
+    openings.enclose((_RECESS,), material="brand")
     sign = (0.2 * w, 0.8 * w, -0.02, 0.22, wall_top - 1.2, wall_top - 0.15)
     p.add_to("steel", porch.wall(0).box(*sign))
 

@@ -1,6 +1,6 @@
 """Towers of offices, one of them under construction."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import itertools
 
 import numpy as np
@@ -40,15 +40,16 @@ class BandedTower(Building):
         gap = 3.4
         room = (self.height - 1.2 - z - gap * (self.stacks - 1)) / self.stacks
         counts = tiers.divided(room, self.storey, 12 // self.stacks)
+        plans = {"wide": outer, "slim": inner}
         shapes = [
-            _Stack(self, plan, counts, name)
-            for plan, name in ((outer, "wide"), (inner, "slim"))[: self.stacks]
+            (plan, _stack(self, plan, counts, name))
+            for name, plan in list(plans.items())[: self.stacks]
         ]
         for k in range(self.stacks):
-            z = shapes[k % 2].place(z, k)
+            plan, place = shapes[k % 2]
+            z = place(z, k)
             if k + 1 < self.stacks:
-                z = _add_garden(self, shapes[k % 2].plan, inner, z, gap, k)
-        plan = shapes[(self.stacks - 1) % 2].plan
+                z = _add_garden(self, plan, inner, z, gap, k)
         rim = round(self.height - z, 3)
         crown = Facade(rim, (Band(rim - 0.4, rim, -min(0.3, self.ledge)),))
         roof = tiers.add_crown(
@@ -104,56 +105,49 @@ def _add_garden(
     return round(z0 + height, 3)
 
 
-class _Stack:
-    """Storeys of one outline, to be placed several times."""
+def _stack(
+    p: BandedTower, plan: np.ndarray, counts: tuple[int, int, float], name: str
+) -> Callable[[float, int], float]:
+    """Returns a function that places storeys of one outline.
 
-    def __init__(
-        self,
-        p: BandedTower,
-        plan: np.ndarray,
-        counts: tuple[int, int, float],
-        name: str,
-    ):
-        self.plan = plan
-        self._p = p
-        self._groups, per_group, storey = counts
-        self._step = per_group * storey
-        bands = (
-            Band(0.0, p.spandrel, 0.0),
-            Band(p.spandrel, storey, p.recess),
-            Band(storey - 0.2, storey, -p.ledge),
-        )
-        facade = Facade(storey, bands, glass=(p.recess,)).stacked(per_group)
-        pieces = [facade_mesh(plan, facade)]
-        if p.fins > 0:
-            # They cross the sunshades and meet those above and below.
-            fins = details.piers(
-                plan, p.fins, 0.18, p.ledge + 0.1, 0.0, self._step,
-                depth=p.recess + 0.05, margin=0.8,
-            )  # fmt: skip
-            pieces.append(fins)
-        self._height = round(self._groups * self._step, 3)
-        pane = massing.inset(plan, p.recess - 0.004)
-        glass = massing.skirt(pane, pane, 0.0, self._height)
-        soffit = massing.flat(plan, 0.0, up=False)
-        self._walls, self._glass, self._soffit = (
-            MeshShape(p.define(f"{name}{part}", mesh))
-            for part, mesh in (
-                ("", merge_meshes(*pieces)),
-                ("_glass", glass),
-                ("_soffit", soffit),
-            )
-        )
+    It gets their bottom and the number of the stack, and returns their top [m].
+    """
+    groups, per_group, storey = counts
+    step = per_group * storey
+    bands = (
+        Band(0.0, p.spandrel, 0.0),
+        Band(p.spandrel, storey, p.recess),
+        Band(storey - 0.2, storey, -p.ledge),
+    )
+    facade = Facade(storey, bands, glass=(p.recess,)).stacked(per_group)
+    pieces = [facade_mesh(plan, facade)]
+    if p.fins > 0:
+        # They cross the sunshades and meet those above and below.
+        pieces.append(details.piers(
+            plan, p.fins, 0.18, p.ledge + 0.1, 0.0, step,
+            depth=p.recess + 0.05, margin=0.8,
+        ))  # fmt: skip
+    height = round(groups * step, 3)
+    pane = massing.inset(plan, p.recess - 0.004)
+    meshes = {
+        name: merge_meshes(*pieces),
+        f"{name}_glass": massing.skirt(pane, pane, 0.0, height),
+        f"{name}_soffit": massing.flat(plan, 0.0, up=False),
+    }
+    walls, glass, soffit = (
+        MeshShape(p.define(part, mesh)) for part, mesh in meshes.items()
+    )
 
-    def place(self, z0: float, number: int) -> float:
-        """Places the storeys; returns their top [m]."""
-        at, part, p = (0.0, 0.0, z0), f"stack_{number}", self._p
-        p.place(f"{part}_glass", self._glass, at, rgb=p.glass_rgb)
-        p.place(f"{part}_soffit", self._soffit, at)
-        for k in range(self._groups):
-            z = z0 + k * self._step
-            p.place(f"{part}_storey_{k:02d}", self._walls, (0.0, 0.0, z))
-        return round(z0 + self._height, 3)
+    def place(z0: float, number: int) -> float:
+        at, part = (0.0, 0.0, z0), f"stack_{number}"
+        p.place(f"{part}_glass", glass, at, rgb=p.glass_rgb)
+        p.place(f"{part}_soffit", soffit, at)
+        for k in range(groups):
+            z = z0 + k * step
+            p.place(f"{part}_storey_{k:02d}", walls, (0.0, 0.0, z))
+        return round(z0 + height, 3)
+
+    return place
 
 
 class GridTower(Building):

@@ -8,10 +8,9 @@ import numpy as np
 from cns_drake.city.facades import bays, details, massing, roofs
 from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.details import add_railing
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
-from cns_drake.city.facades.wings import Wing
+from cns_drake.city.facades.wings import Openings, Wing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _RECESS = 0.18
@@ -91,14 +90,14 @@ def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     wash = 5.2 if p.wash else 0.0
     wide = min(x1 - x0 - wash - (0.6 if wash else 0.0), 18.0)
     start = x1 - wide if p.mirrored else x0
-    shop = Wing.flat(start, ys[0], start + wide, ys[1], p.shop_height, 0.5)
-    openings = Openings(shop)
+    shop = Wing.flat((start, ys[0], start + wide, ys[1]), p.shop_height, 0.5)
+    openings = Openings(p, shop)
     glazing = bays.shop_front(2.7, _RECESS, door=False)
     openings.row((0,), 1.0, 3.4, [glazing], 0.4)
     doors = bays.window(2.0, 0.0, 2.5, _RECESS, mullions=1)
     openings.put(0, 0.55 * wide, 2.6, doors)
     openings.row((1, 2, 3), 1.0, 4.5, [bays.window(1.0, 1.6, 2.3, _RECESS)])
-    openings.enclose(p, (_RECESS,), (Band(0.0, 0.25, -0.05),))
+    openings.enclose((_RECESS,), (Band(0.0, 0.25, -0.05),))
     sign = (0.3, wide - 0.3, -0.02, 0.3, 2.85, p.shop_height + 0.02)
     p.add_to("brand", shop.wall(0).box(*sign))
     equip_roof(p, shop.outline, shop.floor, p.roof_items)
@@ -109,12 +108,12 @@ def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
 
 def _add_wash(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     """Adds a car wash: a gate in front and one behind."""
-    box = Wing.flat(xs[0], ys[0], xs[1], ys[1], p.shop_height - 0.2, 0.3)
-    openings = Openings(box)
+    box = Wing.flat((xs[0], ys[0], xs[1], ys[1]), p.shop_height - 0.2, 0.3)
+    openings = Openings(p, box)
     for edge in (0, 2):
         openings.put(edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5))
     openings.row((1, 3), 1.0, 3.0, [bays.window(2.2, 1.0, 2.4, _RECESS)])
-    openings.enclose(p, (_RECESS,))
+    openings.enclose((_RECESS,))
 
 
 def _add_sign(p: GasStation, xs: bays.Span, y0: float) -> None:

@@ -4,10 +4,9 @@ import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
 from cns_drake.city.geometry.mesh import Mesh
 
 _MARGIN = 0.6
@@ -70,15 +69,15 @@ def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
     x = float(np.clip(x, half + 0.4, wall.length - half - 0.4))
     high = p.height if p.roof == "flat" else min(top + 0.5, p.height)
     x0, y0 = wall.point(x - half, 1.2)
-    hall = Wing.flat(x0, y0, x0 + 2 * half, bar[0, 1] + 4.0, high, 0.4)
-    openings = Openings(hall)
+    hall = Wing.flat((x0, y0, x0 + 2 * half, bar[0, 1] + 4.0), high, 0.4)
+    openings = Openings(p, hall)
     glazing = bays.window(
         2 * half - 0.9, 2.9, high - 0.9, _RECESS, mullions=2, transom=3.0
     )
     openings.put(0, half, 2 * half - 0.4, glazing)
     doors = bays.window(2 * half - 1.4, 0.05, 2.5, _RECESS, mullions=3)
     openings.add(0, doors(0.2, 2 * half - 0.2))
-    openings.enclose(p, (_RECESS,), material="accent")
+    openings.enclose((_RECESS,), material="accent")
     front = hall.wall(0)
     a, b = -0.8, 2 * half + 0.8
     posts = (
@@ -96,12 +95,12 @@ def _add_back_wing(p: School, bar: np.ndarray, back: float, top: float) -> None:
     x0 = b - wide - 0.3 if p.mirrored else a + 0.3
     high = min(top, 4.2 if p.storeys < 3 else 7.6)
     area = (x0, y - 0.05, x0 + wide, min(back, y + 22.0))
-    openings = Openings(Wing.flat(*area, high, 0.4, rim=0.6))
+    openings = Openings(p, Wing.flat(area, high, 0.4, rim=0.6))
     for k in range(2 if high > 6.0 else 1):
         z = 3.4 * k
         pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
         openings.row((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
-    openings.enclose(p, (_RECESS,), material="gym")
+    openings.enclose((_RECESS,), material="gym")
 
 
 def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
@@ -115,14 +114,16 @@ def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
     wall = max(top - drop, 0.55 * top)
     eaves = 0.0 if p.gym_roof == "barrel" else 0.4
     roof = Roof(p.gym_roof, True, eaves, 0.4, 0.25, parapet=0.5)
-    gym = Wing.at(x0, y0, x1, y1, wall, top, roof)
+    gym = Wing.at((x0, y0, x1, y1), wall, top, roof)
     link_y = min(bar[2, 1], y1) - 3.4
     ends = (bar[1, 0] - 0.1, x0 + 0.1)
     if p.mirrored:
         ends = (min(x1, bar[1, 0]) - 0.1, bar[0, 0] + 0.1)
-    link = Wing.flat(ends[0], link_y, ends[1], link_y + 3.0, 3.4, 0.2, rim=0.3)
+    link = Wing.flat(
+        (ends[0], link_y, ends[1], link_y + 3.0), 3.4, 0.2, rim=0.3
+    )
     boxes = (gym, link)
-    openings = Openings(gym, boxes)
+    openings = Openings(p, gym, boxes)
     high = bays.window(2.6, wall - 2.2, wall - 0.7, _RECESS, mullions=1)
     openings.row((1, 2, 3), 3.5, 3.6, [high], 0.9)
     openings.put(0, (x1 - x0) / 2, 3.4, bays.gate(2.4, 2.6, 0.3))
@@ -131,10 +132,10 @@ def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
         for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist():
             pier = side.box(u - 0.2, u + 0.2, -0.02, 0.25, 0.0, wall - 0.3)
             p.add_to("accent", pier)
-    openings.enclose(p, (_RECESS,), material="gym")
-    passage = Openings(link, boxes)
+    openings.enclose((_RECESS,), material="gym")
+    passage = Openings(p, link, boxes)
     passage.row((0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3)
-    passage.enclose(p, (_RECESS,), material="trim")
+    passage.enclose((_RECESS,), material="trim")
 
 
 _CHAPEL_MARGIN = 0.45
@@ -200,7 +201,7 @@ def _nave(p: Chapel, width: float, length: float) -> Wing:
     wall_top = max(top - rise - _THICK, 0.35 * top)
     roof = Roof("gable", True, 0.35, 0.25, _THICK)
     back = min(length - _CHAPEL_MARGIN, ahead + 2.6 * wide)
-    return Wing.at(x, min(ahead, 0.3 * length), x + wide, back, wall_top, top,
+    return Wing.at((x, min(ahead, 0.3 * length), x + wide, back), wall_top, top,
                    roof)  # fmt: skip
 
 
@@ -213,11 +214,11 @@ def _tower(p: Chapel, nave: Wing) -> Wing:
     if p.belfry == "side":
         x0 = nave.x1 - 0.1 if p.mirrored else nave.x0 + 0.1 - side
         y0 = nave.y0 + 0.8
-    return Wing.at(x0, y0, x0 + side, y0 + side, top, top, Roof("flat"))
+    return Wing.at((x0, y0, x0 + side, y0 + side), top, top, Roof("flat"))
 
 
 def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
-    openings = Openings(nave, boxes)
+    openings = Openings(p, nave, boxes)
     high = nave.wall_top
     spring = max(1.6, high - 1.5)
     lancet = bays.arched(1.0, 1.2, spring, _CHAPEL_RECESS, rise=0.7)
@@ -231,9 +232,7 @@ def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
             openings.put(0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4))
     low = high + 0.2 * (nave.top - high)
     rose = wings.attic_window(1.3, low, low + 1.6, _CHAPEL_RECESS)
-    openings.enclose(
-        p, (_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose
-    )
+    openings.enclose((_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose)
 
 
 def _add_buttresses(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
@@ -252,7 +251,7 @@ def _add_buttresses(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
 
 def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
     """Adds the shaft, its bell chamber and the spire with a cross."""
-    openings = Openings(tower, boxes)
+    openings = Openings(p, tower, boxes)
     side, top = tower.width, tower.wall_top
     width = round(min(1.2, 0.4 * side), 2)
     louvre = bays.arched(width, top - 2.6, top - 1.3, _CHAPEL_RECESS)
@@ -267,7 +266,7 @@ def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
         openings.put(0, side / 2, width + 0.6, door)
     bands = (Band(0.0, 0.45, -0.1), Band(top - 3.1, top - 2.9, -0.08),
              Band(top - 0.3, top, -0.18))  # fmt: skip
-    openings.add_walls(p, (_CHAPEL_RECESS,), bands)
+    openings.add_walls((_CHAPEL_RECESS,), bands)
     p.add_to("roof", *_spire(p, tower))
     p.add_to("trim", *_cross(*tower.center, p.height - 1.3, p.height))
 
@@ -328,7 +327,7 @@ def _add_small(
     p: Chapel, wing: Wing, boxes: list[Wing], *, is_porch: bool
 ) -> None:
     """Adds the porch or the vestry."""
-    openings = Openings(wing, boxes)
+    openings = Openings(p, wing, boxes)
     if is_porch:
         arch = bays.window(1.5, 0.0, wing.wall_top - 0.3, 0.9)
         openings.put(0, wing.width / 2, 2.2, arch)
@@ -337,7 +336,7 @@ def _add_small(
         openings.row(
             range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _CHAPEL_RECESS)]
         )
-    openings.enclose(p, (_CHAPEL_RECESS,))
+    openings.enclose((_CHAPEL_RECESS,))
 
 
 def _porch(nave: Wing) -> Wing:
@@ -345,7 +344,7 @@ def _porch(nave: Wing) -> Wing:
     roof = Roof("gable", True, 0.25, 0.25, 0.15)
     area = (middle - half, nave.y0 - 1.7, middle + half, nave.y0 + 0.1)
     top = min(4.2, nave.wall_top + 0.8)
-    return Wing.at(*area, min(2.6, nave.wall_top - 0.2), top, roof)
+    return Wing.at(area, min(2.6, nave.wall_top - 0.2), top, roof)
 
 
 def _annex(nave: Wing, width: float) -> Wing | None:
@@ -364,7 +363,7 @@ def _annex(nave: Wing, width: float) -> Wing | None:
     roof = Roof("shed", True, 0.25, 0.2, 0.15, falling=side == 0)
     if high - low < 0.3 or y0 < nave.y0 + 1.0:
         return None
-    return Wing.at(a, y0, b, nave.y1 - 0.4, low, high, roof)
+    return Wing.at((a, y0, b, nave.y1 - 0.4), low, high, roof)
 
 
 def _cross(x: float, y: float, z0: float, z1: float) -> list[Mesh]:

@@ -6,19 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.city.facades import (
-    bays,
-    details,
-    house_walls,
-    massing,
-    roofs,
-    wings,
-)
+from cns_drake.city.facades import bays, details, massing, roofs, wings
 from cns_drake.city.facades.assembly import Assembly, Building
-from cns_drake.city.facades.house_walls import Openings
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.facades.walls import Band, Patch
-from cns_drake.city.facades.wings import Roof, Wing
+from cns_drake.city.facades.wings import Openings, Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
 
 _ROOF_M = 0.2
@@ -43,7 +35,7 @@ def _add_unit(
         door_material: material of the door's leaf.
     """
     wing, storeys = _unit_box(p, area, blind)
-    openings = Openings(wing)
+    openings = Openings(p, wing)
     step = (wing.wall_top - 0.25 - p.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
     for edges, pitch in (((0, 2), p.window_pitch), (sides, 4.2)):
@@ -52,7 +44,7 @@ def _add_unit(
         )  # fmt: skip
     door = _add_entrance(p, wing, openings, door_material)
     _add_bay(p, wing, openings, storeys, step, door)
-    openings.add_casings(p, (0,), p.casing)
+    openings.add_casings((0,), p.casing)
     bands = [Band(0.0, round(p.floor, 2), -0.05)]
     if storeys > 1:
         z = round(p.floor + step, 2)
@@ -60,7 +52,7 @@ def _add_unit(
     if p.roof == "flat":
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.22))
-    openings.add_walls(p, (house_walls.GLASS_M,), bands)
+    openings.add_walls((wings.GLASS_M,), bands)
     _add_roof(p, wing)
     if p.chimney:
         _add_stack(p, wing, f"{part}chimney")
@@ -92,7 +84,7 @@ def _unit_box(
     kind = "gable" if across else p.roof
     eaves, verge = 0.0 if across else 0.35, 0.0 if p.roof == "stepped" else 0.3
     roof = Roof(kind, across, eaves, verge, _ROOF_M, parapet=0.45)
-    return Wing.at(x0, y0, x1, y1, wall_top, top, roof, blind), storeys
+    return Wing.at((x0, y0, x1, y1), wall_top, top, roof, blind), storeys
 
 
 def _add_entrance(
@@ -102,7 +94,7 @@ def _add_entrance(
     wall = wing.wall(0)
     inset = min(0.95, 0.3 * wall.length)
     x = inset if p.door_left else wall.length - inset
-    openings.add_door(p, 0, x, p.floor, height=2.25, material=material)
+    openings.add_door(0, x, p.floor, height=2.25, material=material)
     count = max(1, round(p.floor / 0.17))
     run = min(0.29 * count, max(p.stoop - 0.5, 0.3 * p.stoop))
     landing = p.stoop - run
@@ -147,7 +139,7 @@ def _add_bay(
 def _add_roof(p: Building, wing: Wing) -> None:
     """Adds a roof with its dormers, firewalls or steps."""
     low = wing.wall_top + 0.45
-    attic = wings.attic_window(0.8, low, low + 1.1, house_walls.GLASS_M)
+    attic = wings.attic_window(0.8, low, low + 1.1, wings.GLASS_M)
     wings.add_roof(p, wing, None if p.roof == "stepped" else attic)
     if p.roof == "stepped":
         for edge in (0, 2):
@@ -184,7 +176,7 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
     for edge in (0, 2):
         wall = wing.wall(edge)
         for u in spots:
-            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, house_walls.GLASS_M)
+            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wings.GLASS_M)
             frame = details.casings([pane], (pane.depth,), "frame", 0.12)
             glass = details.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
             out.add_to("trim", *(wall.place(piece) for piece in frame))
@@ -247,9 +239,9 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     wall_top = min(p.annex_height, top - 0.4)
     area = (x0, main.y1 - 0.06, x0 + width, back)
     roof = Roof("shed", True, 0.0, 0.2, 0.18)
-    openings = Openings(Wing.at(*area, wall_top, top, roof, blind), (main,))
-    openings.row((1, 2, 3), 0.9, 2.6, [house_walls.sash(1.1, 0.1, 0.9, 2.1)])
-    openings.enclose(p, (house_walls.GLASS_M,))
+    openings = Openings(p, Wing.at(area, wall_top, top, roof, blind), (main,))
+    openings.row((1, 2, 3), 0.9, 2.6, [wings.sash(1.1, 0.1, 0.9, 2.1)])
+    openings.enclose((wings.GLASS_M,))
 
 
 _DOORS = ("accent", "trim", "roof")
@@ -303,7 +295,7 @@ class ShopHouse(Building):
         left, right, blind = _front_site(self)
         area = (left, y0 + self.stoop, right, y1 - 0.35)
         wing, storeys = _unit_box(self, area, blind)
-        openings, ground = Openings(wing), self.floor
+        openings, ground = Openings(self, wing), self.floor
         room = wing.wall_top - 0.25 - ground
         upper = storeys if room > 2.4 else 0
         step = room / max(upper, 1)
@@ -315,13 +307,13 @@ class ShopHouse(Building):
             )
         _add_ground(self, wing, openings)
         _add_oriels(self, wing, openings, upper, step)
-        openings.add_casings(self, (0,), self.casing)
+        openings.add_casings((0,), self.casing)
         bands = [Band(round(ground - 0.3, 2), ground, -self.course)]
         if self.roof == "flat" and room > 0.8:
             z = round(wing.wall_top - 0.45, 2)
             bands.append(Band(z, wing.wall_top, -0.25))
-        glass = (house_walls.GLASS_M, *house_walls.SHOP_GLASS_M)
-        openings.add_walls(self, glass, bands)
+        glass = (wings.GLASS_M, *wings.SHOP_GLASS_M)
+        openings.add_walls(glass, bands)
         _add_roof(self, wing)
         if self.roof == "flat":
             equip_roof(self, wing.outline, wing.floor, self.roof_items)
@@ -335,13 +327,13 @@ def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
     door, length = 1.7 * (p.floor < p.height - 3.0), wall.length
     left = p.door_left
     start, end = (door, length) if left else (0.0, length - door)
-    openings.add_shops(p, 0, start, end, p.floor,
+    openings.add_shops(0, start, end, p.floor,
         width=p.shop_width, awnings=p.awnings,
     )  # fmt: skip
     if door:
         x = 0.9 if left else length - 0.9
-        openings.add_door(p, 0, x, 0.0, height=2.3)
-    back = [house_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
+        openings.add_door(0, x, 0.0, height=2.3)
+    back = [wings.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
     openings.row((2,), 0.5, 4.5, back, 0.8)
 
 

@@ -133,22 +133,9 @@ class Site:
 
 
 class Archetype(BaseModel, frozen=True, extra="forbid"):
-    """The description of a kind of building, see `archetypes.yaml`.
+    """The description of a kind of building: a `name` in `archetypes.yaml`.
 
-    Attributes:
-        name: by which plans ask for it.
-        heights: least and greatest sensible height [m].
-        widths: least and greatest sensible side of the footprint [m].
-        overhang: how far eaves, balconies, canopies and pilasters reach
-            outside the footprint [m]; near the ground at most
-            `GROUND_OVERHANG_M`.
-        any_outline: whether it follows any polygon; else rectangles only.
-        party_walls: whether it can stand wall to wall with a neighbour;
-            else it keeps its overhang clear of blind edges.
-        colours: part -> colours to draw from, or a part of the same colour.
-        choices: colours that are drawn while it is built.
-        materials: the parts that its pieces are gathered in.
-        parameters: name -> formula, in the order of the draws.
+    What its fields are stands there.
     """
 
     name: str

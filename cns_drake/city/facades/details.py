@@ -50,7 +50,7 @@ class WallFrame:
         x, y, height = mesh.vertices.T
         xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
         vertices = np.column_stack([xy, height + z])
-        return Mesh(vertices, tuple(face[::-1] for face in mesh.faces))
+        return Mesh(vertices, mesh.faces).turned()
 
     def box(self, *limits: float, bottom: bool = True) -> Mesh:
         """Returns `massing.box`, given in wall coordinates."""
@@ -97,7 +97,7 @@ def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
     faces: list[tuple[int, ...]]
     faces = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
     faces += [(3, 2, 0), (2, 1, 0), (4, 5, 6), (4, 6, 7)]
-    return Mesh(np.array(vertices), tuple(f[::-1] for f in faces))
+    return Mesh(np.array(vertices), tuple(faces)).turned()
 
 
 def awnings(

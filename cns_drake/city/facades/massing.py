@@ -248,9 +248,7 @@ def tent(eaves: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
 
 
 def revolved(
-    profile: Sequence[Point],
-    count: int,
-    center: ArrayLike = (0.0, 0.0),
+    profile: Sequence[Point], count: int, center: ArrayLike = (0.0, 0.0)
 ) -> Mesh:
     """Returns the surface that a profile sweeps around an upright axis.
 
@@ -331,8 +329,7 @@ def bar(section: Sequence[Point | np.ndarray], y0: float, y1: float) -> Mesh:
 
 def swapped(mesh: Mesh) -> Mesh:
     """Returns the mesh with its x and y axes exchanged."""
-    faces = tuple(face[::-1] for face in mesh.faces)
-    return Mesh(mesh.vertices[:, [1, 0, 2]], faces)
+    return Mesh(mesh.vertices[:, [1, 0, 2]], mesh.faces).turned()
 
 
 def shortest_side(points: ArrayLike) -> float:
@@ -358,31 +355,19 @@ def roof_pan(
     return merge_meshes(coping, wall, flat(inner, z_floor))
 
 
-def box(
-    x0: float,
-    x1: float,
-    y0: float,
-    y1: float,
-    z0: float,
-    z1: float,
-    *,
-    bottom: bool = True,
-) -> Mesh:
-    """Returns an upright box between the given limits [m]."""
+def box(*limits: float, bottom: bool = True) -> Mesh:
+    """Returns an upright box between x0, x1, y0, y1, z0 and z1 [m]."""
+    x0, x1, y0, y1, z0, z1 = limits
     return prism(rectangle(x0, y0, x1, y1), z0, z1, bottom=bottom)
 
 
-def standing(
-    x0: float,
-    x1: float,
-    y0: float,
-    y1: float,
-    z1: float,
-    *,
-    bottom: bool = False,
-) -> Mesh:
-    """Returns a box that stands on the ground, its foot out of sight [m]."""
-    return box(x0, x1, y0, y1, -FOUNDATION_M, z1, bottom=bottom)
+def standing(*limits: float, bottom: bool = False) -> Mesh:
+    """Returns a box with x0, x1, y0, y1 and z1 that stands on the ground [m].
+
+    Its foot is out of sight.
+    """
+    *spot, z1 = limits
+    return box(*spot, -FOUNDATION_M, z1, bottom=bottom)
 
 
 def post(

@@ -413,10 +413,12 @@ def _quads_mesh(
     vertices: list[np.ndarray] = []
     faces: list[tuple[int, ...]] = []
     for edge in range(len(points)):
-        panel = _Panel(points, edge, facade, z0)
-        for quad in quads_of(panel.grid, facade.glass):
+        grid, place = _panel(points, edge, facade)
+        for quad in quads_of(grid, facade.glass):
             faces.append(tuple(range(len(vertices), len(vertices) + 4)))
-            vertices.extend(panel.place(corner) for corner in quad)
+            for corner in quad:
+                x, y = place(corner)
+                vertices.append(np.array([x, y, z0 + corner.z]))
     return _welded(np.array(vertices).reshape(-1, 3), faces)
 
 
@@ -428,85 +430,58 @@ def _welded(vertices: np.ndarray, faces: list[tuple[int, ...]]) -> Mesh:
     return Mesh(unique, tuple(tuple(int(inverse[i]) for i in f) for f in faces))
 
 
-class _Panel:
-    """One wall: its cells, and how they meet those of its neighbours."""
+def _panel(
+    points: np.ndarray, edge: int, facade: Facade
+) -> tuple[WallCells, Callable[[Corner], np.ndarray]]:
+    """Returns the cells of one wall, and where their corners are in x and y.
 
-    def __init__(
-        self, points: np.ndarray, edge: int, facade: Facade, z0: float
-    ) -> None:
-        count = len(points)
-        before, after = (edge - 1) % count, (edge + 1) % count
-        directions = []
-        for k in (before, edge, after):
-            side = points[(k + 1) % count] - points[k]
-            directions.append(side / np.hypot(*side))
-        self._start, self._z0 = points[edge], z0
-        self._along = directions[1]
-        self._inward = np.array([-self._along[1], self._along[0]])
-        self._turns = [
-            _Turn.between(*directions[:2]),
-            _Turn.between(*directions[1:]),
-        ]
-        length = float(np.hypot(*(points[after] - points[edge])))
-        is_plain = edge in facade.plain
-        reliefs = () if is_plain else facade.layout(edge, length)
-        zs = _levels(facade, reliefs)
-        middles = (np.array(zs[1:]) + zs[:-1]) / 2
-        # The depths at the ends of the neighbouring walls, row by row. Above
-        # and below the wall every cell closes back to depth 0.
-        ends = np.zeros((2, len(zs) + 1))
-        for end, neighbour in enumerate((before, after)):
-            if neighbour not in facade.plain:
-                ends[end, 1:-1] = [_band_depth(facade, z) for z in middles]
-        self._ends = ends
-        rows = np.zeros(len(zs) - 1, dtype=int)
-        if {before, edge, after} & facade.plain:
-            steps = (np.diff(ends[:, 1:-1], axis=1) != 0).any(axis=0)
-            rows[1:] = np.cumsum(steps)
-        bands = () if is_plain else facade.bands
-        self.grid = WallCells.painted(length, zs, rows, bands, reliefs)
-
-    def place(self, corner: Corner) -> np.ndarray:
-        """Returns the position of a corner in the building's frame."""
-        x, z, depth, row = corner
-        if x == 0.0:
-            x = self._turns[0].shift(depth, self._ends[0, row + 1])
-        elif x == self.grid.xs[-1]:
-            x -= self._turns[1].shift(depth, self._ends[1, row + 1])
-        p = self._start + x * self._along + depth * self._inward
-        return np.array([p[0], p[1], self._z0 + z])
-
-
-class _Turn(NamedTuple):
-    """The angle at a corner of the outline."""
-
-    cosine: float
-    sine: float
-
-    @staticmethod
-    def between(a: np.ndarray, b: np.ndarray) -> _Turn:
-        return _Turn(float(a @ b), float(a[0] * b[1] - a[1] * b[0]))
-
-    def shift(self, depth: float, other: float) -> float:
-        """Returns by how much a wall at `depth` shortens at this corner.
-
-        Two lines that leave the corner at the turn t, moved inwards by
-        `depth` and `other`, meet (other - depth cos t) / sin t along the
-        first one; for equal depths this is depth tan(t / 2).
-        """
-        if abs(self.sine) < 1e-6:
-            return 0.0
-        return (other - depth * self.cosine) / self.sine
-
-
-def _levels(facade: Facade, reliefs: Sequence[Relief]) -> list[float]:
+    There they meet those of the neighbouring walls.
+    """
+    count = len(points)
+    before, after = (edge - 1) % count, (edge + 1) % count
+    directions = []
+    for k in (before, edge, after):
+        side = points[(k + 1) % count] - points[k]
+        directions.append(side / np.hypot(*side))
+    along = directions[1]
+    inward = np.array([-along[1], along[0]])
+    length = float(np.hypot(*(points[after] - points[edge])))
+    is_plain = edge in facade.plain
+    reliefs = () if is_plain else facade.layout(edge, length)
     bounds = [v for r in (*reliefs, *facade.bands) for v in (r.z0, r.z1)]
-    return breaks(facade.height, bounds)
+    zs = breaks(facade.height, bounds)
+    # The depths at the ends of the neighbouring walls, row by row. Above
+    # and below the wall every cell closes back to depth 0.
+    ends = np.zeros((2, len(zs) + 1))
+    for row, z in enumerate((np.array(zs[1:]) + zs[:-1]) / 2, start=1):
+        inside = [band for band in facade.bands if band.z0 < z < band.z1]
+        for end, neighbour in enumerate((before, after)):
+            if inside and neighbour not in facade.plain:
+                ends[end, row] = inside[-1].depth
+    rows = np.zeros(len(zs) - 1, dtype=int)
+    if {before, edge, after} & facade.plain:
+        steps = (np.diff(ends[:, 1:-1], axis=1) != 0).any(axis=0)
+        rows[1:] = np.cumsum(steps)
+    bands = () if is_plain else facade.bands
+    grid = WallCells.painted(length, zs, rows, bands, reliefs)
+
+    def place(corner: Corner) -> np.ndarray:
+        x, _, depth, row = corner
+        if x == 0.0:
+            x = _shift(directions[0], along, depth, ends[0, row + 1])
+        elif x == grid.xs[-1]:
+            x -= _shift(along, directions[2], depth, ends[1, row + 1])
+        return points[edge] + x * along + depth * inward
+
+    return grid, place
 
 
-def _band_depth(facade: Facade, z: float) -> float:
-    depth = 0.0
-    for band in facade.bands:
-        if band.z0 < z < band.z1:
-            depth = band.depth
-    return depth
+def _shift(a: np.ndarray, b: np.ndarray, depth: float, other: float) -> float:
+    """Returns by how much a wall at `depth` shortens between directions.
+
+    Two lines that leave the corner at the turn t, moved inwards by `depth` and
+    `other`, meet (other - depth cos t) / sin t along the first one; for equal
+    depths this is depth tan(t / 2).
+    """
+    cosine, sine = float(a @ b), float(a[0] * b[1] - a[1] * b[0])
+    return 0.0 if abs(sine) < 1e-6 else (other - depth * cosine) / sine

@@ -1,20 +1,31 @@
 """Houses of several wings: boxes that may overlap, each under its own roof.
 
+Walls have windows and doors where no other wing hides them.
+
 A wing's edges count like those of a rectangle: 0 front, 1 right, 2 back,
 3 left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+import itertools
 import math
 
 import numpy as np
 
 from cns_drake.city.facades import bays, details, massing, roofs
 from cns_drake.city.facades.assembly import Assembly
-from cns_drake.city.facades.walls import Patch
+from cns_drake.city.facades.walls import (
+    Arch,
+    Band,
+    Facade,
+    Patch,
+    Relief,
+    facade_mesh,
+    glass_mesh,
+)
 from cns_drake.city.geometry.mesh import Mesh
 
 # The windows of a gable: (from, to) -> holes.
@@ -73,36 +84,22 @@ class Wing:
 
     @staticmethod
     def at(
-        x0: float,
-        y0: float,
-        x1: float,
-        y1: float,
-        wall_top: float,
-        top: float,
-        roof: Roof,
+        area: massing.Area, wall_top: float, top: float, roof: Roof,
         blind: Collection[int] = (),
-    ) -> Wing:
+    ) -> Wing:  # fmt: skip
         """Returns a wing with its walls on whole centimetres.
 
         Whole centimetres keep the meshes' text short.
         """
-        a, b, c, d, e = (round(float(v), 2) for v in (x0, y0, x1, y1, wall_top))
+        a, b, c, d, e = (round(float(v), 2) for v in (*area, wall_top))
         return Wing(a, b, c, d, e, round(float(top), 3), roof, frozenset(blind))
 
     @staticmethod
     def flat(
-        x0: float,
-        y0: float,
-        x1: float,
-        y1: float,
-        top: float,
-        parapet: float,
-        rim: float = 0.1,
-        blind: Collection[int] = (),
+        area: massing.Area, top: float, parapet: float, rim: float = 0.1
     ) -> Wing:
         """Returns a wing under a flat roof; its walls end `rim` below."""
-        roof = Roof("flat", parapet=parapet)
-        return Wing.at(x0, y0, x1, y1, top - rim, top, roof, blind)
+        return Wing.at(area, top - rim, top, Roof("flat", parapet=parapet))
 
     def mirrored(self, width: float) -> Wing:
         """Returns the wing with x replaced by `width` - x."""
@@ -273,7 +270,7 @@ def ridge_rise(span: float, pitch_deg: float) -> float:
 
 
 _THICKNESS = 0.14
-_RECESS = 0.1
+_DORMER_RECESS = 0.1
 _QUAD = ((0, 1, 2, 3),)
 # How far a dormer's walls and roof reach into the slope behind them [m].
 _SUNK = 0.25
@@ -324,7 +321,7 @@ def add_dormer(
     low = foot - _SUNK
     hole = Patch(
         round(a + 0.15, 2), round(b - 0.15, 2),
-        round(foot + 0.25, 2), round(eaves - 0.15, 2), _RECESS,
+        round(foot + 0.25, 2), round(eaves - 0.15, 2), _DORMER_RECESS,
     )  # fmt: skip
     front = roofs.gable_wall(under, a, b, low, [hole])
     pane = roofs.gable_glass([hole])
@@ -373,3 +370,295 @@ def add_dormers(
                 slope=slope, ridge=wing.top, setback=setback, height=height,
                 roof=roof,
             )  # fmt: skip
+
+
+def free_stretches(
+    wing: Wing, edge: int, others: Iterable[Wing], z: float
+) -> list[tuple[float, float]]:
+    """Returns the parts of a wall that no other wing hides at a height."""
+    wall = wing.wall(edge)
+    cuts = {0.0, wall.length}
+    hiding = [w for w in others if w is not wing and w.top > z]
+    for other in hiding:
+        for corner in other.outline:
+            along = wall.point(0.0, 0.0), wall.point(1.0, 0.0)
+            x = float((corner - along[0]) @ (along[1] - along[0]))
+            if 0.0 < x < wall.length:
+                cuts.add(x)
+    free: list[tuple[float, float]] = []
+    bounds = sorted(cuts)
+    for a, b in itertools.pairwise(bounds):
+        x, y = wall.point((a + b) / 2, 0.05)
+        if edge in wing.blind or any(w.covers(x, y) for w in hiding):
+            continue
+        if free and abs(free[-1][1] - a) < 1e-9:
+            free[-1] = (free[-1][0], b)
+        else:
+            free.append((a, b))
+    return free
+
+
+class Openings:
+    """The windows and doors of a wing, by edge."""
+
+    def __init__(
+        self, out: Assembly, wing: Wing, others: Sequence[Wing] = ()
+    ) -> None:
+        self._out, self._wing, self._others = out, wing, others
+        self._reliefs: dict[int, list[Relief]] = {k: [] for k in range(4)}
+
+    def row(
+        self,
+        edges: Iterable[int],
+        z: float,
+        pitch: float,
+        choices: Sequence[bays.Bay],
+        margin: float = 0.5,
+    ) -> None:
+        """Repeats bays along the free parts of walls.
+
+        Bays take turns from both ends towards the middle, about `pitch` wide
+        and `margin` from the ends of a part. Parts that other wings hide at z
+        are not free [m].
+        """
+        for edge in edges:
+            for a, b in free_stretches(self._wing, edge, self._others, z):
+                layout = bays.rhythm(pitch, choices, margin)
+                self._reliefs[edge] += [
+                    r._replace(x0=r.x0 + a, x1=r.x1 + a)
+                    for r in layout(edge, b - a)
+                ]
+
+    def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
+        """Puts a bay around x, in place of the bays it meets there."""
+        x0, x1 = x - width / 2, x + width / 2
+        new = bay(x0, x1)
+        if not new:
+            return
+        low = min(r.z0 for r in new)
+        high = max(r.z1 for r in new)
+        self._reliefs[edge] = [
+            r
+            for r in self._reliefs[edge]
+            if r.x1 < x0 + 0.01 or r.x0 > x1 - 0.01 or r.z1 < low or r.z0 > high
+        ] + new
+
+    def add(self, edge: int, reliefs: Iterable[Relief]) -> None:
+        """Adds reliefs given in the wall's coordinates."""
+        self._reliefs[edge] += reliefs
+
+    def clear(
+        self, edge: int, x0: float, x1: float, z0: float, z1: float
+    ) -> None:
+        """Removes the reliefs that meet a part of a wall."""
+        self._reliefs[edge] = [
+            r
+            for r in self._reliefs[edge]
+            if r.x1 < x0 or r.x0 > x1 or r.z1 < z0 or r.z0 > z1
+        ]
+
+    def layout(self, edge: int, length: float) -> list[Relief]:
+        """Returns all reliefs, for a facade.
+
+        Bands end at arches, which need flat wall around them.
+        """
+        found: list[Relief] = []
+        for relief in self._reliefs[edge]:
+            if isinstance(relief, Arch):
+                found.append(Patch(*relief[:3], relief.z1, 0.0))
+            found.append(relief)
+        return found
+
+    def add_walls(
+        self,
+        glass: Sequence[float],
+        bands: Sequence[Band] = (),
+        material: str = "walls",
+    ) -> None:
+        """Adds the walls on their foundation, with their panes as `glass`.
+
+        `glass` gives the depths of the openings that have panes [m].
+        """
+        wing = self._wing
+        bands, glass = tuple(bands), tuple(glass)
+        facade = Facade(wing.wall_top, bands, self.layout, glass, wing.blind)
+        outline = wing.outline
+        self._out.add_to(
+            material, massing.foundation(outline), facade_mesh(outline, facade)
+        )
+        self._out.add_to("glass", glass_mesh(outline, facade))
+
+    def enclose(
+        self,
+        glass: Sequence[float],
+        bands: Sequence[Band] = (),
+        material: str = "walls",
+        attic: Attic | None = None,
+    ) -> None:
+        """Adds the walls, see `add_walls`, and the roof on them.
+
+        `attic` gives the windows of its gables.
+        """
+        self.add_walls(glass, bands, material)
+        add_roof(self._out, self._wing, attic, material)
+
+    def add_rows(
+        self,
+        edges: Iterable[int],
+        floor: float,
+        storey: float,
+        count: int,
+        pitch: float,
+        width: float,
+        margin: float = 0.6,
+        head: float = 2.15,
+    ) -> None:
+        """Adds a row of windows to each storey of a wing.
+
+        Windows of the ground floor are the widest. They are kept `margin` from
+        corners; `head` is their top above the floor [m].
+        """
+        for k in range(count):
+            z = floor + k * storey
+            wide = round(width * (1.25 if k == 0 else 1.0), 2)
+            choices = [sash(wide, z, 0.85, head), sash(width, z, 0.85, head)]
+            self.row(edges, z + 0.7, pitch, choices, margin)
+
+    def add_door(
+        self,
+        edge: int,
+        x: float,
+        floor: float,
+        *,
+        width: float = 1.0,
+        height: float = 2.1,
+        lights: float = 0.0,
+        material: str = "accent",
+    ) -> None:
+        """Adds a door with its leaf, between windows of `lights` width."""
+        half, top = width / 2, round(floor + height, 2)
+
+        def bay(x0: float, x1: float) -> list[Relief]:
+            a, b = round(x - half, 2), round(x + half, 2)
+            relief: list[Relief] = [Patch(a, b, floor, top, DOOR_M)]
+            if lights > 0:
+                for u0, u1 in ((a - lights, a - 0.08), (b + 0.08, b + lights)):
+                    relief.append(
+                        Patch(u0, u1, round(floor + 0.3, 2), top, GLASS_M)
+                    )
+            return relief
+
+        self.put(edge, x, width + 2 * lights + 0.5, bay)
+        leaf = _leaf(x - half, x + half, floor, top)
+        self._out.add_to(
+            material, *(self._wing.wall(edge).place(part) for part in leaf)
+        )
+
+    def add_garage_door(
+        self, edge: int, x: float, width: float, height: float = 2.15
+    ) -> None:
+        """Adds a sectional door with ribs, as `trim`."""
+        a, b = round(x - width / 2, 2), round(x + width / 2, 2)
+        hole: list[Relief] = [Patch(a, b, 0.0, height, DOOR_M)]
+        self.put(edge, x, width + 0.3, lambda x0, x1: hole)
+        count = 4
+        step = height / count
+        for k in range(count):
+            low, high = (
+                round(k * step + 0.02, 2),
+                round((k + 1) * step - 0.02, 2),
+            )
+            panel = details.board(a, b, low, high, 0.06)
+            panel = panel.moved((0.0, -DOOR_M, 0.0))
+            self._out.add_to("trim", self._wing.wall(edge).place(panel))
+
+    def add_casings(self, edges: Sequence[int], style: str) -> None:
+        """Frames the windows of some walls, see `details.casings`."""
+        material = "accent" if style == "shutters" else "trim"
+        for edge in edges:
+            wall = self._wing.wall(edge)
+            boards = details.casings(
+                self.layout(edge, wall.length), (GLASS_M,), style
+            )
+            self._out.add_to(material, *(wall.place(board) for board in boards))
+
+    def add_shops(
+        self,
+        edge: int,
+        start: float,
+        end: float,
+        height: float,
+        *,
+        width: float = 5.5,
+        awnings: float = 0.6,
+        reach: float = 1.2,
+    ) -> None:
+        """Adds shops side by side between two points of a wall.
+
+        They are about `width` wide, in a ground floor of some `height`; a part
+        of them has `awnings` with a reach out of the wall [m]. Fascias are
+        `sign`, blades `trim`, awnings `awning`.
+        """
+        wall = self._wing.wall(edge)
+        head = round(height - 1.15, 2)
+        for a, b in bays.stretches(end - start, width, 0.1):
+            x0, x1 = round(start + a, 2), round(start + b, 2)
+            if x1 - x0 < 2.4:
+                continue
+            shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
+            if self._out.chance(0.5):
+                shop = _reversed(shop)
+            self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
+            z, tall = head + 0.08, self._out.uniform(0.55, 0.8, 2)
+            fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
+            self._out.add_to("sign", fascia)
+            if self._out.chance(awnings):
+                shade = details.awning(
+                    x0 + 0.3, x1 - 0.3, reach, max(2.4, head - 0.8), head + 0.05
+                )
+                self._out.add_to("awning", wall.place(shade))
+            if self._out.chance(0.4):
+                x = x0 + 0.25 if self._out.chance(0.5) else x1 - 0.25
+                # Blades hang above heads, like awnings.
+                z = max(2.4, head + 0.1)
+                blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
+                self._out.add_to("trim", blade)
+
+
+# Depths of windows and of the leaves of doors behind the wall [m].
+GLASS_M, DOOR_M = 0.12, 0.2
+
+
+def sash(
+    width: float, z: float, sill: float, head: float, bars: int = 0
+) -> bays.Bay:
+    """A window of a storey whose floor is at z; sill and head above it."""
+    low, high = round(z + sill, 2), round(z + head, 2)
+    return bays.window(width, low, high, GLASS_M, mullions=bars, pier=0.25)
+
+
+def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
+    """A door leaf with a raised frame, in wall coordinates."""
+    shift = (0.0, -DOOR_M, 0.0)
+    panels = [
+        details.board(x0, x1, z0, z1, 0.04),
+        details.board(x0 + 0.12, x1 - 0.12, z0 + 0.15, z0 + 0.8, 0.07),
+        details.board(x0 + 0.12, x1 - 0.12, z0 + 0.95, z1 - 0.15, 0.07),
+    ]
+    return [panel.moved(shift) for panel in panels]
+
+
+# Depths of shop windows and of the doors between them [m].
+SHOP_GLASS_M = (0.35, 0.95)
+
+
+def _reversed(bay: bays.Bay) -> bays.Bay:
+    """Returns a bay mirrored left to right."""
+
+    def mirrored(x0: float, x1: float) -> list[Relief]:
+        return [
+            r._replace(x0=round(x0 + x1 - r.x1, 2), x1=round(x0 + x1 - r.x0, 2))
+            for r in bay(x0, x1)
+        ]
+
+    return mirrored

@@ -1,15 +1,8 @@
 """From a road network and a plan to all structures of a city."""
 
-from collections.abc import (
-    Callable,
-    Container,
-    Iterable,
-    Iterator,
-    Mapping,
-    Sequence,
-)
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from shapely import GEOSException
 from shapely.geometry import Polygon
@@ -46,7 +39,7 @@ from cns_drake.city.placement.sidewalks import (
     park_along_streets,
     plant_medians,
 )
-from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, load_plan
+from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.street_areas import (
     RoadSurface,
@@ -55,27 +48,21 @@ from cns_drake.roads.street_areas import (
 )
 
 
-@dataclass(frozen=True)
-class City:
-    """A whole city.
+class City(NamedTuple):
+    """A whole city: the ground first, then the things on it.
 
-    Attributes:
-        structures: the ground first, then the things on it.
-        cars: object -> weight of its parked cars.
+    `cars` are the weights of its parked cars.
     """
 
     structures: tuple[Structure, ...]
     cars: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Streets:
+class Streets(NamedTuple):
     """Streets that a city is built along.
 
     Attributes:
-        areas: their areas.
-        surface: how high they lie.
-        kerb_height: height of sidewalks above it [m].
+        kerb_height: height of sidewalks above the surface [m].
         junctions: the area of all junctions in W [m].
         margins: strips beside them that stay free; buildings stand along them,
             in W.
@@ -209,35 +196,26 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
 
 def _check_names(plan: CityPlan, source: str) -> None:
     """Raises InputError for names that are in no registry."""
+
+    def require(field: str, names: Iterable[str]) -> None:
+        registry = ARCHETYPES if field.endswith(".rows") else OBJECTS
+        for name in names:
+            if name not in registry:
+                raise InputError(f"{source}: {field}: unknown name {name}")
+
     streets = [("street", plan.street), ("medians", plan.medians)]
     for district in plan.districts:
         field = f"districts.{district.name}"
         streets.append((f"{field}.street", district.street))
-        for name, used in _used_names(district):
-            registry = ARCHETYPES if name == "rows" else OBJECTS
-            _require(used, registry, f"{source}: {field}.{name}")
-    _require(plan.cars, OBJECTS, f"{source}: cars")
+        for row in district.rows:
+            require(f"{field}.rows", row.archetypes)
+        for line in district.lines:
+            require(f"{field}.lines", line.objects)
+        for scatter in district.scatter:
+            require(f"{field}.scatter", scatter.objects)
+        objects = [entry.object for entry in district.objects]
+        require(f"{field}.objects", objects)
+    require("cars", plan.cars)
     for field, street in streets:
         if street is not None:
-            used = [*street.trees, street.lamp, *street.furniture]
-            _require(used, OBJECTS, f"{source}: {field}")
-
-
-def _used_names(
-    district: DistrictPlan,
-) -> Iterator[tuple[str, Iterable[str]]]:
-    for row in district.rows:
-        yield "rows", row.archetypes
-    for line in district.lines:
-        yield "lines", line.objects
-    for scatter in district.scatter:
-        yield "scatter", scatter.objects
-    yield "objects", [entry.object for entry in district.objects]
-
-
-def _require(
-    names: Iterable[str], registry: Container[str], field: str
-) -> None:
-    for name in names:
-        if name not in registry:
-            raise InputError(f"{field}: unknown name {name}")
+            require(field, [*street.trees, street.lamp, *street.furniture])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 import itertools
@@ -70,6 +69,10 @@ class Mesh:
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return self.with_vertices(self.vertices @ R.T + np.asarray(translation))
 
+    def turned(self) -> Mesh:
+        """Returns the mesh with faces that look to the other side."""
+        return Mesh(self.vertices, tuple(face[::-1] for face in self.faces))
+
     def to_obj(self) -> str:
         """Returns the mesh as OBJ text with coordinates in millimetres.
 
@@ -116,16 +119,6 @@ def box_mesh(size: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
         (1, 3, 7, 5),
     )
     return Mesh(corners * half + np.asarray(center), faces)
-
-
-def boxes(
-    size: ArrayLike,
-    xs: Sequence[float],
-    ys: Sequence[float],
-    zs: Sequence[float],
-) -> list[Mesh]:
-    """Returns equal boxes about all points of a grid [m]."""
-    return [box_mesh(size, point) for point in itertools.product(xs, ys, zs)]
 
 
 FOLDER = Path(__file__).parents[1] / "object_meshes"

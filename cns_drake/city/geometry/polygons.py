@@ -288,28 +288,27 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
     return sorted(parts, key=lambda part: (part.bounds, part.area))
 
 
-def tiles(
-    geometry: BaseGeometry, size: float
-) -> Iterator[tuple[int, int, MultiPolygon]]:
-    """Yields the pieces of polygons in squares of a world-anchored grid.
+def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
+    """Yields the pieces of polygons in squares of a world-anchored grid."""
+    _, squares = _squares(geometry, size)
+    pieces = shapely.intersection(geometry, squares)
+    for piece in shapely.set_precision(pieces, _GRID):
+        if polygons := polygons_of(piece):
+            yield MultiPolygon(polygons)
 
-    Yields:
-        The column and row of each square, and the polygons within it.
-    """
+
+def _squares(
+    geometry: BaseGeometry, size: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the (N, 2) lower left corners and (N,) squares that are hit."""
     if geometry.is_empty:
-        return
+        return np.zeros((0, 2)), np.zeros(0, object)
     x0, y0, x1, y1 = np.floor(np.array(geometry.bounds) / size).astype(int)
+    y, x = np.mgrid[y0 : y1 + 1, x0 : x1 + 1].reshape(2, -1) * size
+    squares = shapely.box(x, y, x + size, y + size)
     shapely.prepare(geometry)
-    for row in range(y0, y1 + 1):
-        for column in range(x0, x1 + 1):
-            square = box(
-                column * size, row * size, (column + 1) * size, (row + 1) * size
-            )
-            if not geometry.intersects(square):
-                continue
-            piece = polygons_of(snap(geometry.intersection(square)))
-            if piece:
-                yield column, row, MultiPolygon(piece)
+    hit = shapely.intersects(geometry, squares)
+    return np.column_stack([x, y])[hit], squares[hit]
 
 
 def surface_mesh(
@@ -366,20 +365,13 @@ def _cut_into_squares(
         clockwise from the right and lower one; and in the order of the grid
         the pieces in all squares, None for each whole one.
     """
-    if geometry.is_empty:
-        return np.zeros((0, 4, 2)), []
-    x0, y0, x1, y1 = np.floor(np.array(geometry.bounds) / size).astype(int)
-    y, x = np.mgrid[y0 : y1 + 1, x0 : x1 + 1].reshape(2, -1) * size
-    squares = shapely.box(x, y, x + size, y + size)
-    shapely.prepare(geometry)
-    hit = shapely.intersects(geometry, squares)
-    x, y, squares = x[hit], y[hit], squares[hit]
+    corners, squares = _squares(geometry, size)
     is_whole = shapely.contains_properly(geometry, squares)
     pieces = np.full(len(squares), None)
-    pieces[~is_whole] = snap(geometry.intersection(squares[~is_whole]))
-    x, y = x[is_whole], y[is_whole]
-    xx, yy = (x + size, x + size, x, x), (y, y + size, y + size, y)
-    return np.stack([np.transpose(xx), np.transpose(yy)], axis=2), list(pieces)
+    cut = shapely.intersection(geometry, squares[~is_whole])
+    pieces[~is_whole] = shapely.set_precision(cut, _GRID)
+    ring = size * np.array([(1, 0), (1, 1), (0, 1), (0, 0)])
+    return corners[is_whole][:, None] + ring, list(pieces)
 
 
 def wall_mesh(
@@ -434,12 +426,6 @@ def _heights(xy: np.ndarray, height: HeightMap | float) -> np.ndarray:
     return np.full(len(xy), float(height))
 
 
-def _counter_clockwise(ring: np.ndarray) -> np.ndarray:
-    x, y = ring[:, 0], ring[:, 1]
-    area = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
-    return ring if area > 0 else ring[::-1]
-
-
 def _quad(polygon: Polygon) -> np.ndarray | None:
     """Returns the (4, 2) corners of a polygon that is an upright rectangle.
 
@@ -452,8 +438,8 @@ def _quad(polygon: Polygon) -> np.ndarray | None:
         or polygon.area <= 0.999999 * (x1 - x0) * (y1 - y0)
     ):
         return None
-    ring = np.array(shapely.normalize(polygon).exterior.coords[:4])
-    return _counter_clockwise(ring)
+    # A normalized ring is clockwise.
+    return np.array(shapely.normalize(polygon).exterior.coords[3::-1])
 
 
 def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:

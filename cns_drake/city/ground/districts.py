@@ -1,6 +1,6 @@
 """Divides the ground between the streets among a plan's districts."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import shapely
 from shapely.geometry import MultiPolygon, Point, Polygon, box
@@ -13,13 +13,10 @@ from cns_drake.city.ground.elevation import Pad
 from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
 
 
-@dataclass(frozen=True)
-class District:
-    """A district with its ground.
+class District(NamedTuple):
+    """A district with all of its ground in W [m].
 
     Attributes:
-        plan: the plan of the district.
-        area: all of its ground in W [m].
         grounds: kind of ground -> area; together they are `area`.
         terraces: patches that are held level.
     """
@@ -35,10 +32,8 @@ def share_out(
 ) -> list[District]:
     """Gives each district its ground, in the order of the plan.
 
-    Args:
-        plan: the city's plan.
-        streets: the area of carriageways, sidewalks and medians in W [m].
-        source: the plan's file name, for messages.
+    Carriageways, sidewalks and medians are `streets`, in W [m]; `source` is the
+    name of the plan's file, for messages.
 
     Raises:
         InputError: if a block or area is outside the city or on ground that is
@@ -49,7 +44,9 @@ def share_out(
     for district in plan.districts:
         field = f"{source}: districts.{district.name}"
         if district.block is not None:
-            area = _block_at(free, Point(district.block))
+            block = Point(district.block)
+            hit = (one for one in polygons_of(free) if one.contains(block))
+            area: BaseGeometry = next(hit, Polygon())
             fault = f"block: no free ground at {district.block}"
         elif district.area is not None:
             area = _polygon(district.area, f"{field}.area").intersection(free)
@@ -59,14 +56,13 @@ def share_out(
         pieces = MultiPolygon(polygons_of(snap(area)))
         if pieces.is_empty:
             raise InputError(f"{field}.{fault}")
-        districts.append(
-            District(
-                district,
-                pieces,
-                _grounds(district, pieces),
-                _terraces(district, pieces),
-            )
+        terraces = tuple(
+            Pad(snap(_patch_shape(patch).intersection(pieces)), patch.level)
+            for patch in district.patches
+            if patch.level is not None
         )
+        grounds = _grounds(district, pieces)
+        districts.append(District(district, pieces, grounds, terraces))
         free = snap(free.difference(pieces))
     left = sum(piece.area for piece in polygons_of(free))
     if left > 1.0:
@@ -74,13 +70,6 @@ def share_out(
             f"{source}: districts: {left:.0f} m^2 belong to no district"
         )
     return districts
-
-
-def _block_at(free: BaseGeometry, point: Point) -> BaseGeometry:
-    for piece in polygons_of(free):
-        if piece.contains(point):
-            return piece
-    return Polygon()
 
 
 def _polygon(corners: list[tuple[float, float]], field: str) -> Polygon:
@@ -103,14 +92,6 @@ def _grounds(plan: DistrictPlan, area: MultiPolygon) -> dict[str, MultiPolygon]:
         ground: MultiPolygon(polygons_of(snap(unary_union(shapes))))
         for ground, shapes in pieces.items()
     }
-
-
-def _terraces(plan: DistrictPlan, area: MultiPolygon) -> tuple[Pad, ...]:
-    return tuple(
-        Pad(snap(_patch_shape(patch).intersection(area)), patch.level)
-        for patch in plan.patches
-        if patch.level is not None
-    )
 
 
 def _patch_shape(patch: PatchPlan) -> BaseGeometry:

@@ -7,6 +7,7 @@ pads in it.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -34,32 +35,24 @@ _ROUNDING = 6
 _TOUCHING = 1e-6
 
 
-@dataclass(frozen=True)
-class Pad:
-    """Ground that is held level.
-
-    Attributes:
-        area: in W [m].
-        height: in W [m].
-    """
+class Pad(NamedTuple):
+    """Ground that is held level at a height, both in W [m]."""
 
     area: BaseGeometry
     height: float
 
 
+@dataclass(frozen=True)
 class LevelGround:
-    """The ground of a city whose streets are all level."""
+    """The ground at a height [m] of a city whose streets are all level."""
 
+    height: float
     pads: tuple[Pad, ...] = ()
     is_level = True
 
-    def __init__(self, height: float):
-        """Makes level ground at a height [m]."""
-        self._height = height
-
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Returns the (N,) heights at points in W [m]."""
-        return np.full(np.shape(x), self._height)
+        return np.full(np.shape(x), self.height)
 
 
 class SlopingGround:
@@ -85,12 +78,10 @@ class SlopingGround:
     ):
         """Shapes the ground.
 
-        Args:
-            surface: surface of the roads.
-            kerb_height: height of sidewalks above the roads [m].
-            streets: carriageways, sidewalks and medians in W [m].
-            bounds: x0, y0, x1, y1 of the city [m].
-            pads: outside the streets; of two that meet the first wins.
+        Sidewalks are `kerb_height` above the surface of the roads; `streets`
+        are carriageways, sidewalks and medians, and `bounds` x0, y0, x1, y1 of
+        the city, in W [m]. Pads lie outside the streets; of two that meet the
+        first wins.
         """
         self.pads = tuple(pads)
         self._surface = surface
@@ -103,8 +94,7 @@ class SlopingGround:
         self._pad_tree = shapely.STRtree([pad.area for pad in self.pads])
         self._pad_heights = np.array([pad.height for pad in self.pads])
         x0, y0, x1, y1 = bounds
-        self._x = _nodes(x0, x1)
-        self._y = _nodes(y0, y1)
+        self._x, self._y = _nodes(x0, x1), _nodes(y0, y1)
         self._z = self._field()
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """The surfaces of streets: carriageway, kerbs, sidewalks, medians, paint."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -55,21 +55,52 @@ _SIDEWALK_RGB = (0.66, 0.64, 0.61)
 _MEDIAN_RGB = (0.47, 0.55, 0.34)
 
 
-@dataclass(frozen=True)
-class Covering:
-    """A part of the carriageway that is of another kind than the lanes.
+class Covering(NamedTuple):
+    """Ground of one kind, with the name and colour of its structure.
 
-    Attributes:
-        name: name of its structure.
-        semantic_class: likewise.
-        area: in W [m].
-        rgb: colour.
+    Its area is in W [m].
     """
 
     name: str
     semantic_class: str
     area: BaseGeometry
     rgb: tuple[float, float, float]
+
+    def tiles(self) -> Iterator[tuple[str, MultiPolygon]]:
+        """Yields the name of each tile, and the polygons in it."""
+        for k, piece in enumerate(tiles(self.area, TILE)):
+            yield f"tile_{k:02d}", piece
+
+    def surface(
+        self, height: HeightMap | float, spacing: float = 0.0
+    ) -> Structure:
+        """Returns its upper side, one part a tile.
+
+        A mesh that follows a height map has vertices `spacing` apart [m], or
+        with 0 those of the polygons alone.
+        """
+        return self.structure(
+            {
+                part: surface_mesh(piece, height, spacing)
+                for part, piece in self.tiles()
+            }
+        )
+
+    def structure(self, pieces: dict[str, Mesh]) -> Structure:
+        """Returns the structure of meshes that are given in W already.
+
+        Pieces without faces, of slivers alone, are left out.
+        """
+        pieces = {part: mesh for part, mesh in pieces.items() if mesh.faces}
+        meshes = {f"{self.name}_{part}": mesh for part, mesh in pieces.items()}
+        parts = tuple(
+            Part(part, MeshShape(mesh), rgb=self.rgb)
+            for part, mesh in zip(pieces, meshes, strict=True)
+        )
+        model, origin = Model(parts, meshes, self.area), (0.0, 0.0, 0.0)
+        return Structure(
+            self.name, self.semantic_class, model, origin, tags=(GROUND_TAG,)
+        )
 
 
 def parking_bays(area: BaseGeometry) -> Covering:
@@ -97,14 +128,9 @@ def street_surfaces(
 ) -> list[Structure]:
     """Returns the ground of streets.
 
-    Kinds of ground that are absent from these streets are left out.
-
-    Args:
-        areas: areas of the streets.
-        surface: how high the carriageway lies.
-        kerb: height of sidewalks and medians above it [m].
-        coverings: within the carriageway.
-        kerbless: area without kerbs, where streets lead onto bridges, in W [m].
+    Kinds of ground that are absent from these streets are left out. Sidewalks
+    and medians lie `kerb` above the carriageway, which the coverings are a part
+    of. Where streets lead onto bridges, an area in W is `kerbless` [m].
     """
     road, walk = _heights(surface, kerb)
     medians = snap(areas.medians())
@@ -115,20 +141,18 @@ def street_surfaces(
         kerbs = MultiPolygon(polygons_of(snap(kerbs.difference(kerbless))))
     sidewalks = snap(areas.sidewalks()).difference(kerbs)
     outer = unary_union([paved, kerbs, sidewalks, medians]).boundary
+    road_part = paved.difference(covered)
+    walks = Covering("sidewalks", "sidewalk", sidewalks, _SIDEWALK_RGB)
     structures = [
-        _surface(
-            "carriageway", "road", paved.difference(covered), road, _ROAD_RGB
-        ),
-        *(
-            _surface(one.name, one.semantic_class, one.area, road, one.rgb)
-            for one in coverings
-        ),
+        _surface(Covering("carriageway", "road", road_part, _ROAD_RGB), road),
+        *(_surface(one, road) for one in coverings),
         _kerb_structure(kerbs, paved, road, walk),
+        _surface(walks, walk, outer),
         _surface(
-            "sidewalks", "sidewalk", sidewalks, walk, _SIDEWALK_RGB, outer
-        ),
-        _surface(
-            "medians", "terrain", medians.difference(kerbs), walk, _MEDIAN_RGB
+            Covering(
+                "medians", "terrain", medians.difference(kerbs), _MEDIAN_RGB
+            ),
+            walk,
         ),
     ]
     return [structure for structure in structures if structure.model.parts]
@@ -158,68 +182,22 @@ def kerb_height(network: RoadNetwork) -> float:
     return max(road.kerb_height for road in network.roads.values())
 
 
-def ground_structure(
-    name: str,
-    semantic_class: str,
-    area: BaseGeometry,
-    height: HeightMap | float,
-    rgb: tuple[float, float, float],
-    spacing: float = 0.0,
-) -> Structure:
-    """Returns the upper side of an area, one part a tile.
-
-    A mesh that follows a height map has vertices `spacing` apart [m], or with 0
-    those of the polygons alone.
-    """
-    pieces = {
-        f"tile_{k:02d}": surface_mesh(piece, height, spacing)
-        for k, (_, _, piece) in enumerate(tiles(area, TILE))
-    }
-    return as_structure(name, semantic_class, pieces, area, rgb)
-
-
-def as_structure(
-    name: str,
-    semantic_class: str,
-    pieces: dict[str, Mesh],
-    area: BaseGeometry,
-    rgb: tuple[float, float, float],
-) -> Structure:
-    """Returns a structure of meshes that are given in W already.
-
-    Pieces without faces, of slivers alone, are left out.
-    """
-    pieces = {part: mesh for part, mesh in pieces.items() if mesh.faces}
-    meshes = {f"{name}_{part}": mesh for part, mesh in pieces.items()}
-    parts = tuple(
-        Part(part, MeshShape(f"{name}_{part}"), rgb=rgb) for part in pieces
-    )
-    model = Model(parts, meshes, area)
-    origin = (0.0, 0.0, 0.0)
-    return Structure(name, semantic_class, model, origin, tags=(GROUND_TAG,))
-
-
 def _surface(
-    name: str,
-    semantic_class: str,
-    area: BaseGeometry,
+    ground: Covering,
     height: HeightMap | float,
-    rgb: tuple[float, float, float],
     edge: BaseGeometry | None = None,
 ) -> Structure:
     """Returns the upper side of streets, with edging stones on slopes.
 
-    Args:
-        name, semantic_class, area, height, rgb: as for `ground_structure`.
-        edge: line in W along which the slopes are edged [m].
+    Slopes are edged along the line `edge` in W [m].
     """
     pieces = {}
-    for part, piece, top, spacing in _street_tiles(area, height):
+    for part, piece, top, spacing in _street_tiles(ground, height):
         pieces[part] = surface_mesh(piece, top, spacing)
         if edge is not None and callable(top):
             stones = _edging(piece, top, spacing, edge)
             pieces[part] = merge_meshes(pieces[part], stones)
-    return as_structure(name, semantic_class, pieces, area, rgb)
+    return ground.structure(pieces)
 
 
 def _edging(
@@ -241,23 +219,23 @@ def _kerb_structure(
     road: HeightMap | float,
     walk: HeightMap | float,
 ) -> Structure:
+    ground = Covering("kerbs", "sidewalk", kerbs, _KERB_RGB)
     pieces = {}
-    for part, piece, top, spacing in _street_tiles(kerbs, walk):
+    for part, piece, top, spacing in _street_tiles(ground, walk):
         # The upstand faces the carriageway, so it is the carriageway's rim
         # seen from inside, where this tile's kerb stones border on it.
         near = piece.buffer(_NEAR)
         rim = shapely.segmentize(paved, spacing) if spacing > 0 else paved
         upstand = wall_mesh(rim, road, top, along=near)
         pieces[part] = merge_meshes(surface_mesh(piece, top, spacing), upstand)
-    return as_structure("kerbs", "sidewalk", pieces, kerbs, _KERB_RGB)
+    return ground.structure(pieces)
 
 
 def _street_tiles(
-    area: BaseGeometry, height: HeightMap | float
+    ground: Covering, height: HeightMap | float
 ) -> Iterator[tuple[str, BaseGeometry, HeightMap | float, float]]:
     """Yields name, polygons, height and mesh spacing of each tile."""
-    for k, (_, _, piece) in enumerate(tiles(area, TILE)):
-        name = f"tile_{k:02d}"
+    for name, piece in ground.tiles():
         if not callable(height):
             yield name, piece, height, 0.0
             continue
@@ -320,7 +298,8 @@ def marking_structure(network: RoadNetwork) -> Structure:
         ]
         if road.length > _LEAST_LENGTH and strips:
             pieces[name] = merge_meshes(*(_strip(road, *s) for s in strips))
-    return as_structure("markings", "road", pieces, network.lane_area(), _RGB)
+    ground = Covering("markings", "road", network.lane_area(), _RGB)
+    return ground.structure(pieces)
 
 
 def _is_junction(network: RoadNetwork, road: Road, end: End) -> bool:

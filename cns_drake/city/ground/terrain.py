@@ -1,7 +1,6 @@
 """The ground of districts: lawns with relief, paving, water behind quays."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -10,19 +9,18 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.mesh import merge_meshes
 from cns_drake.city.geometry.polygons import (
     HeightMap,
     polygons_of,
     snap,
     surface_mesh,
-    tiles,
     wall_mesh,
 )
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.districts import District
 from cns_drake.city.ground.elevation import Ground
-from cns_drake.city.ground.streets import TILE, as_structure, ground_structure
+from cns_drake.city.ground.streets import Covering
 
 # Kind of ground -> semantic class and colour.
 _LOOK = {
@@ -40,35 +38,6 @@ _SPACING = 4.0
 _GENTLE, _FINE_SPACING = 4.0, 2.0
 # Wavelengths of the swells [m].
 _WAVELENGTHS = (22.0, 60.0)
-
-
-@dataclass(frozen=True)
-class _Swell:
-    """The relief of one district's lawns.
-
-    Attributes:
-        area: where it acts.
-        level: lines and areas at which the relief has faded to zero.
-        amplitude: greatest height [m].
-        margin: distance over which it rises from `level` [m].
-        waves: rows of wave vector [rad/m] and phase [rad].
-    """
-
-    area: BaseGeometry
-    level: BaseGeometry
-    amplitude: float
-    margin: float
-    waves: np.ndarray
-
-    def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Returns the height above level ground at points in W [m]."""
-        distance = shapely.distance(shapely.points(x, y), self.level)
-        u = np.clip(distance / self.margin, 0.0, 1.0)
-        rise = u * u * (3 - 2 * u)
-        phase = np.outer(x, self.waves[:, 0]) + np.outer(y, self.waves[:, 1])
-        wave = np.sin(phase + self.waves[:, 2]).mean(axis=1)
-        # The relief is never below level, so that no hollow collects water.
-        return self.amplitude * rise * (0.65 + 0.35 * wave)
 
 
 class GroundShape:
@@ -93,11 +62,40 @@ class GroundShape:
         """Returns the height of the ground at points in W [m]."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         z = self.base(x, y)
-        for swell in self._swells:
-            inside = shapely.intersects_xy(swell.area, x, y)
+        for lawn, swell in self._swells:
+            inside = shapely.intersects_xy(lawn, x, y)
             if inside.any():
-                z[inside] += swell.height(x[inside], y[inside])
+                z[inside] += swell(x[inside], y[inside])
         return z
+
+
+def _make_swell(
+    district: District, buildings: BaseGeometry, rng: np.random.Generator
+) -> tuple[BaseGeometry, HeightMap]:
+    """Returns a district's lawn, and its height above level ground in W."""
+    plan = district.plan
+    rows = []
+    for wavelength in rng.uniform(*_WAVELENGTHS, 5):
+        heading, phase = rng.uniform(0, 2 * math.pi, 2)
+        k = 2 * math.pi / wavelength
+        rows.append((k * math.cos(heading), k * math.sin(heading), phase))
+    # Rows of wave vector [rad/m] and phase [rad].
+    waves = np.array(rows)
+    lawn = district.grounds["lawn"]
+    level = unary_union([lawn.boundary, buildings.intersection(lawn)])
+    shapely.prepare(level)
+    shapely.prepare(lawn)
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        distance = shapely.distance(shapely.points(x, y), level)
+        u = np.clip(distance / plan.relief_margin, 0.0, 1.0)
+        rise = u * u * (3 - 2 * u)
+        phase = np.outer(x, waves[:, 0]) + np.outer(y, waves[:, 1])
+        wave = np.sin(phase + waves[:, 2]).mean(axis=1)
+        # The relief is never below level, so that no hollow collects water.
+        return plan.relief * rise * (0.65 + 0.35 * wave)
+
+    return lawn, height
 
 
 def ground_structures(
@@ -118,47 +116,32 @@ def ground_structures(
         ]
     )
     for district in districts:
-        for ground, area in district.grounds.items():
+        for kind, area in district.grounds.items():
             if area.is_empty:
                 continue
-            name = f"ground_{district.plan.name}_{ground}"
-            semantic_class, rgb = _LOOK[ground]
-            if ground == "water":
+            semantic_class, rgb = _LOOK[kind]
+            name = f"ground_{district.plan.name}_{kind}"
+            ground = Covering(name, semantic_class, area, rgb)
+            if kind == "water":
+                structures.append(ground.surface(water_level))
                 structures.append(
-                    ground_structure(
-                        name, semantic_class, area, water_level, rgb
-                    )
+                    _quay(district.plan.name, area, land, shape, water_level)
                 )
-                structures.append(
-                    _quay(district, area, land, shape, water_level)
-                )
-                continue
-            has_relief = ground == "lawn" and district.plan.relief > 0
-            if shape.base.is_level:
+            elif shape.base.is_level:
+                has_relief = kind == "lawn" and district.plan.relief > 0
                 spacing = _SPACING if has_relief else 0.0
-                structures.append(
-                    ground_structure(
-                        name, semantic_class, area, shape, rgb, spacing
-                    )
-                )
+                structures.append(ground.surface(shape, spacing))
             else:
-                structures.append(
-                    _slope(name, semantic_class, area, shape, rgb)
-                )
+                structures.append(_slope(ground, shape))
     return structures
 
 
-def _slope(
-    name: str,
-    semantic_class: str,
-    area: MultiPolygon,
-    shape: GroundShape,
-    rgb: tuple[float, float, float],
-) -> Structure:
+def _slope(ground: Covering, shape: GroundShape) -> Structure:
     """Returns ground that slopes between level pads, one part a tile."""
-    spacing = _SPACING if _fall(area, shape.base) < _GENTLE else _FINE_SPACING
+    is_gentle = _fall(ground.area, shape.base) < _GENTLE
+    spacing = _SPACING if is_gentle else _FINE_SPACING
     pieces = {}
-    for k, (_, _, piece) in enumerate(tiles(area, TILE)):
+    for part, piece in ground.tiles():
         meshes = []
         rest: BaseGeometry = piece
         for pad in shape.base.pads:
@@ -168,8 +151,8 @@ def _slope(
             rest = snap(rest.difference(pad.area))
             meshes.append(surface_mesh(level, pad.height))
         meshes.append(surface_mesh(rest, shape, spacing))
-        pieces[f"tile_{k:02d}"] = merge_meshes(*meshes)
-    return as_structure(name, semantic_class, pieces, area, rgb)
+        pieces[part] = merge_meshes(*meshes)
+    return ground.structure(pieces)
 
 
 def _fall(area: BaseGeometry, base: Ground) -> float:
@@ -178,24 +161,8 @@ def _fall(area: BaseGeometry, base: Ground) -> float:
     return float(np.ptp(base(*shapely.get_coordinates(outline).T)))
 
 
-def _make_swell(
-    district: District, buildings: BaseGeometry, rng: np.random.Generator
-) -> _Swell:
-    plan = district.plan
-    waves = []
-    for wavelength in rng.uniform(*_WAVELENGTHS, 5):
-        heading, phase = rng.uniform(0, 2 * math.pi, 2)
-        k = 2 * math.pi / wavelength
-        waves.append((k * math.cos(heading), k * math.sin(heading), phase))
-    lawn = district.grounds["lawn"]
-    level = unary_union([lawn.boundary, buildings.intersection(lawn)])
-    shapely.prepare(level)
-    shapely.prepare(lawn)
-    return _Swell(lawn, level, plan.relief, plan.relief_margin, np.array(waves))
-
-
 def _quay(
-    district: District,
+    district: str,
     water: BaseGeometry,
     land: BaseGeometry,
     shape: GroundShape,
@@ -203,13 +170,12 @@ def _quay(
 ) -> Structure:
     """Returns the walls where water borders on land, one part a tile."""
     rim = water.boundary.buffer(0.3).intersection(land.buffer(0.6))
-    pieces = {}
-    for k, (_, _, piece) in enumerate(tiles(rim, TILE)):
-        wall = wall_mesh(water, water_level, shape, along=piece)
-        if wall.faces:
-            pieces[f"tile_{k:02d}"] = wall
-    return as_structure(
-        f"quay_{district.plan.name}", "other-structure", pieces, rim, _QUAY_RGB
+    quay = Covering(f"quay_{district}", "other-structure", rim, _QUAY_RGB)
+    return quay.structure(
+        {
+            part: wall_mesh(water, water_level, shape, along=piece)
+            for part, piece in quay.tiles()
+        }
     )
 
 
@@ -249,49 +215,27 @@ def bridge_structures(
         if district.plan.ground != "water":
             continue
         water = water_area(district, streets)
-        decks = polygons_of(snap(water.difference(district.grounds["water"])))
+        banks = water.boundary.buffer(_NEAR)
+        inner = water.buffer(-_SPAN, join_style="mitre")
+        ring = inner.difference(inner.buffer(-_PIER, join_style="mitre"))
+        open_water = district.grounds["water"]
+        decks = polygons_of(snap(water.difference(open_water)))
         for number, deck in enumerate(decks, start=1):
             name = f"bridge_{district.plan.name}_{number:02d}"
-            structures += _bridge(
-                name, deck, district, water, shape, water_level
-            )
+            middle = np.array([deck.centroid.coords[0]])
+            bottom, low = float(shape(*middle.T)[0]) - _DEPTH, water_level
+            beside, piers = deck.buffer(_NEAR), snap(deck.intersection(ring))
+            pieces = {
+                "sides": wall_mesh(open_water, bottom, shape, along=beside),
+                "underside": surface_mesh(deck, bottom).turned(),
+                "abutments": wall_mesh(deck, low, bottom, along=banks),
+                "piers": wall_mesh(piers, low, bottom).turned(),
+            }
+            area = MultiPolygon([deck])
+            bridge = Covering(name, "other-structure", area, _BRIDGE_RGB)
+            below = Covering(f"{name}_water", "other-ground", area, _WATER_RGB)
+            structures += [
+                bridge.structure(pieces),
+                below.structure({"surface": surface_mesh(deck, low)}),
+            ]
     return structures
-
-
-def _bridge(
-    name: str,
-    deck: Polygon,
-    district: District,
-    water: BaseGeometry,
-    shape: HeightMap,
-    water_level: float,
-) -> list[Structure]:
-    """Returns a bridge and the water below it."""
-    bottom = float(shape(*np.array([deck.centroid.coords[0]]).T)[0]) - _DEPTH
-    inner = water.buffer(-_SPAN, join_style="mitre")
-    piers = deck.intersection(
-        inner.difference(inner.buffer(-_PIER, join_style="mitre"))
-    )
-    banks = water.boundary.buffer(_NEAR)
-    surface = {"surface": surface_mesh(deck, water_level)}
-    pieces = {
-        "sides": wall_mesh(
-            district.grounds["water"], bottom, shape, along=deck.buffer(_NEAR)
-        ),
-        "underside": _turned(surface_mesh(deck, bottom)),
-        "abutments": wall_mesh(deck, water_level, bottom, along=banks),
-        "piers": _turned(wall_mesh(snap(piers), water_level, bottom)),
-    }
-    pieces = {part: mesh for part, mesh in pieces.items() if mesh.faces}
-    area = MultiPolygon([deck])
-    return [
-        as_structure(name, "other-structure", pieces, area, _BRIDGE_RGB),
-        as_structure(
-            f"{name}_water", "other-ground", surface, area, _WATER_RGB
-        ),
-    ]
-
-
-def _turned(mesh: Mesh) -> Mesh:
-    """Returns a mesh whose faces look to the other side."""
-    return Mesh(mesh.vertices, tuple(face[::-1] for face in mesh.faces))

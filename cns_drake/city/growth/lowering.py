@@ -49,9 +49,9 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
     after `name`. The model itself is returned where less than a storey of it
     lies above `height`, or nothing there is enclosed.
     """
-    placed = [(part, part_mesh(part, model.meshes)) for part in model.parts]
-    if _top(placed) < height + _STOREY:
+    if top_of(model) < height + _STOREY:
         return model
+    placed = [(part, part_mesh(part, model.meshes)) for part in model.parts]
     ground = box(*model.footprint.bounds)
     site = Site(ground, f"{name}_at_{round(10 * height)}")
     assembly = Assembly(site, np.random.default_rng(seed), _wall_rgb(placed))
@@ -82,13 +82,9 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
 def top_of(model: Model) -> float:
     """Returns the height of a building without equipment on its roof [m]."""
-    return _top([(part, part_mesh(part, model.meshes)) for part in model.parts])
-
-
-def _top(placed: Sequence[tuple[Part, Mesh]]) -> float:
     return max(
-        float(mesh.vertices[:, 2].max())
-        for part, mesh in placed
+        float(part_mesh(part, model.meshes).vertices[:, 2].max())
+        for part in model.parts
         if not _is_shared(part)
     )
 
@@ -173,11 +169,13 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
     walls = unary_union(shapely.buffer(lines, _REVEAL, cap_style="square"))
     plan: BaseGeometry = MultiPolygon()
     # From the outside inwards: courtyards are inside their buildings.
-    for ring in sorted(polygons_of(walls), key=_outer_area, reverse=True):
-        mine = shapely.intersects(lines, ring)
-        if _turns_left(edges[mine]):
-            shell = _offset(Polygon(ring.exterior), -_REVEAL)
-            plan = plan.union(shell)
+    rings = [(Polygon(one.exterior), one) for one in polygons_of(walls)]
+    for outer, ring in sorted(rings, key=lambda r: r[0].area, reverse=True):
+        mine = edges[shapely.intersects(lines, ring)]
+        a, b = (mine - mine.mean(axis=(0, 1))).transpose(1, 0, 2)
+        # Taken together, those of a building run counter-clockwise.
+        if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0:
+            plan = plan.union(_offset(outer, -_REVEAL))
         else:
             holes = [Polygon(hole) for hole in ring.interiors]
             yard = _offset(unary_union(holes), _REVEAL)
@@ -198,26 +196,15 @@ def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
         return area.buffer(distance, join_style="mitre")
 
 
-def _outer_area(polygon: Polygon) -> float:
-    return Polygon(polygon.exterior).area
-
-
-def _turns_left(edges: np.ndarray) -> bool:
-    """Returns whether edges, taken together, run counter-clockwise."""
-    a, b = (edges - edges.mean(axis=(0, 1))).transpose(1, 0, 2)
-    return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()) > 0
-
-
 def _add_roof(assembly: Assembly, plan: MultiPolygon, height: float) -> None:
     """Closes the walls by a band, a parapet and a flat roof."""
     top = round(height + _PARAPET, 3)
     outer = snap(_offset(plan, _BAND_REACH))
     inner = snap(_offset(plan, -_PARAPET_WIDTH))
-    band = wall_mesh(outer, height - _BAND, top)
     assembly.add(
         "new_roof",
         # Seen from outside, not from within.
-        Mesh(band.vertices, tuple(face[::-1] for face in band.faces)),
+        wall_mesh(outer, height - _BAND, top).turned(),
         surface_mesh(outer.difference(inner), top),
         wall_mesh(inner, height, top),
         surface_mesh(inner, height),

@@ -6,6 +6,7 @@ another use."""
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 import math
+from pathlib import Path
 from typing import Any, get_args
 import zlib
 
@@ -14,6 +15,7 @@ import shapely
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.geometry.polygons import Occupancy
 from cns_drake.city.geometry.structures import (
@@ -155,32 +157,7 @@ def _spread(values: np.ndarray) -> np.ndarray:
 _MARGIN = 0.8
 # A smaller lot is a gap between houses [m^2].
 _SMALLEST = 40.0
-# Objects along the front and across the lot are this far apart [m].
-_PITCH = {
-    "car_park": (2.7, 8.5),
-    "market": (4.2, 5.0),
-    "garden": (3.6, 3.6),
-    "yard": (7.5, 5.5),
-}
-_OBJECTS: dict[str, Mapping[str, float]] = {
-    "market": {"market_stall": 6, "kiosk": 0.5, "cafe_table": 1},
-    "garden": {
-        "low_shrub": 3,
-        "flower_bed": 3,
-        "shrub": 1,
-        "picnic_table": 0.4,
-        "bench": 0.6,
-    },
-    "yard": {
-        "container": 2,
-        "site_cabin": 1,
-        "brick_pallets": 1,
-        "pipe_stack": 1,
-        "skip": 0.7,
-    },
-}
-# Part of the places that are taken.
-_FILL = {"car_park": 0.6, "market": 0.7, "garden": 0.5, "yard": 0.45}
+_USES = parse_yaml(Path(__file__).with_name("lot_uses.yaml").read_bytes())
 USES: tuple[LotUse, ...] = get_args(LotUse)
 
 
@@ -207,7 +184,7 @@ def lot_objects(
     footprint = structure.model.footprint
     if use == "empty" or footprint.area < _SMALLEST:
         return
-    weights = cars if use == "car_park" else _OBJECTS[use]
+    weights = _USES[use].get("objects", cars)
     taken = Occupancy()
     count = 0
     for x, y, yaw in _places(footprint, use, rng):
@@ -235,14 +212,14 @@ def _places(
 ) -> Iterator[tuple[float, float, float]]:
     """Yields x, y and heading of the places that are taken, in S."""
     x0, y0, x1, y1 = largest_rectangle(footprint).bounds
-    along, across = _PITCH[use]
+    along, across = _USES[use]["pitch"]
     columns = max(1, math.floor((x1 - x0 - 2 * _MARGIN) / along))
     rows = max(1, math.floor((y1 - y0 - 2 * _MARGIN) / across))
     for row in range(rows):
         y = (y0 + y1) / 2 + (row - (rows - 1) / 2) * across
         for column in range(columns):
             x = (x0 + x1) / 2 + (column - (columns - 1) / 2) * along
-            taken = rng.random() < _FILL[use]
+            taken = rng.random() < _USES[use]["fill"]
             jitter = rng.uniform(-0.3, 0.3, 2)
             turn = int(rng.integers(2)) * math.pi
             if not taken:

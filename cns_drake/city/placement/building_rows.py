@@ -38,12 +38,9 @@ _RIGHT_EDGE, _LEFT_EDGE = 1, 3
 
 @dataclass
 class _House:
-    """A building that is to be built.
+    """A building that is to be built, its frame S at `xy` and `yaw` in W.
 
     Attributes:
-        archetype: key of the registry of buildings.
-        footprint: in its own frame S [m].
-        xy, yaw: where S lies in W [m, rad].
         height: height of the walls [m].
         taken: the ground in W that was taken for it.
         blind_edges: edges of the footprint with a neighbour wall to wall.

@@ -1,6 +1,5 @@
 """Lines along streets, and lots cut off along them."""
 
-from dataclasses import dataclass
 import itertools
 import math
 from typing import NamedTuple
@@ -25,16 +24,12 @@ _BEND = math.radians(17)
 _SHORT = 0.25
 
 
-@dataclass(frozen=True)
-class Lot:
+class Lot(NamedTuple):
     """A rectangle of ground for one building, its front to the street.
 
-    Attributes:
-        x, y: centre of the rectangle in W [m].
-        yaw: heading in W of the frame S of the lot, whose x axis runs along
-            the front and whose y axis points away from the street [rad].
-        width: size along x of S [m].
-        depth: size along y of S [m].
+    In the middle is its frame S, whose x axis runs along the front and whose y
+    axis points away from the street; `yaw` is its heading in W [rad]. Width and
+    depth are along these axes [m].
     """
 
     x: float

@@ -39,11 +39,7 @@ def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
 
 
 def _furnish_arm(
-    draft: Draft,
-    road: Road,
-    junction: Junction,
-    arm: Arm,
-    rng: Generator,
+    draft: Draft, road: Road, junction: Junction, arm: Arm, rng: Generator
 ) -> None:
     carriageway = draft.areas.carriageway()
     starts = arm.end == "start"

@@ -5,14 +5,19 @@ from shapely.geometry import box
 from cns_drake.city.buildings import family_houses
 from cns_drake.city.facades import bays, massing, wings
 from cns_drake.city.facades.assembly import Assembly, Site
-from cns_drake.city.facades.house_walls import Openings, free_stretches
 from cns_drake.city.facades.walls import Arch, Patch
-from cns_drake.city.facades.wings import Roof, Wing, add_roof
+from cns_drake.city.facades.wings import (
+    Openings,
+    Roof,
+    Wing,
+    add_roof,
+    free_stretches,
+)
 from cns_drake.city.geometry.mesh import box_mesh
 
-HALL = Wing.at(0, 0, 20, 8, 6.0, 9.0, Roof())
+HALL = Wing.at((0, 0, 20, 8), 6.0, 9.0, Roof())
 # The porch stands at the middle of the hall's front, lower than its walls.
-PORCH = Wing.at(8, -3, 12, 0.1, 2.5, 3.5, Roof())
+PORCH = Wing.at((8, -3, 12, 0.1), 2.5, 3.5, Roof())
 
 
 GROUND = box(0, 0, 9, 9)
@@ -36,13 +41,13 @@ def test_other_wings_hide_walls_up_to_their_tops():
 
 
 def test_blind_walls_have_no_free_part():
-    wing = Wing.at(0, 0, 20, 8, 6.0, 9.0, Roof(), blind={1})
+    wing = Wing.at((0, 0, 20, 8), 6.0, 9.0, Roof(), blind={1})
     assert free_stretches(wing, 1, (wing,), 1.0) == []
     assert free_stretches(wing, 3, (wing,), 1.0) == [(0.0, 8.0)]
 
 
 def test_a_row_keeps_off_hidden_walls_and_a_door_replaces_windows():
-    openings = Openings(HALL, (HALL, PORCH))
+    openings = Openings(assembly("h"), HALL, (HALL, PORCH))
     openings.row((0,), 1.0, 2.0, [bays.window(1.0, 1.0, 2.0, 0.1)])
     row = openings.layout(0, 20.0)
     assert len(row) == 6
@@ -57,7 +62,7 @@ def test_a_row_keeps_off_hidden_walls_and_a_door_replaces_windows():
 
 
 def test_flat_wall_comes_below_an_arch():
-    openings = Openings(HALL)
+    openings = Openings(assembly("h"), HALL)
     arch = Arch(2.0, 3.0, 0.0, 2.0, 2.5, 0.3)
     openings.add(0, [arch])
     assert openings.layout(0, 20.0) == [Patch(2.0, 3.0, 0.0, 2.5, 0.0), arch]
@@ -65,7 +70,7 @@ def test_flat_wall_comes_below_an_arch():
 
 @pytest.mark.parametrize("along_y", [False, True])
 def test_gables_stand_below_the_ends_of_the_ridge(along_y):
-    wing = Wing.at(0, 0, 6, 6, 4.0, 7.0, Roof("gable", along_y, 0.4, 0.3))
+    wing = Wing.at((0, 0, 6, 6), 4.0, 7.0, Roof("gable", along_y, 0.4, 0.3))
     house = assembly("h", walls=(1, 1, 1), roof=(0, 0, 0))
     add_roof(house, wing)
     meshes = house.finish(GROUND).meshes
@@ -82,7 +87,7 @@ def test_gables_stand_below_the_ends_of_the_ridge(along_y):
 
 
 def test_a_mirrored_wing():
-    wing = Wing.at(1, 0, 4, 8, 3.0, 4.0, Roof(), blind={3, 2})
+    wing = Wing.at((1, 0, 4, 8), 3.0, 4.0, Roof(), blind={3, 2})
     mirrored = wing.mirrored(10.0)
     assert (mirrored.x0, mirrored.x1) == (6.0, 9.0)
     assert mirrored.blind == {1, 2}
@@ -106,7 +111,7 @@ def test_dormers_stay_below_the_ridge_and_on_the_slope():
 
 
 def test_no_dormer_on_a_flat_slope():
-    wing = Wing.at(0, 0, 20, 16, 6.0, 8.0, Roof())
+    wing = Wing.at((0, 0, 20, 16), 6.0, 8.0, Roof())
     house = assembly("d", walls=(1, 1, 1))
     wings.add_dormers(house, wing, 0.0, 20.0, 3, "gable")
     assert house.finish(GROUND).parts == ()
