@@ -63,13 +63,10 @@ _LONGEST_NAME = 80
 
 
 class CityGeometry(NamedTuple):
-    """One geometry of an object.
+    """One geometry of an object; the level of detail is 0 if unknown.
 
-    Attributes:
-        lod: level of detail, such as 2.2; 0 if the file has none.
-        faces: all of them.
-        kinds: the type of each face, such as RoofSurface; "" if unknown.
-        is_solid: whether the faces close a solid.
+    Each face has a type, such as RoofSurface; "" if unknown. The faces of a
+    solid close it.
     """
 
     lod: float

@@ -52,18 +52,18 @@ def face_triangles(
     if not normal.any():
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
-    outer, *holes = rings
-    holes = [hole for hole in holes if len(hole) >= 3]
-    if len(outer) == 3 and not holes:
+    outer = rings[0]
+    has_holes = any(len(hole) >= 3 for hole in rings[1:])
+    if len(outer) == 3 and not has_holes:
         return outer[None]
     heights = (outer - outer[0]) @ normal
     if np.ptp(heights) > 2.0 * _BENT * np.linalg.norm(normal):
         faults.add("face that is not plane, folded between its corners", name)
-    if len(outer) == 4 and not holes:
+    if len(outer) == 4 and not has_holes:
         corners = outer[_CORNERS_OF_FOUR]
         if (long_normals(corners) @ normal > 0.0).all():
             return corners[[1, 3]]
-    return _filled(_Plane(normal, rings), outer, holes, name, faults)
+    return _filled(normal, rings, name, faults)
 
 
 def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
@@ -79,72 +79,51 @@ def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
     return ring
 
 
-class _Plane:
-    """Two of the three axes, along which a face is seen from outside."""
-
-    def __init__(self, normal: np.ndarray, rings: Sequence[np.ndarray]):
-        axis = int(np.abs(normal).argmax())
-        self._axes = [(axis + 1) % 3, (axis + 2) % 3]
-        if normal[axis] < 0.0:
-            self._axes.reverse()
-        self._axis = axis
-        self._normal = normal
-        self._origin = rings[0].mean(axis=0)
-        self._corners = {
-            tuple(key): corner
-            for ring in rings
-            for key, corner in zip(
-                np.rint(self.flat(ring) * _MM).astype(np.int64).tolist(),
-                ring,
-                strict=True,
-            )
-        }
-
-    def flat(self, points: np.ndarray) -> np.ndarray:
-        """Returns points (..., 3) as (..., 2)."""
-        return points[..., self._axes]
-
-    def lifted(self, xy: np.ndarray) -> np.ndarray:
-        """Returns points (N, 2) in space; corners keep their exact places."""
-        result = np.empty((len(xy), 3))
-        keys = np.rint(xy * _MM).astype(np.int64).tolist()
-        for row, key, point in zip(result, keys, xy, strict=True):
-            corner = self._corners.get(tuple(key))
-            if corner is not None:
-                row[:] = corner
-                continue
-            row[self._axes] = point
-            row[self._axis] = self._origin[self._axis]
-            offset = self._normal @ (row - self._origin)
-            row[self._axis] -= offset / self._normal[self._axis]
-        return result
-
-
 def _filled(
-    plane: _Plane,
-    outer: np.ndarray,
-    holes: list[np.ndarray],
+    normal: np.ndarray,
+    rings: Sequence[np.ndarray],
     name: str,
     faults: ImportFaults,
 ) -> np.ndarray:
-    def flat(ring: np.ndarray) -> np.ndarray:
-        return np.rint(plane.flat(ring) * _MM) / _MM
-
-    polygon = Polygon(flat(outer), [flat(hole) for hole in holes])
+    """Returns the triangles of a face, cut as it is seen along an axis."""
+    axis = int(np.abs(normal).argmax())
+    axes = [(axis + 1) % 3, (axis + 2) % 3]
+    if normal[axis] < 0.0:
+        axes.reverse()
+    # In whole millimetres.
+    flat = [np.rint(ring[:, axes] * _MM) for ring in rings]
+    corners = {
+        tuple(key): corner
+        for keys, ring in zip(flat, rings, strict=True)
+        for key, corner in zip(keys.tolist(), ring, strict=True)
+    }
+    holes = [one / _MM for one in flat[1:] if len(one) >= 3]
+    polygon: BaseGeometry = Polygon(flat[0] / _MM, holes)
     if not polygon.is_valid:
         faults.add("face that crosses itself, repaired", name)
-        repaired = shapely.set_precision(make_valid(polygon), 1.0 / _MM)
-    else:
-        repaired = polygon
+        polygon = shapely.set_precision(make_valid(polygon), 1.0 / _MM)
     parts = [np.zeros((0, 3, 2))]
-    for part in shapely.get_parts(repaired):
+    for part in shapely.get_parts(polygon):
         if isinstance(part, Polygon) and part.area >= _LEAST_AREA:
             try:
                 parts.append(triangulate(part))
             except ValueError:
                 faults.add("part of a face that is in no plane, left out", name)
-    triangles = np.concatenate(parts)
-    return plane.lifted(triangles.reshape(-1, 2)).reshape(-1, 3, 3)
+    xy = np.concatenate(parts).reshape(-1, 2)
+    origin = rings[0].mean(axis=0)
+    lifted = np.empty((len(xy), 3))
+    for row, key, point in zip(
+        lifted, np.rint(xy * _MM).tolist(), xy, strict=True
+    ):
+        # Corners keep their exact places.
+        corner = corners.get(tuple(key))
+        if corner is not None:
+            row[:] = corner
+            continue
+        row[axes] = point
+        row[axis] = origin[axis]
+        row[axis] -= normal @ (row - origin) / normal[axis]
+    return lifted.reshape(-1, 3, 3)
 
 
 def flat_surface(

@@ -85,11 +85,9 @@ class Ground:
 
 
 def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
-    """Returns a smooth ground through places whose height is known.
+    """Returns a smooth ground through feet (N, 3), one or more [m].
 
-    Args:
-        feet: (N, 3) places on the ground [m], one or more.
-        corners: (M, 3) those of all structures; the ground reaches beyond [m].
+    It reaches beyond the corners (M, 3) of all structures [m].
     """
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))

@@ -35,7 +35,7 @@ from cns_drake.imports.options import (
     ImportOptions,
     ImportReport,
 )
-from cns_drake.imports.staged_city import StagedCity, grow, stage_city
+from cns_drake.imports.staged_city import grow, stage_city
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
@@ -45,6 +45,9 @@ Progress = Callable[[str], None]
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 
 
+# Threads of linear algebra would only wait for each other: the matrices are
+# small, and several processes work here.
+@threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
 def import_city(
     source: Path,
     output: Path,
@@ -67,20 +70,6 @@ def import_city(
         InputError: if the file or the options cannot be used, or the folder
             is there or cannot be written.
     """
-    # Threads of linear algebra would only wait for each other: the matrices are
-    # small, and several processes work here.
-    with threadpool_limits(limits=1):
-        return _import_city(source, output, options, progress, finish)
-
-
-def _import_city(
-    source: Path,
-    output: Path,
-    options: ImportOptions,
-    progress: Progress,
-    finish: Finish,
-) -> ImportReport:
-    """Writes a map folder of a file; see `import_city`."""
     _check(source, output, options)
     own = None if options.along is None else [drive_along(options.along)]
     progress(f"reading {source}")
@@ -127,11 +116,28 @@ def _import_city(
             city, options, list(staged.standing), changes, dressing
         )
         map_files.write_facts(draft, source, facts, city.faults)
-        report = _report(staged, drives, city.faults)
+        report = ImportReport(
+            kinds=dict(Counter(one.kind for one in staged.kept)),
+            # All but buildings may share their meshes.
+            triangles=sum(
+                one.structure.model.num_triangles
+                if one.kind.startswith("Building")
+                else len(one.triangles)
+                for one in staged.kept
+            ),
+            stages={stage: len(o) for stage, o in staged.standing.items()},
+            undated=staged.undated,
+            dated=staged.dated,
+            drives=tuple(drive.length for drive in drives),
+            faults=city.faults.rows(),
+        )
         map_files.write_report(draft, report)
+        when = [f" in {year}" for year in options.years] or [""]
+        if options.grow is not None:
+            when = [", not all of it built", ""]
         map_files.write_drives(
             draft,
-            _titles(staged, options),
+            dict(zip(staged.standing, when, strict=True)),
             [drive.waypoints for drive in drives],
         )
         finish(draft, sizes)
@@ -251,31 +257,3 @@ def _lifted(
         else:
             faults.add("drive too tight on its slope, left out", "drive")
     return lifted
-
-
-def _titles(city: StagedCity, options: ImportOptions) -> dict[str, str]:
-    """Returns stage -> words for its time, the end of a title."""
-    when = [f" in {year}" for year in options.years] or [""]
-    if options.grow is not None:
-        when = [", not all of it built", ""]
-    return dict(zip(city.standing, when, strict=True))
-
-
-def _report(
-    city: StagedCity, drives: Sequence[WaypointDrive], faults: ImportFaults
-) -> ImportReport:
-    return ImportReport(
-        kinds=dict(Counter(one.kind for one in city.kept)),
-        # All but buildings may share their meshes.
-        triangles=sum(
-            one.structure.model.num_triangles
-            if one.kind.startswith("Building")
-            else len(one.triangles)
-            for one in city.kept
-        ),
-        stages={stage: len(some) for stage, some in city.standing.items()},
-        undated=city.undated,
-        dated=city.dated,
-        drives=tuple(drive.length for drive in drives),
-        faults=faults.rows(),
-    )

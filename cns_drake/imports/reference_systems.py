@@ -58,14 +58,11 @@ class ReferenceSystem:
         return points @ self.matrix.T
 
     def as_used(self, point: np.ndarray) -> ReferenceSystem:
-        """Returns the system as a file uses it.
+        """Returns the system as a file with a point (3,) uses it.
 
         Many programs write east first against the definition. That is assumed
-        only if a point is in the system's area of use with its first two
-        coordinates exchanged, and not otherwise.
-
-        Args:
-            point: (3,) coordinates of the file.
+        only if the point is in the area of use with its first two coordinates
+        exchanged, and not otherwise.
         """
         if not self.axes[0].startswith(("north", "south")):
             return self

@@ -136,12 +136,8 @@ class StagedCity:
     ) -> StagedCity:
         """Returns the city without structures far from drives.
 
-        Of a terrain, the near part stays.
-
-        Args:
-            drives: the city's drives.
-            distance: greatest distance of a structure's bounding box [m].
-            faults: counts structures left out.
+        The near part of a terrain stays. At most the distance lies between the
+        bounding box of a structure and a drive [m]. Others are counted.
 
         Raises:
             InputError: if no structure is near, or there is no drive.

@@ -127,13 +127,9 @@ class DriveViews:
         ground: Ground,
         solids: np.ndarray,
     ):
-        """Prepares the views.
+        """Prepares the views of at least one drive.
 
-        Args:
-            drives: at least one.
-            ground: below them.
-            solids: (M, 3, 3) triangles that hide other things at all stages
-                [m].
+        Solids (M, 3, 3) hide other things at all stages [m].
         """
         paths = [LineString(drive.path) for drive in drives]
         self._xy = shapely.get_coordinates(shapely.segmentize(paths, _SPACING))
@@ -148,24 +144,19 @@ class DriveViews:
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
     def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
-        """Returns which (N,) boxes have a place nearby.
+        """Returns which (N,) boxes have a viewing place within a distance [m].
 
-        Args:
-            limits: (N, 2, 2) least and greatest x and y [m].
-            distance: from a place to the circle about a box, at most [m].
+        Limits (N, 2, 2) are their least and greatest x and y [m]; a circle
+        about each box counts.
         """
         middles = limits.mean(axis=1)
         reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns panels' distances (N,) from the nearest viewing place [m].
+        """Returns distances (N,) of panels from the nearest viewing place [m].
 
-        The distance is infinite if no place within `most` sees the panel.
-
-        Args:
-            panels: N walls.
-            most: the greatest distance [m].
+        They are infinite if no place within `most` sees the panel.
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]
@@ -234,12 +225,10 @@ _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 @dataclass(frozen=True)
 class DressedBuildings:
-    """The result of dressing buildings.
+    """The dressed buildings, by what they were before.
 
-    Attributes:
-        buildings: before -> after.
-        at_random: kind of added detail -> its number.
-        by_file: kind of look that the file gives -> number of buildings.
+    Beside them are counts of added details by kind, and of buildings by the
+    kind of look that the file gives.
     """
 
     buildings: Mapping[Imported, Imported]
@@ -413,11 +402,8 @@ def _seen(
 ) -> tuple[list[Panel], np.ndarray]:
     """Returns the plane walls that drives see from near, and how near [m].
 
-    The nearest come first, within the budget of triangles.
-
-    Args:
-        walls: walls of each building, upright triangles (M, 3, 3) [m].
-        views: from the drives.
+    The nearest come first, within the budget of triangles. Walls of each
+    building are upright triangles (M, 3, 3) [m].
     """
     panels = [
         panel
@@ -442,14 +428,10 @@ _TERRAIN = "TINRelief"
 
 @dataclass(frozen=True)
 class Dressing:
-    """A dressed city.
+    """A dressed city, and the guessed ground with its class and colour.
 
-    Attributes:
-        city: dressed.
-        origins: name of a structure -> `dressed` or `lot`; all others are as
-            the file has them.
-        facts: counts of parts from the file and at random, to be written.
-        bottom: the guessed ground, with its class and colour.
+    Names of structures have the origin `dressed` or `lot`; all others are as
+    the file has them. Facts count parts from the file and at random.
     """
 
     city: StagedCity

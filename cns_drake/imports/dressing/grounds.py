@@ -253,13 +253,10 @@ def _area(structures: Sequence[Imported], near: BaseGeometry) -> BaseGeometry:
 def _laid(
     area: BaseGeometry, ground: np.ndarray, outlines: np.ndarray, above: float
 ) -> np.ndarray:
-    """Returns an area laid on a ground, as triangles (N, 3, 3) [m].
+    """Returns an area laid above a ground, as triangles (N, 3, 3) [m].
 
-    Args:
-        area: from above.
-        ground: triangles (M, 3, 3) that look upwards and meet it [m].
-        outlines: (M,) theirs from above.
-        above: height above it [m].
+    Triangles (M, 3, 3) of the ground look upwards and meet the area; outlines
+    (M,) are theirs from above.
     """
     pieces = shapely.intersection(outlines, area, grid_size=_GRID)
     found = [np.zeros((0, 3, 3))]

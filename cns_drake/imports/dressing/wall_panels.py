@@ -66,12 +66,7 @@ class Panel:
     def place(
         self, x: np.ndarray, z: np.ndarray, out: np.ndarray | float = 0.0
     ) -> np.ndarray:
-        """Returns places (..., 3) of the panel's coordinates [m].
-
-        Args:
-            x, z: along the panel and up, from its origin [m].
-            out: distance outwards [m].
-        """
+        """Returns places (..., 3) at x, z and outwards of the panel [m]."""
         places = np.empty((*np.shape(x), 3))
         for k in range(2):
             places[..., k] = (
@@ -148,10 +143,8 @@ def _plane_pieces(
 ) -> list[Panel]:
     """Divides a wall that bends into pieces, each as long as it is plane.
 
-    Args:
-        wall: the whole wall.
-        facets: (M,) number of the plane piece of each triangle.
-        triangles, normals, areas: see `_panel`.
+    Facets (M,) number the plane piece of each triangle; for the others see
+    `_panel`.
     """
     x = (triangles[..., :2] - wall.origin[:2]).mean(axis=1) @ wall.along
     starts = [x[facets == number].min() for number in range(facets.max() + 1)]

@@ -185,11 +185,8 @@ def simplified_drive(
 ) -> WaypointDrive | Obstacle:
     """Returns a drive with as few waypoints as the room allows.
 
-    Args:
-        xy: (N, 2) places to pass, about 1 m apart [m].
-        space: where a car has room.
-        tolerances: greatest distances of its waypoints from these places,
-            tried in turn [m].
+    It passes places (N, 2), about 1 m apart, within tolerances that are tried
+    in turn [m].
     """
     found: WaypointDrive | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):

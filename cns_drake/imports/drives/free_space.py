@@ -75,10 +75,9 @@ class FreeSpace:
         return self.clearance[self.cells(xy)]
 
     def obstacle(self, path: np.ndarray) -> np.ndarray | None:
-        """Returns the first (2,) place of a path where a car has no room.
+        """Returns the first (2,) place of a path without room for a car.
 
-        Args:
-            path: (N, 2) places, close together [m].
+        The places (N, 2) of the path are close together [m].
         """
         narrow = self.clearance_at(path) < self.least - _SLACK
         hit = self.walls.query(shapely.points(path), "dwithin", _HALF_CAR)[0]

@@ -80,12 +80,10 @@ class WaypointDrive:
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointDrive | Obstacle:
-    """Returns the drive along waypoints, or the obstacle.
+    """Returns the drive along waypoints (N, 2) or (N, 3), or the obstacle [m].
 
-    Args:
-        waypoints: (N, 2) or (N, 3), at least two [m].
-        room: checked on the whole path.
-        margin: least radius of bends, in tightest radii of the car.
+    The whole path needs room, and bends a margin: their least radius, in
+    tightest radii of the car.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))
@@ -117,8 +115,7 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
 def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns the places (M, 2) of a path, and the radii (M,) of its bends.
 
-    Args:
-        points: (N, 2) the control points of its spline, evenly spaced [m].
+    The control points (N, 2) of its spline are evenly spaced [m].
     """
     reach = _DEGREE // 2
     points = np.concatenate(
@@ -151,12 +148,9 @@ class WayGraph(ABC):
         after: np.ndarray,
         costs: np.ndarray | None = None,
     ):
-        """Makes the graph.
+        """Links pieces of lengths (N,); `before` (L,) leads into `after` [m].
 
-        Args:
-            lengths: (N,) lengths of the pieces [m].
-            before, after: (L,) numbers of pieces; `before` leads into `after`.
-            costs: (L,) from middle to middle; the length if None [m].
+        Costs (L,) are from middle to middle, lengths if None [m].
         """
         self.lengths = lengths
         if costs is None:
@@ -168,9 +162,7 @@ class WayGraph(ABC):
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
         """Returns (N,) bool: the pieces that an arm must not use.
 
-        Args:
-            pieces: the pieces in use by drives.
-            joint: the piece among them where the arm begins.
+        Drives use some pieces; the arm begins at one of them, the joint.
         """
 
     @abstractmethod

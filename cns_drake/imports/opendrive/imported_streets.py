@@ -72,8 +72,7 @@ def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
 def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
     """Yields the corners of areas where an edge steps to the left.
 
-    Args:
-        xy: (N, 2) corners of a ring with the carriageway on its left [m].
+    A ring of corners (N, 2) has the carriageway on its left [m].
     """
     steps = np.roll(xy, -1, axis=0) - xy
     lengths = np.hypot(*steps.T)
@@ -119,11 +118,8 @@ def _straight_on(xy: np.ndarray, ahead: np.ndarray) -> int:
 def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     """Returns the first corners (M, 2) of an edge that goes straight on.
 
-    Where it soon steps back, the corner behind that step is the last one.
-
-    Args:
-        xy: (N, 2) corners of a ring, with the carriageway on its left [m].
-        ahead: (2,) unit vector.
+    A ring of corners (N, 2) has the carriageway on its left [m]. Where it soon
+    steps back, the corner behind that step is the last one.
     """
     last = _straight_on(xy, ahead)
     if 0 < last < len(xy) - 2 and _straight_on(xy[last + 1 :], ahead):

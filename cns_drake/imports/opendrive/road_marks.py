@@ -85,11 +85,9 @@ def as_triangles(quads: np.ndarray) -> np.ndarray:
 
 
 def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
-    """Returns the parts of quads on a carriageway, as triangles (M, 3, 3) [m].
+    """Returns the parts of quads (K, 4, 3) on a prepared carriageway [m].
 
-    Args:
-        quads: (K, 4, 3), seen from above [m].
-        carriageway: prepared.
+    They are triangles (M, 3, 3), cut as seen from above.
     """
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
@@ -192,15 +190,10 @@ def _painted(
     end: float,
     carriageway: BaseGeometry | None,
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yields colours, and the quads (K, 4, 3) on a border [m].
+    """Yields colours, and the quads (K, 4, 3) on a border (N, 3) [m].
 
-    Args:
-        border: (N, 3) places [m].
-        s, heading: (N,) the road's there [m, rad].
-        marks: along it.
-        side: positive if outwards is to the left.
-        end: where the last mark ends along the road [m].
-        carriageway: see `road_marks`.
+    The road has headings (N,) at distances s (N,) along it [rad, m]; its last
+    mark ends at `end`. The side is positive if outwards is to the left.
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]

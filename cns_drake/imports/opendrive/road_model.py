@@ -301,12 +301,9 @@ class Lane:
 
 @dataclass(frozen=True)
 class LaneSection:
-    """A stretch of road with the same lanes.
+    """A stretch of road with the same lanes, from start to end [m].
 
-    Attributes:
-        start, end: along the road [m].
-        lanes: without the middle one, by their number.
-        middle_marks: on the middle, one after the other.
+    The middle one is not among its lanes by number, but has marks.
     """
 
     start: float
@@ -381,9 +378,7 @@ class ImportedRoad:
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Returns (N, 5) x, y, z, heading and roll of the reference line.
 
-        Args:
-            s: (N,) along the road [m].
-            inside: see `Cubics.at`.
+        For distances (N,) along the road [m], see `Cubics.at`.
         """
         starts = np.array([piece.s for piece in self.pieces])
         index = np.searchsorted(starts, inside, side="right") - 1
@@ -400,12 +395,9 @@ class ImportedRoad:
     def points(
         self, s: np.ndarray, inside: np.ndarray, t: np.ndarray
     ) -> np.ndarray:
-        """Returns (N, 3) places beside the reference line [m].
+        """Returns (N, 3) places t (N,) to the left of the reference line [m].
 
-        Args:
-            s: (N,) along the road [m].
-            inside: see `Cubics.at`.
-            t: (N,) to the left of it [m].
+        For distances (N,) along the road [m], see `Cubics.at`.
         """
         x, y, z, heading, roll = self.reference(s, inside).T
         across = t * np.cos(roll)
@@ -421,12 +413,10 @@ class ImportedRoad:
 
 @dataclass(frozen=True)
 class RoadMap:
-    """All roads of a file.
+    """All roads of a file, in its order.
 
-    Attributes:
-        roads: in the order of the file.
-        reference_system: as the file names it.
-        origin: (3,) the world's origin in the file's coordinates [m].
+    The reference system is as the file names it, and the origin that of the
+    world in its coordinates [m].
     """
 
     roads: tuple[ImportedRoad, ...]

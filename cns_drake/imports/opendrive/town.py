@@ -68,18 +68,10 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Town:
-    """A town, and the result of its import.
+    """A town in all its stages, and the counts of its import.
 
-    Attributes:
-        roads: the file's roads.
-        seed: the seed of the random draws.
-        city: everything, in all stages.
-        stages: the differences between the stages.
-        streets: the areas of the roads that lie on the ground.
-        drives: two, or fewer, through it.
-        lanes: the text of the file of lanes; None without lanes for traffic.
-        kinds: kind of thing -> number.
-        faults: counts of repaired and omitted parts.
+    Streets are on the ground, and there are at most two drives. The text of the
+    file of lanes is None without lanes for traffic.
     """
 
     roads: RoadMap

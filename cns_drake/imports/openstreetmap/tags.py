@@ -311,11 +311,8 @@ class LaneLayout(NamedTuple):
     def offset(self, is_forward: bool, number: int) -> float:
         """Returns the place of a lane, from the middle of the street [m].
 
-        To the side on which traffic keeps, in the lane's own direction.
-
-        Args:
-            is_forward: whether it leads along the street's line.
-            number: the lane's in its direction, 0 for the innermost one.
+        To the side on which traffic keeps, in the direction of the lane. Number
+        0 is the innermost one.
         """
         same, other = self.forward, self.backward
         if not is_forward:

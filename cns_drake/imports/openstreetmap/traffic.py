@@ -60,12 +60,9 @@ class StreetWalkways:
     ):
         """Finds the walkways.
 
-        Args:
-            streets: for cars.
-            paths: (N, 2) middles of ways for people [m].
-            crossed: nodes of streets at which people cross.
-            sidewalks: area of sidewalks and paths.
-            height: how high sidewalks stand above the streets [m].
+        Paths (N, 2) are middles of ways for people [m], who cross at some nodes
+        of streets. Sidewalks and paths have an area, at a height above the
+        streets [m].
         """
         walked = sidewalks.buffer(-_FROM_EDGE, quad_segs=2)
         shapely.prepare(walked)
@@ -252,13 +249,10 @@ _ABOVE, _BELOW = 0.3, 3.5
 
 @dataclass(frozen=True)
 class Stretch:
-    """A street between two junctions.
+    """A street between two junctions, with its middle (N, 2) and lanes.
 
-    Attributes:
-        street: the whole one.
-        line: (N, 2) its middle, with rounded corners, evenly spaced [m].
-        nodes: numbers of its first and last place.
-        layout: its lanes.
+    That line has rounded corners and is evenly spaced [m]; the nodes are those
+    of its first and last place.
     """
 
     street: Street
@@ -279,13 +273,9 @@ class Stretch:
 
 @dataclass(frozen=True)
 class _Lane:
-    """A lane of a stretch.
+    """A lane of a stretch, with points (N, 2) in driving direction [m].
 
-    Attributes:
-        stretch: number of the stretch.
-        is_forward: whether it leads along the stretch's line.
-        number: 0 for the innermost lane of its direction.
-        points: (N, 2) in driving direction [m].
+    Its number is 0 for the innermost one of its direction.
     """
 
     stretch: int
@@ -518,14 +508,11 @@ def _rounded(line: np.ndarray) -> np.ndarray:
 
 
 def _beside(lanes: Sequence[_Lane]) -> Mapping[int, int]:
-    number = {
-        (lane.stretch, lane.is_forward, lane.number): k
-        for k, lane in enumerate(lanes)
-    }
+    # The lanes of a direction follow each other, from the inside out.
     return {
-        k: number[outer]
-        for (stretch, is_forward, of), k in number.items()
-        if (outer := (stretch, is_forward, of + 1)) in number
+        k: k + 1
+        for k, (one, other) in enumerate(pairwise(lanes))
+        if (one.stretch, one.is_forward) == (other.stretch, other.is_forward)
     }
 
 

@@ -217,13 +217,13 @@ def test_a_house_is_the_same_whatever_else_the_file_holds(row, tmp_path):
 
 def test_a_lower_house_has_the_colours_of_the_whole_one(row):
     city = type(row)(row.structures, row.origin, "", ImportFaults())
-    staged, growth = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
-    assert growth.lower
+    staged, changes = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
+    assert changes["part_of_height"]
     drives = [WaypointDrive(STREET, STREET)]
     ground = ground_of(staged.kept)
     found = dress_buildings(staged.kept, drives, (), ground, 0)
     new = {o.structure.name: o for o in found.buildings.values()}
-    for name in growth.lower:
+    for name in changes["part_of_height"]:
         whole, low = new[name], new[f"{name}_lower"]
         rgb = [
             {p.name: p.rgb for p in one.structure.model.parts}
