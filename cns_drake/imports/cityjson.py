@@ -425,13 +425,9 @@ def import_structures(
 ) -> list[Imported]:
     """Returns a structure for each object that has a surface.
 
-    A building with its parts is one.
-
-    Args:
-        city: the content of the file; its faults are extended.
-        origin: (3,) the world's origin in the file's coordinates [m].
-        lod: level of detail to take; the highest of each object if None.
-        year_attribute: see `construction_year`.
+    A building with its parts is one. The world has an origin (3,) in the file's
+    coordinates [m]. If the level of detail is None, each object has its highest
+    one.
     """
     groups = _families(city)
     names = _unique_names(groups)

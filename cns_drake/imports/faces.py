@@ -31,11 +31,8 @@ def face_triangles(
 ) -> np.ndarray:
     """Returns a face as (M, 3, 3) triangles [m], turned as its outer ring.
 
-    Args:
-        rings: (N, 3) corners of the outer ring, then of holes [m], without
-            repeated corners.
-        name: the object's name, for the faults.
-        faults: counts repaired faces and those left out.
+    Rings (N, 3) are the outer one, then holes [m], without repeated corners.
+    Faces that are repaired or left out are counted.
     """
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
@@ -263,12 +260,8 @@ def surface_samples(
 ) -> Iterator[np.ndarray]:
     """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
 
-    No place on a triangle is farther from all of them than the spacing.
-
-    Args:
-        triangles: to sample.
-        spacing: greatest distance from a place to a point [m].
-        window: (2,) least and greatest x and y; points outside are left out.
+    No place on a triangle is farther from all of them than the spacing. Points
+    outside of a window, least and greatest x and y (2,), are left out.
     """
     while len(triangles):
         if window is not None:
@@ -311,10 +304,9 @@ def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _parts(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the ends of equal parts of N things, as shares from 0 to 1.
+    """Returns the ends of counted (N,) equal parts of N things.
 
-    Args:
-        counts: (N,) number of parts of each.
+    They are (M,) number of the thing, and (M,) share from 0 to 1.
 
     Returns:
         (M,) number of the thing, and (M,) share.

@@ -1,9 +1,11 @@
 """An imported city, independent of its file format."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 import hashlib
+from itertools import pairwise
 
 import numpy as np
 
@@ -83,14 +85,10 @@ class Imported:
 
 @dataclass(frozen=True)
 class Thing:
-    """A small thing of a file, such as a bench.
+    """A small thing of a file, such as a bench, at a place [m].
 
-    Attributes:
-        source: name of its element in the file.
-        element: kind of that element, as the file has it.
-        kind: a key of `cns_drake.city.placement.objects.OBJECTS`.
-        xy: its place [m].
-        yaw: its heading, if known [rad].
+    Its source is the name of its element in the file, and its kind a key of
+    `cns_drake.city.placement.objects.OBJECTS`. It may have a heading [rad].
     """
 
     source: str
@@ -122,6 +120,36 @@ class Street:
     width: float = 0.0
     name: str = ""
     tags: Mapping[str, str] = field(default_factory=dict)
+
+
+def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
+    """Returns node -> number of ends of streets there, two where one passes."""
+    ends: Counter[int] = Counter()
+    for street in streets:
+        last = len(street.nodes) - 1
+        for k, node in enumerate(street.nodes):
+            ends[node] += 1 if k in (0, last) else 2
+    return ends
+
+
+def cut_at_nodes(
+    streets: Sequence[Street], also: AbstractSet[int] = frozenset()
+) -> Iterator[tuple[Street, np.ndarray, tuple[int, int]]]:
+    """Yields pieces of streets: the street, the line, first and last node.
+
+    Streets are cut where they meet, and at other nodes.
+    """
+    uses = Counter(node for street in streets for node in street.nodes)
+    for street in streets:
+        last = len(street.nodes) - 1
+        cuts = [
+            k
+            for k, node in enumerate(street.nodes)
+            if k in (0, last) or uses[node] > 1 or node in also
+        ]
+        for first, after in pairwise(cuts):
+            ends = street.nodes[first], street.nodes[after]
+            yield street, street.line[first : after + 1], ends
 
 
 @dataclass(frozen=True)
@@ -182,17 +210,9 @@ def make_imported(
 ) -> Imported:
     """Returns a structure of triangles in the world.
 
-    Args:
-        name: unique in the city.
-        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        kind: type of its object.
-        surfaces: part -> its triangles (M, 3, 3) [m]; empty parts are left
-            out, not all are empty.
-        colours: part -> diffuse colour; by default that of the class.
-        year: in which it was built, if known.
-        until: in which it was demolished, if it was.
-        tags: its tags or attributes in the file.
-        lod: level of detail; 0 if unknown.
+    Its name is unique in the city. Each part of its surface has triangles (M,
+    3, 3) [m]; empty parts are left out, and not all are empty. A part without a
+    colour has that of the class, a key of `scene.semantics.CLASS_IDS`.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -206,6 +226,16 @@ def make_imported(
     )
     structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
     return Imported(structure, kind, year, triangles, until, tags or {}, lod)
+
+
+def boxes_of(structures: Sequence[Imported]) -> np.ndarray:
+    """Returns the least and greatest coordinates (N, 2, 3) of each [m]."""
+    return np.array(
+        [
+            (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))
+            for one in structures
+        ]
+    )
 
 
 def to_mesh(triangles: np.ndarray) -> Mesh:

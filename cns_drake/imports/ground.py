@@ -32,13 +32,7 @@ _EVERY_CORNER = 7
 
 
 class Ground:
-    """Heights on a grid.
-
-    Attributes:
-        xs, ys: (C,) and (R,) of the grid [m].
-        z: (R, C) heights there [m].
-        cell: distance of its lines [m].
-    """
+    """Heights z (R, C) on a grid of xs (C,) and ys (R,), evenly spaced [m]."""
 
     def __init__(self, xs: np.ndarray, ys: np.ndarray, z: np.ndarray):
         self.xs, self.ys, self.z = xs, ys, z

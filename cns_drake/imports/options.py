@@ -32,11 +32,6 @@ class ImportFaults:
         self._counts[kind] += number
         self._examples.setdefault(kind, _printable(example))
 
-    def extend(self, others: ImportFaults) -> None:
-        """Adds the counts of others, found later."""
-        self._counts += others._counts
-        self._examples = {**others._examples, **self._examples}
-
     def take_back(self, kind: str) -> None:
         """Counts one fault less of a kind that has some."""
         kind = _printable(kind)

@@ -17,11 +17,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
-from cns_drake.city.geometry.upper_sides import (
-    UpperSides,
-    looks_up,
-    turned_up,
-)
+from cns_drake.city.geometry.upper_sides import UpperSides, looks_up, turned_up
 from cns_drake.imports.dressing import facade_pieces, grounds
 from cns_drake.imports.dressing.facade_pieces import FacadePlan
 from cns_drake.imports.dressing.street_dressing import dress_streets
@@ -249,18 +245,10 @@ def dress_buildings(
 
     A building looks the same in each stage and each import, since its random
     draws depend on its name. Only the choice of walls with windows depends on
-    the drives, whose neighbourhood gets them.
-
-    Args:
-        structures: those of all stages.
-        drives: through the city; without any no wall has windows.
-        streets: streets of the file; doors and shops face them.
-        ground: below the city.
-        seed: seed of the random draws.
-        always: structures of all stages, which hide what is behind them; all
-            structures if None.
-        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
-            which doors stand [m].
+    the drives, whose neighbourhood gets them. Structures of all stages,
+    `always`, hide what is behind them; all structures do if it is None. Doors
+    and shops face streets, and doors stand above the paving, triangles (M, 3,
+    3) of terrain, streets and sidewalks [m].
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = all_laid_bare(buildings, ground, seed)

@@ -245,10 +245,7 @@ _EXACT, _LEAST_AREA = 1e-3, 1e-4
 
 
 def add_facade(
-    out: Assembly,
-    plan: FacadePlan,
-    to_drive: float,
-    rng: np.random.Generator,
+    out: Assembly, plan: FacadePlan, to_drive: float, rng: np.random.Generator
 ) -> Counter[str]:
     """Adds all parts of a wall; returns how many details of each kind.
 
@@ -450,10 +447,7 @@ def _add_balconies(out: Assembly, plan: FacadePlan, to_drive: float) -> int:
 
 
 def _add_signs(
-    out: Assembly,
-    plan: FacadePlan,
-    to_drive: float,
-    rng: np.random.Generator,
+    out: Assembly, plan: FacadePlan, to_drive: float, rng: np.random.Generator
 ) -> Counter[str]:
     """Adds the signs and awnings above shop windows."""
     shops = [o for o in plan.openings if o.kind == "shop"]

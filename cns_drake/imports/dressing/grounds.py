@@ -1,6 +1,5 @@
 """The ground of a dressed city: kerbs, sidewalks, streets, paving, marks."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -16,7 +15,13 @@ from cns_drake.city.geometry.upper_sides import looks_up, turned_up
 from cns_drake.imports.dressing.wall_panels import joined
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.faces import flat_surface, parts_of
-from cns_drake.imports.foreign_city import Imported, Rgb, Street, make_imported
+from cns_drake.imports.foreign_city import (
+    Imported,
+    Rgb,
+    Street,
+    ends_at_nodes,
+    make_imported,
+)
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.options import ImportFaults
 
@@ -245,8 +250,7 @@ def _area(structures: Sequence[Imported], near: BaseGeometry) -> BaseGeometry:
     polygons = _upper_sides(structures, with_lower=False)
     shapely.prepare(near)
     return shapely.union_all(
-        polygons[shapely.intersects(near, polygons)],
-        grid_size=_GRID,
+        polygons[shapely.intersects(near, polygons)], grid_size=_GRID
     )
 
 
@@ -315,8 +319,7 @@ def paved_gaps(
         ):
             continue
         taken = shapely.union_all(
-            other[other_tree.query(part, "intersects")],
-            grid_size=_GRID,
+            other[other_tree.query(part, "intersects")], grid_size=_GRID
         )
         free = _cut(part, taken)
         inside = free.buffer(-_NARROWEST_GAP / 2.0, 2)
@@ -403,13 +406,12 @@ def lane_marks(
 
 def _junctions(streets: Sequence[Street]) -> shapely.MultiPoint:
     """Returns the places where more than two ends of streets meet."""
-    ends: Counter[int] = Counter()
-    places = {}
-    for street in streets:
-        last = len(street.nodes) - 1
-        for k, node in enumerate(street.nodes):
-            ends[node] += 1 if k in (0, last) else 2
-            places[node] = street.line[k]
+    ends = ends_at_nodes(streets)
+    places = {
+        node: place
+        for street in streets
+        for node, place in zip(street.nodes, street.line, strict=True)
+    }
     return shapely.MultiPoint([places[n] for n in ends if ends[n] > 2])
 
 

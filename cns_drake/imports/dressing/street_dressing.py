@@ -128,14 +128,9 @@ _TRUNK = 0.4
 class StreetThings:
     """The placed things.
 
-    Attributes:
-        structures: in the world.
-        from_file: names of structures from the file.
-        moved: name of a tree of the file -> the same beside the carriageway.
-        sources: sources of the file's things that were placed.
-        by_file, at_random: kind -> how many.
-        no_room: how many of the file's things would stand in the way of a
-            drive, in a wall or in each other.
+    Those from the file are counted, those at random, and those of the file that
+    would stand in the way of a drive, in a wall or in each other. Trees of the
+    file that were on a carriageway are moved beside it.
     """
 
     structures: list[Imported] = field(default_factory=list)

@@ -93,11 +93,9 @@ def find_panels(
 ) -> list[Panel]:
     """Returns the panels of the walls of buildings.
 
-    Args:
-        walls: walls of each building, upright triangles (M, 3, 3) that look
-            outwards [m].
-        is_wanted: maps the least and greatest x and y of N panels, (N, 2, 2)
-            [m], to which (N,) are wanted; all if None.
+    Walls of each building are upright triangles (M, 3, 3) that look outwards
+    [m]. If not all panels are wanted, `is_wanted` maps the least and greatest x
+    and y of N of them, (N, 2, 2) [m], to (N,) bool.
     """
     triangles = joined(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
@@ -172,13 +170,10 @@ def _connected(
     building: np.ndarray,
     least: float,
 ) -> np.ndarray:
-    """Returns the number (M,) of each triangle's panel.
+    """Returns the number (M,) of the panel of each triangle (M, 3, 3) [m].
 
-    Args:
-        triangles: (M, 3, 3) [m].
-        normals: (M, 3), of unit length.
-        building: (M,) number of its building.
-        least: product of the normals of neighbours in one panel.
+    Unit normals (M, 3) of neighbours in one panel have at least a product. A
+    panel is part of one building, numbered (M,).
     """
     corners = np.rint(triangles * _MM).astype(np.int64).reshape(-1, 3)
     keyed = np.column_stack([np.repeat(building, 3), corners])
@@ -205,13 +200,10 @@ def _panel(
     areas: np.ndarray,
     bent: float = _BENT,
 ) -> Panel:
-    """Returns the panel of connected triangles.
+    """Returns the panel of connected triangles (M, 3, 3) of a building [m].
 
-    Args:
-        building: its number.
-        triangles: (M, 3, 3) [m].
-        normals, areas: (M, 3) as long as the areas, and these (M,) [m^2].
-        bent: how far the triangles of a plane may lie apart across it [m].
+    Normals (M, 3) are as long as the areas (M,) [m^2]. The triangles of a plane
+    lie apart across it by no more than `bent` [m].
     """
     corners = triangles.reshape(-1, 3)
     # The mean over areas: small triangles have imprecise normals.

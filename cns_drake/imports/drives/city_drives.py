@@ -13,7 +13,11 @@ from shapely.geometry import LineString
 from cns_drake.imports.drives import search
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import Obstacle, WaypointDrive
-from cns_drake.imports.foreign_city import SHARPEST_TURN_DEG, Street
+from cns_drake.imports.foreign_city import (
+    SHARPEST_TURN_DEG,
+    Street,
+    cut_at_nodes,
+)
 from cns_drake.imports.options import DriveOn
 
 # Paths prefer this distance from walls [m].
@@ -66,27 +70,12 @@ class Lane:
 
 def make_lanes(streets: Sequence[Street]) -> list[Lane]:
     """Returns the lanes of streets that meet."""
-    uses: defaultdict[int, int] = defaultdict(int)
-    for street in streets:
-        for node in street.nodes:
-            uses[node] += 1
     lanes: list[Lane] = []
-    way = 0
-    for street in streets:
-        last = len(street.nodes) - 1
-        cuts = [
-            k
-            for k, node in enumerate(street.nodes)
-            if k in (0, last) or uses[node] > 1
-        ]
-        for first, after in pairwise(cuts):
-            line = street.line[first : after + 1]
-            begin, end = street.nodes[first], street.nodes[after]
-            way += 1
-            if street.forward:
-                lanes.append(Lane(line, begin, end, street.aside, way))
-            if street.backward:
-                lanes.append(Lane(line[::-1], end, begin, street.aside, way))
+    for way, (street, line, (begin, end)) in enumerate(cut_at_nodes(streets)):
+        if street.forward:
+            lanes.append(Lane(line, begin, end, street.aside, way))
+        if street.backward:
+            lanes.append(Lane(line[::-1], end, begin, street.aside, way))
     return [lane for lane in lanes if lane.length > 0.0]
 
 

@@ -14,7 +14,7 @@ import shapely
 from shapely import STRtree
 
 from cns_drake.imports.faces import surface_samples
-from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.foreign_city import Imported, boxes_of
 from cns_drake.imports.ground import Ground
 
 CELL = 1.0  # [m]
@@ -209,12 +209,7 @@ def _largest(cells: np.ndarray) -> int:
 
 def _window(structures: Sequence[Imported]) -> _Window:
     """Returns the corners of the window in which room is searched."""
-    boxes = np.array(
-        [
-            (s.triangles.min(axis=(0, 1)), s.triangles.max(axis=(0, 1)))
-            for s in structures
-        ]
-    )[:, :, :2]
+    boxes = boxes_of(structures)[:, :, :2]
     middle = np.median(boxes.mean(axis=1), axis=0)
     low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)
     high = np.minimum(boxes[:, 1].max(axis=0), middle + _FARTHEST)

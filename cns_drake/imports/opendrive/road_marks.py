@@ -54,13 +54,10 @@ def moved_off_kerbs(
 ) -> np.ndarray:
     """Returns how far (N,) lines are moved to the left [m].
 
-    Where only one side of a border is carriageway, they lie on that side.
-
-    Args:
-        border: (N, 3) places of a border of lanes [m].
-        left: (N, 2) unit vectors to its left.
-        reach: how far the lines reach to the left and to the right of it [m].
-        carriageway: prepared.
+    Where only one side of a border of lanes, places (N, 3), is carriageway,
+    they lie on that side. Unit vectors (N, 2) lead to its left, and the lines
+    reach so far to the left and to the right of it [m]. The carriageway is
+    prepared.
     """
     xy = border[:, :2].copy()
     # A kerb may cross the very end.
@@ -123,15 +120,11 @@ def road_marks(
     heights: Callable[[np.ndarray], np.ndarray] | None = None,
     carriageway: BaseGeometry | None = None,
 ) -> Iterator[Structure]:
-    """Yields the marks of each road.
+    """Yields the marks of each road, whose names begin with a prefix.
 
-    Args:
-        prefix: how the names begin.
-        bands: lanes of the roads.
-        heights: gives the ground's at (N, 2) places [m]; the marks lie on the
-            borders of lanes if None.
-        carriageway: with kerbs all around, which the marks do not leave; lanes
-            have no kerbs if None [m].
+    Heights give the ground's at (N, 2) places [m]; marks lie on the borders of
+    lanes without them. They do not leave a carriageway with kerbs all around,
+    if there is one.
     """
     if carriageway is not None:
         shapely.prepare(carriageway)

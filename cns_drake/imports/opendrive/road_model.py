@@ -100,13 +100,10 @@ class Cubic:
     ):
         """Prepares the arc length.
 
-        Args:
-            u, v: four coefficients each, of p^0 first [m].
-            last: p at the end.
-            length: the curve's length in the file [m].
-            by_parameter: whether p is the distance itself.
-            stretched: whether the whole curve is scaled to that length; else it
-                ends where the length is reached.
+        Each coordinate has four coefficients, of p^0 first [m], and p is `last`
+        at the end, or the distance itself by `by_parameter`. The whole curve is
+        stretched to its length in the file [m], or else ends where that is
+        reached.
         """
         self._u, self._v = (np.polynomial.Polynomial(one) for one in (u, v))
         self._du, self._dv = self._u.deriv(), self._v.deriv()

@@ -33,10 +33,7 @@ _SIGNS = (
 # Beginning of a type -> class; all others are other objects.
 _CLASSES = (
     (("building",), "building"),
-    (
-        ("barrier", "railing", "guard", "fence", "wall", "soundbarrier"),
-        "fence",
-    ),
+    (("barrier", "railing", "guard", "fence", "wall", "soundbarrier"), "fence"),
     (("vegetation", "bush", "hedge", "plant"), "vegetation"),
     (("pole", "streetlamp", "lamp", "permanentdelineator"), "pole"),
     (("gantry", "bridge", "tunnel"), "other-structure"),

@@ -1,5 +1,6 @@
 """A town on an imported road network, and its files."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -169,11 +170,7 @@ def _build(
             ),
             structures=(
                 *street_surfaces(
-                    streets,
-                    surface,
-                    kerb,
-                    streets.coverings,
-                    ends,
+                    streets, surface, kerb, streets.coverings, ends
                 ),
                 *decks,
                 *things,
@@ -259,32 +256,26 @@ def _kinds(
     marks: Sequence[Structure],
     generated: Sequence[Structure],
 ) -> dict[str, int]:
-    junctions = {road.junction for road in roads.roads} - {None}
+    junctions = [
+        road.junction for road in roads.roads if road.junction is not None
+    ]
+    drawn = Counter(one.semantic_class for one in generated)
     kinds = {
-        "roads": sum(road.junction is None for road in roads.roads),
-        "roads in junctions": sum(
-            road.junction is not None for road in roads.roads
-        ),
-        "junctions": len(junctions),
+        "roads": len(roads.roads) - len(junctions),
+        "roads in junctions": len(junctions),
+        "junctions": len(set(junctions)),
         "signals": sum("signal" in one.tags for one in things),
         "objects": sum("object" in one.tags for one in things),
         "bridges": sum(one.semantic_class == "road" for one in decks),
         "roads with marks": len(marks),
-        "buildings, drawn at random": sum(
-            one.semantic_class == "building" for one in generated
-        ),
-        "plants, drawn at random": sum(
-            one.semantic_class == "vegetation" for one in generated
-        ),
+        "buildings, drawn at random": drawn["building"],
+        "plants, drawn at random": drawn["vegetation"],
     }
     return {kind: number for kind, number in kinds.items() if number}
 
 
 def write_town(
-    draft: Path,
-    source: Path,
-    town: Town,
-    progress: Callable[[str], None],
+    draft: Path, source: Path, town: Town, progress: Callable[[str], None]
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
     """Writes all files of a town to its folder, which has the map's name.
 

@@ -81,7 +81,7 @@ def object_of(tags: reading.Tags) -> str | None:
 
 
 def make_things(
-    nodes: Iterable[tuple[str, reading.Tags, tuple[float, float]]],
+    nodes: Iterable[reading.OsmNode],
     ways: Iterable[reading.OsmWay],
     kinds: Mapping[str, str],
     local: reading.Local,
@@ -279,7 +279,7 @@ def _barriers(
 
 
 def _trees(
-    trees: Iterable[tuple[str, reading.Tags, tuple[float, float]]],
+    trees: Iterable[reading.OsmNode],
     local: reading.Local,
     faults: ImportFaults,
 ) -> Iterator[Imported]:

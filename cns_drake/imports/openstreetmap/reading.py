@@ -61,6 +61,10 @@ class Local:
         return shapely.transform(polygon, self)
 
 
+# A node: its id, tags and place [deg].
+OsmNode = tuple[str, Tags, tuple[float, float]]
+
+
 class OsmWay(NamedTuple):
     """A way: its id, tags, places [deg] and the numbers of its nodes."""
 
@@ -97,13 +101,9 @@ class OsmFeatures:
 
     areas: list[OsmArea] = field(default_factory=list)
     ways: list[OsmWay] = field(default_factory=list)
-    trees: list[tuple[str, Tags, tuple[float, float]]] = field(
-        default_factory=list
-    )
+    trees: list[OsmNode] = field(default_factory=list)
     crossings: list[tuple[int, Tags]] = field(default_factory=list)
-    nodes: list[tuple[str, Tags, tuple[float, float]]] = field(
-        default_factory=list
-    )
+    nodes: list[OsmNode] = field(default_factory=list)
     outers: dict[str, str] = field(default_factory=dict)
     kinds: dict[str, str] = field(default_factory=dict)
     faults: ImportFaults = field(default_factory=ImportFaults)
@@ -161,14 +161,12 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                         if member.type == "w" and member.role != "inner"
                     }
             elif isinstance(one, osmium.osm.Node) and one.location.valid():
-                if tags.get("natural") == "tree":
-                    place = (one.lon, one.lat)
-                    features.trees.append((f"n{one.id}", tags, place))
-                elif tags.get("highway") == "crossing":
+                is_tree = tags.get("natural") == "tree"
+                if not is_tree and tags.get("highway") == "crossing":
                     features.crossings.append((one.id, tags))
                 elif tags:
-                    place = (one.lon, one.lat)
-                    features.nodes.append((f"n{one.id}", tags, place))
+                    node = (f"n{one.id}", tags, (one.lon, one.lat))
+                    (features.trees if is_tree else features.nodes).append(node)
     except (
         RuntimeError,
         ValueError,

@@ -58,10 +58,8 @@ _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 class Bridges:
     """Ids of ways for cars and people above or below the ground.
 
-    Attributes:
-        over_streets: bridges over another street, or a railway.
-        level: all other bridges, at the height of the ground beside them.
-        tunnels: below it.
+    Bridges over another street, or a railway, and all others, at the level of
+    the ground beside them; and tunnels.
     """
 
     over_streets: AbstractSet[str] = frozenset()
@@ -174,10 +172,7 @@ def parapets(
 
 
 def street_surfaces(
-    ways: Iterable[OsmWay],
-    local: Local,
-    faults: ImportFaults,
-    bridges: Bridges,
+    ways: Iterable[OsmWay], local: Local, faults: ImportFaults, bridges: Bridges
 ) -> Iterator[Imported]:
     """Yields carriageways, and the sidewalks and paths beside them."""
     for kind, ids in (

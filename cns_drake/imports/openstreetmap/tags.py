@@ -105,16 +105,11 @@ def tag_value(
     where: tuple[str, ImportFaults] | None,
     least: float = 0.0,
 ) -> float | None:
-    """Returns the value of a tag; None if it has no valid one.
+    """Returns the value of a tag, as read; None if it has no valid one.
 
-    Args:
-        tags: a thing's tags.
-        key: the tag's key.
-        read: parser of its value.
-        most: greatest plausible value.
-        where: name of the thing, and the counts for values that cannot be
-            parsed or are implausible; None if they are counted elsewhere.
-        least: least plausible value.
+    Values that cannot be parsed, or are not from the least to the most
+    plausible one, are counted for the name of the thing `where` they are,
+    unless they are counted elsewhere.
     """
     text = tags.get(key)
     if text is None:

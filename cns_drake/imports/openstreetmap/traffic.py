@@ -1,6 +1,6 @@
 """Lanes and walkways of OpenStreetMap's streets, for traffic."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -20,6 +20,8 @@ from cns_drake.imports.foreign_city import (
     Imported,
     Street,
     StreetPlaces,
+    cut_at_nodes,
+    ends_at_nodes,
 )
 from cns_drake.imports.openstreetmap.tags import (
     LaneLayout,
@@ -40,6 +42,10 @@ _LEAST_STRIP = 4.0
 # A crossing or another strip begins within this distance of a strip [m].
 _NEAR, _NEAR_END = 1.5, 4.0
 _CROSSING_WIDTH, _CROSSING_HALF_WIDTH = 2.4, 0.8
+
+
+# A place on a strip: the number of the strip, and how far along it [m].
+_Place = tuple[int, float]
 
 
 class StreetWalkways:
@@ -75,14 +81,10 @@ class StreetWalkways:
             if strip.geom_type == "LineString" and strip.length >= _LEAST_STRIP
         ]
         self._tree = shapely.STRtree(self._strips)
-        self._nodes: dict[tuple[int, float], int] = {}
+        self._nodes: dict[_Place, int] = {}
         self.crossings: dict[int, lane_graph.Crossing] = {}
         over = []
-        arms: Counter[int] = Counter()
-        for street in streets:
-            last = len(street.nodes) - 1
-            for k, node in enumerate(street.nodes):
-                arms[node] += 1 if k in (0, last) else 2
+        arms = ends_at_nodes(streets)
         wanted = {node for node in crossed if arms[node] <= 2}
         for street in streets:
             for k, node in enumerate(street.nodes):
@@ -101,10 +103,7 @@ class StreetWalkways:
 
     def _crossing(
         self, street: Street, k: int
-    ) -> (
-        tuple[lane_graph.Crossing, tuple[tuple[int, float], tuple[int, float]]]
-        | None
-    ):
+    ) -> tuple[lane_graph.Crossing, tuple[_Place, _Place]] | None:
         """Returns a crossing and its places on strips; None without strips."""
         line = street.line
         along = line[min(k + 1, len(line) - 1)] - line[max(k - 1, 0)]
@@ -124,7 +123,7 @@ class StreetWalkways:
         course = np.column_stack([kerbs, np.zeros(2)])
         return lane_graph.make_crossing(course, _CROSSING_WIDTH), (first, last)
 
-    def _on_strip(self, place: np.ndarray) -> tuple[int, float] | None:
+    def _on_strip(self, place: np.ndarray) -> _Place | None:
         point = shapely.Point(place)
         near = self._tree.query_nearest(point, max_distance=_NEAR)
         if not len(near):
@@ -132,12 +131,10 @@ class StreetWalkways:
         number = int(near[0])
         return number, float(self._strips[number].project(point))
 
-    def _node(self, place: tuple[int, float]) -> int:
+    def _node(self, place: _Place) -> int:
         return self._nodes.setdefault(place, len(self._nodes))
 
-    def _links(
-        self,
-    ) -> Iterator[tuple[tuple[int, float], tuple[int, float]]]:
+    def _links(self) -> Iterator[tuple[_Place, _Place]]:
         """Yields pairs of ends of strips between which people can walk."""
         ends = [
             (k, s)
@@ -178,17 +175,13 @@ class StreetWalkways:
                 )
 
     def _way(
-        self, a: tuple[int, float], b: tuple[int, float], crossing: int = -1
+        self, a: _Place, b: _Place, crossing: int = -1
     ) -> lane_graph.Walkway:
         places = [self._strips[k].interpolate(s) for k, s in (a, b)]
         return self._walkway(shapely.get_coordinates(places), a, b, crossing)
 
     def _walkway(
-        self,
-        line: np.ndarray,
-        a: tuple[int, float],
-        b: tuple[int, float],
-        crossing: int = -1,
+        self, line: np.ndarray, a: _Place, b: _Place, crossing: int = -1
     ) -> lane_graph.Walkway:
         height = np.full(len(line), self._height)
         return lane_graph.Walkway(
@@ -338,10 +331,7 @@ class StreetTraffic:
         for first, last, is_junction, line in self._ways(lanes):
             if not surface.covers(shapely.LineString(line)):
                 continue
-            self.links += [
-                (first, len(self.lanes)),
-                (len(self.lanes), last),
-            ]
+            self.links += [(first, len(self.lanes)), (len(self.lanes), last)]
             limit = min(self.lanes[k].limit for k in (first, last))
             self.lanes.append(DirectedLane(_level(line), limit, is_junction))
 
@@ -462,27 +452,16 @@ class StreetTraffic:
 def _stretches(
     streets: Sequence[Street], crossed: AbstractSet[int]
 ) -> Iterator[Stretch]:
-    layouts: list[tuple[Street, LaneLayout]] = []
-    uses: defaultdict[int, int] = defaultdict(int)
-    for street in streets:
-        layout = lane_layout(street.tags, street.width)
-        if street.tags.get("highway") in _NO_TRAFFIC or not layout.width:
-            continue
-        layouts.append((street, layout))
-        for node in street.nodes:
-            uses[node] += 1
-    for street, layout in layouts:
-        last = len(street.nodes) - 1
-        cuts = [
-            k
-            for k, node in enumerate(street.nodes)
-            if k in (0, last) or uses[node] > 1 or node in crossed
-        ]
-        for first, after in pairwise(cuts):
-            line = street.line[first : after + 1]
-            if shapely.LineString(line).length > SPACING:
-                ends = street.nodes[first], street.nodes[after]
-                yield Stretch(street, _rounded(line), ends, layout)
+    used = [
+        street
+        for street in streets
+        if street.tags.get("highway") not in _NO_TRAFFIC
+        and lane_layout(street.tags, street.width).width
+    ]
+    for street, line, ends in cut_at_nodes(used, crossed):
+        if shapely.LineString(line).length > SPACING:
+            layout = lane_layout(street.tags, street.width)
+            yield Stretch(street, _rounded(line), ends, layout)
 
 
 def _rounded(line: np.ndarray) -> np.ndarray:
@@ -554,11 +533,7 @@ def lanes_of_streets(
     if not near:
         return None
     walks = StreetWalkways(
-        near,
-        places.paths,
-        places.crossed,
-        _sidewalks(structures, paths),
-        _KERB,
+        near, places.paths, places.crossed, _sidewalks(structures, paths), _KERB
     )
     surface = shapely.union_all(
         [
