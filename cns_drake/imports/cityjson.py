@@ -19,7 +19,7 @@ from cns_drake.base.files import check_regular
 from cns_drake.base.json_text import parse_json
 from cns_drake.imports import foreign_city
 from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.faces import face_triangles
+from cns_drake.imports.faces import face_triangles, joined
 from cns_drake.imports.foreign_city import ForeignCity, Imported, Rgb
 from cns_drake.imports.options import ImportFaults
 from cns_drake.imports.reference_systems import (
@@ -547,7 +547,7 @@ def _surfaces(
 
 def _volume(faces: list[np.ndarray]) -> float:
     """Returns the volume that triangles (M, 3, 3) enclose [m^3]."""
-    triangles = np.concatenate([np.zeros((0, 3, 3)), *faces])
+    triangles = joined(faces)
     if len(triangles) == 0:
         return 0.0
     a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)

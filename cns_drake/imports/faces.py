@@ -2,7 +2,7 @@
 
 Solids may have the roofs that OpenStreetMap describes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -24,6 +24,11 @@ _MM = 1000.0
 _LEAST_PART = 0.01  # [m^2]
 # The angles of a face of four corners; the second and last one fill it.
 _CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
+
+
+def joined(some: Iterable[np.ndarray]) -> np.ndarray:
+    """Returns all triangles (M, 3, 3) of any number of arrays."""
+    return np.concatenate([np.zeros((0, 3, 3)), *some])
 
 
 def face_triangles(
@@ -307,9 +312,6 @@ def _parts(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns the ends of counted (N,) equal parts of N things.
 
     They are (M,) number of the thing, and (M,) share from 0 to 1.
-
-    Returns:
-        (M,) number of the thing, and (M,) share.
     """
     owner = np.repeat(np.arange(len(counts)), counts + 1)
     first = np.cumsum(counts + 1) - counts - 1

@@ -13,7 +13,7 @@ from shapely.geometry import Point
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
-from cns_drake.imports.faces import surface_samples
+from cns_drake.imports.faces import joined, surface_samples
 from cns_drake.imports.foreign_city import Imported
 
 # Cells of a guessed ground, and how far it reaches beyond the city [m].
@@ -156,7 +156,7 @@ def bottom_of(
         name += "_"
     # The guessed ground must not cover streets and water.
     laid = [one.triangles for one in structures if one.is_ground]
-    covered = np.concatenate([np.zeros((0, 3, 3)), *laid])
+    covered = joined(laid)
     lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
     model = Model(
         (Part("surface", MeshShape(name)),),

@@ -115,7 +115,7 @@ def city_facts(
 
     If the first stage was drawn, its changes are among them.
     """
-    facts = {
+    facts: dict[str, object] = {
         "reference_system": city.reference_system or "unknown",
         **({"axes": list(city.axes)} if city.axes else {}),
         "origin": list(city.origin),
@@ -123,8 +123,11 @@ def city_facts(
         "years": dict(zip(stages, options.years, strict=False)),
     }
     if changes is not None:
-        draws = {"grow": options.grow, "seed": options.seed}
-        facts["first_stage_at_random"] = {**draws, **changes}
+        facts["first_stage_at_random"] = {
+            "grow": options.grow,
+            "seed": options.seed,
+            **changes,
+        }
     if dressing is not None:
         facts["dressing"] = dict(dressing.facts)
     return facts

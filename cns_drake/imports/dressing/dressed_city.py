@@ -26,9 +26,9 @@ from cns_drake.imports.dressing.wall_panels import (
     Panel,
     find_panels,
     is_upright,
-    joined,
 )
 from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import (
     ForeignCity,
     Imported,

@@ -12,9 +12,8 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape, Part, Structure
 from cns_drake.city.geometry.upper_sides import looks_up, turned_up
-from cns_drake.imports.dressing.wall_panels import joined
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.faces import flat_surface, parts_of
+from cns_drake.imports.faces import flat_surface, joined, parts_of
 from cns_drake.imports.foreign_city import (
     Imported,
     Rgb,

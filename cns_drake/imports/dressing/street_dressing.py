@@ -27,8 +27,8 @@ from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.imports.dressing.grounds import HALF_STREET
-from cns_drake.imports.dressing.wall_panels import joined
 from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import (
     Imported,
     Street,

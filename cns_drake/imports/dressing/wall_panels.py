@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades.details import WallFrame
 from cns_drake.city.geometry.upper_sides import long_normals, unit_normals
+from cns_drake.imports.faces import joined
 
 # A face is upright if the z of its unit normal is below this.
 _UPRIGHT = 0.02
@@ -74,11 +75,6 @@ class Panel:
             )
         places[..., 2] = self.origin[2] + z
         return places
-
-
-def joined(some: Iterable[np.ndarray]) -> np.ndarray:
-    """Returns all triangles (M, 3, 3) of any number of arrays."""
-    return np.concatenate([np.zeros((0, 3, 3)), *some])
 
 
 def is_upright(triangles: np.ndarray) -> np.ndarray:

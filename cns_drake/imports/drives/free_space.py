@@ -13,7 +13,7 @@ from scipy.ndimage import (
 import shapely
 from shapely import STRtree
 
-from cns_drake.imports.faces import surface_samples
+from cns_drake.imports.faces import joined, surface_samples
 from cns_drake.imports.foreign_city import Imported, boxes_of
 from cns_drake.imports.ground import Ground
 
@@ -105,8 +105,8 @@ def find_free_space(
         (in_water, [o for o in structures if _is_water(o)]),
     ):
         # All at once: thousands of small groups would take far longer.
-        triangles = [one.triangles for one in some]
-        for row, column in _cells(_joined(triangles), window):
+        surfaces = joined(one.triangles for one in some)
+        for row, column in _cells(surfaces, window):
             covered[row, column] = True
     walls = []
     for one in structures:
@@ -121,7 +121,7 @@ def find_free_space(
         free, on_roads = paved, True
     elif blocked.any():
         free &= _between(blocked)
-    outlines = _joined(walls)[:, [0, 1, 2, 0], :2]
+    outlines = joined(walls)[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
         _clearance(free),
@@ -133,10 +133,6 @@ def find_free_space(
 
 def _is_water(one: Imported) -> bool:
     return one.kind.startswith("Water")
-
-
-def _joined(triangles: Sequence[np.ndarray]) -> np.ndarray:
-    return np.concatenate([np.zeros((0, 3, 3)), *triangles])
 
 
 def _cells(

@@ -139,6 +139,7 @@ class WayGraph(ABC):
 
     Attributes:
         lengths: (N,) lengths of the pieces [m].
+        is_open: (N,) whether a car can drive along them, as far as is known.
     """
 
     def __init__(
@@ -156,7 +157,7 @@ class WayGraph(ABC):
         if costs is None:
             costs = (lengths[before] + lengths[after]) / 2.0
         self._links = (before, after, costs)
-        self._is_open = np.ones(len(lengths), dtype=bool)
+        self.is_open = np.ones(len(lengths), dtype=bool)
 
     @abstractmethod
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
@@ -192,20 +193,12 @@ class WayGraph(ABC):
 
     def links(self, closed: np.ndarray | None = None) -> csr_array:
         """Returns costs from piece to piece, without those closed (N,)."""
-        is_open = self._is_open if closed is None else self._is_open & ~closed
+        is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links
         kept = is_open[before] & is_open[after]
         size = (len(self.lengths), len(self.lengths))
         pairs = (before[kept], after[kept])
         return coo_array((costs[kept], pairs), size).tocsr()
-
-    def close(self, pieces: np.ndarray) -> None:
-        """Removes pieces that no car can drive along."""
-        self._is_open[pieces] = False
-
-    def open_pieces(self) -> np.ndarray:
-        """Returns the numbers of the pieces that are not closed."""
-        return np.flatnonzero(self._is_open)
 
 
 def find_drives(graph: WayGraph) -> list[WaypointDrive]:
@@ -217,7 +210,7 @@ def find_drives(graph: WayGraph) -> list[WaypointDrive]:
         first = graph.drive(way)
         if isinstance(first, WaypointDrive):
             break
-        graph.close(graph.blocked(way, first))
+        graph.is_open[graph.blocked(way, first)] = False
     else:
         return []
     for candidate in islice(_seconds(graph, way), _MOST_TRIES):
@@ -229,7 +222,7 @@ def find_drives(graph: WayGraph) -> list[WaypointDrive]:
 
 def _longest(graph: WayGraph) -> list[int]:
     """Returns about the longest of the shortest ways, [] if there is none."""
-    pieces = graph.open_pieces()
+    pieces = np.flatnonzero(graph.is_open)
     if len(pieces) == 0:
         return []
     links = graph.links()
@@ -287,14 +280,14 @@ def _seconds(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
         begins = every[(part[:-1] >= low) & (part[:-1] <= middle)]
         ends = every[(part[1:] >= 1.0 - middle) & (part[1:] <= high)][::-1]
         for begin in (*_some(begins, along), None):
-            start = begin if begin is not None else _nearest(part[:-1], low)
+            start = _nearest(part[:-1], low) if begin is None else begin
             head: list[int] = []
             if begin is not None:
                 head = _arm(graph, first, first[begin], backwards=True)
                 if not head:
                     continue
             for end in (*_some(ends, along), None):
-                stop = end if end is not None else _nearest(part[1:], high)
+                stop = _nearest(part[1:], high) if end is None else end
                 if begin is None and end is None:
                     continue
                 if part[stop + 1] - part[start] < _LEAST_SHARED:

@@ -3,7 +3,7 @@
 The course is made of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE 1.7,
 chapter 8, https://www.asam.net/standards/detail/opendrive"""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
@@ -18,6 +18,16 @@ _TURN = 0.5
 _MOST_TURN = 10_000.0
 _PANELS = 64
 _NEWTON_STEPS = 8
+
+
+def _integral(
+    rate: Callable[[np.ndarray], np.ndarray],
+    begin: np.ndarray,
+    size: np.ndarray,
+) -> np.ndarray:
+    """Returns the integrals (N,) of a rate over panels."""
+    nodes = begin[:, None] + size[:, None] * (_NODES + 1.0) / 2.0
+    return size / 2.0 * (rate(nodes) @ _WEIGHTS)
 
 
 # A curve has `evaluate`, which returns (N, 3) u, v [m] and heading [rad] in the
@@ -74,16 +84,9 @@ class Spiral:
 
     def _steps(self, begin: np.ndarray, length: np.ndarray) -> np.ndarray:
         """Returns (N, 2) from s = begin (N,) on, over lengths (N,) [m]."""
-        s = begin[:, None] + length[:, None] * (_NODES + 1.0) / 2.0
-        heading = self._heading(s)
-        scale = length / 2.0
-        return np.stack(
-            [
-                scale * (np.cos(heading) @ _WEIGHTS),
-                scale * (np.sin(heading) @ _WEIGHTS),
-            ],
-            axis=1,
-        )
+        u = _integral(lambda s: np.cos(self._heading(s)), begin, length)
+        v = _integral(lambda s: np.sin(self._heading(s)), begin, length)
+        return np.stack([u, v], axis=1)
 
 
 class Cubic:
@@ -131,8 +134,7 @@ class Cubic:
         return np.hypot(self._du(p), self._dv(p))
 
     def _arc(self, begin: np.ndarray, size: np.ndarray) -> np.ndarray:
-        p = begin[:, None] + size[:, None] * (_NODES + 1.0) / 2.0
-        return size / 2.0 * (self._speed(p) @ _WEIGHTS)
+        return _integral(self._speed, begin, size)
 
     def _parameter(self, arc: np.ndarray) -> np.ndarray:
         """Returns the parameter at an arc length, by Newton's rule."""

@@ -6,7 +6,7 @@ https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -80,20 +80,16 @@ def object_of(tags: reading.Tags) -> str | None:
     return name
 
 
-def make_things(
-    nodes: Iterable[reading.OsmNode],
-    ways: Iterable[reading.OsmWay],
-    kinds: Mapping[str, str],
-    local: reading.Local,
-) -> Iterator[Thing]:
+def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
     """Yields things at their nodes, and the trees of rows."""
-    for name, tags, place in nodes:
+    kinds = features.kinds
+    for name, tags, place in features.nodes:
         kind = object_of(tags)
         if kind is not None:
             x, y = local(np.array([place]))[0].tolist()
             direction = _direction(tags)
             yield Thing(name, kinds[name], kind, (x, y), direction)
-    for name, tags, line, _ in ways:
+    for name, tags, line, _ in features.ways:
         if tags.get("natural") == "tree_row":
             needles = tags.get("leaf_type") == "needleleaved"
             course = LineString(local(line))
@@ -182,9 +178,7 @@ def import_openstreetmap(
             tags.get("driving_side") == "left"
             for _, tags, _, _ in features.ways
         ),
-        things=list(
-            make_things(features.nodes, features.ways, features.kinds, local)
-        ),
+        things=list(make_things(features, local)),
     )
 
 

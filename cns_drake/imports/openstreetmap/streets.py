@@ -361,12 +361,12 @@ def ground_areas(
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
             continue
-        areas = map(local.polygon, polygons)
+        outlines = map(local.polygon, polygons)
         yield from laid(
             f"land_{name}",
             look.semantic_class,
             look.kind,
-            areas,
+            outlines,
             look.z,
             faults,
             look.rgb,

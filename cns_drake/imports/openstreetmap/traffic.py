@@ -62,17 +62,15 @@ class StreetWalkways:
         paths: Iterable[np.ndarray],
         crossed: Iterable[int],
         sidewalks: BaseGeometry,
-        height: float,
     ):
         """Finds the walkways.
 
         Paths (N, 2) are middles of ways for people [m], who cross at some nodes
-        of streets. Sidewalks and paths have an area, at a height above the
-        streets [m].
+        of streets. Sidewalks and paths have an area.
         """
         walked = sidewalks.buffer(-_FROM_EDGE, quad_segs=2)
         shapely.prepare(walked)
-        self._walked, self._height = walked, height
+        self._walked = walked
         lines = [*_sidewalk_lines(streets), *map(shapely.LineString, paths)]
         self._strips = [
             strip
@@ -183,7 +181,7 @@ class StreetWalkways:
     def _walkway(
         self, line: np.ndarray, a: _Place, b: _Place, crossing: int = -1
     ) -> lane_graph.Walkway:
-        height = np.full(len(line), self._height)
+        height = np.full(len(line), _KERB)
         return lane_graph.Walkway(
             lane_graph.resampled(np.column_stack([line, height])),
             _HALF_STRIP if crossing < 0 else _CROSSING_HALF_WIDTH,
@@ -533,7 +531,7 @@ def lanes_of_streets(
     if not near:
         return None
     walks = StreetWalkways(
-        near, places.paths, places.crossed, _sidewalks(structures, paths), _KERB
+        near, places.paths, places.crossed, _sidewalks(structures, paths)
     )
     surface = shapely.union_all(
         [
