@@ -156,10 +156,8 @@ def cut_at_nodes(
 class StreetPlaces:
     """Places on and beside streets, for traffic.
 
-    Attributes:
-        crossed: numbers of the streets' nodes at which people cross.
-        signals: (N, 2) [m].
-        paths: (M, 2) middles of ways for people [m].
+    Numbers of the nodes of streets at which people cross, signals (N, 2), and
+    middles (M, 2) of ways for people [m].
     """
 
     crossed: AbstractSet[int] = frozenset()

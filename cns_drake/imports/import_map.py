@@ -17,9 +17,10 @@ from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
 from cns_drake.imports import map_files
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
 from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
 from cns_drake.imports.drives.search import (
+    CellGraph,
+    StreetGraph,
     WaypointDrive,
     driven_path,
     find_drives,

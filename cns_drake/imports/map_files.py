@@ -181,11 +181,8 @@ def write_drives(
 ) -> None:
     """Writes routes, and scenarios of each through every stage.
 
-    Args:
-        folder: the map's folder, with the map's name.
-        stages: stage -> words for its time, the end of a title.
-        routes: waypoints (N, 3) of at most two [m].
-        cruise: speed on each [m/s].
+    A stage has words for its time, the end of a title. At most two routes have
+    waypoints (N, 3) [m], and a speed each [m/s].
     """
     for letter, waypoints in zip("ab", routes, strict=False):
         rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]

@@ -93,13 +93,11 @@ class ReferenceSystem:
 def reference_system(name: str, where: str) -> ReferenceSystem:
     """Returns the axes and units of a reference system.
 
-    Args:
-        name: an EPSG code, or a URL or URN of one, as the file has it.
-        where: the beginning of an error's message.
+    Its name is an EPSG code, or a URL or URN of one, as the file has it.
 
     Raises:
-        InputError: naming the system, if it is unknown, is in degrees, or has
-            axes that are not east, north and up.
+        InputError: naming place and system, if it is unknown, is in degrees, or
+            has axes that are not east, north and up.
     """
     if not name:
         return ReferenceSystem()

@@ -113,15 +113,10 @@ def _shares(one: BaseGeometry, other: BaseGeometry) -> bool:
 
 @dataclass(frozen=True)
 class StagedCity:
-    """The structures of a city, stage by stage.
+    """The structures of a city: those of each stage, and those of any.
 
-    Attributes:
-        standing: stage -> its structures.
-        kept: the structures of any stage.
-        undated: number of buildings without a year.
-        dated: number of buildings with a year.
-        gone: buildings that stand no more, if there is but one stage, that
-            of today.
+    Buildings have a year, dated, or none. If there is but one stage, that of
+    today, `gone` are the buildings that stand no more.
     """
 
     standing: dict[str, list[Imported]]

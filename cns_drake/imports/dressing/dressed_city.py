@@ -252,7 +252,7 @@ def dress_buildings(
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = all_laid_bare(buildings, ground, seed)
-    walls: Mapping[int, list[tuple[FacadePlan, float]]] = {}
+    walls: Mapping[int, list[FacadePlan]] = {}
     if drives and bare:
         lasting = set(buildings if always is None else always)
         hiding = [b.triangles for b in buildings if b in lasting]
@@ -274,14 +274,11 @@ def dress_buildings(
 
 def _dressed(
     some: Bare,
-    plans: Sequence[tuple[FacadePlan, float]],
+    plans: Sequence[FacadePlan],
     paths: BaseGeometry,
     seed: int,
 ) -> tuple[Model, Counter[str]]:
-    """Returns the model of a building, and counts of details added at random.
-
-    Plans of its dressed walls come with distances to the drives [m].
-    """
+    """Returns the model of a building, and counts of random details."""
     structure, style = some.one.structure, some.style
     footprint = structure.model.footprint
     out = Assembly(Site(Polygon(), structure.name), some.rng)
@@ -294,21 +291,19 @@ def _dressed(
         sign=style.sign,
         trim=style.trim,
     )
-    planned = {
-        one.tobytes() for plan, _ in plans for one in plan.panel.triangles
-    }
+    planned = {one.tobytes() for plan in plans for one in plan.panel.triangles}
     bare = [one for one in some.walls if one.tobytes() not in planned]
     walls = np.array(bare).reshape(-1, 3, 3)
     out.add_to("body", to_mesh(walls), to_mesh(some.rest))
     out.add_to("roof", to_mesh(some.roof))
     counts: Counter[str] = Counter()
-    for plan, distance in plans:
+    for plan in plans:
         # A name that does not depend on the map's origin.
         panel = plan.panel
         heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
         wall = f"wall {panel.length:.1f} {heading:.0f}"
         rng = random_generator(seed, wall, some.one.draw_name)
-        counts += facade_pieces.add_facade(out, plan, distance, rng)
+        counts += facade_pieces.add_facade(out, plan, rng)
     has_own_roof = some.one.lod >= _OWN_ROOF or not len(some.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
         facade_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
@@ -323,11 +318,8 @@ def _plans(
     ground: Ground,
     views: DriveViews,
     paving: UpperSides,
-) -> dict[int, list[tuple[FacadePlan, float]]]:
-    """Returns the walls to dress, and their distance to the drives [m].
-
-    The key is the number of the building.
-    """
+) -> dict[int, list[FacadePlan]]:
+    """Returns the number of a building -> its walls to dress."""
     walls = [
         some.walls if some.one.lod < _OWN_WINDOWS else np.zeros((0, 3, 3))
         for some in bare
@@ -348,8 +340,11 @@ def _plans(
             bare[panel.building].style,
             bare[panel.building].base,
             float(height),
+            float(distance),
         )
-        for panel, height in zip(panels, heights, strict=True)
+        for panel, height, distance in zip(
+            panels, heights, to_drive, strict=True
+        )
     ]
     solids = [some.one.triangles for some in bare]
     upper = UpperSides(np.concatenate(solids))
@@ -370,8 +365,7 @@ def _plans(
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for k, plan in enumerate(plans):
         groups[plan.panel.building].append(k)
-    found: dict[int, list[tuple[FacadePlan, float]]] = {}
-    for number, members in groups.items():
+    for members in groups.values():
         possible = [k for k in members if plans[k].on_street]
         # The wall with the building's door.
         front = min(possible, key=lambda k: (to_way[k], k), default=None)
@@ -381,8 +375,11 @@ def _plans(
                 plan = facade_pieces.with_shops(plan, paving)
             if k == front:
                 plan = facade_pieces.with_doors(plan, paving)
-            found.setdefault(number, []).append((plan, float(to_drive[k])))
-    return found
+            plans[k] = plan
+    return {
+        number: [plans[k] for k in members]
+        for number, members in groups.items()
+    }
 
 
 def _seen(

@@ -135,15 +135,11 @@ def _reach(xy: np.ndarray) -> float:
 
 
 class ImportedStreets:
-    """Areas of lanes on the ground, by kind.
+    """Areas of lanes on the ground, by kind [m].
 
-    Where two overlap, road comes before parking, that before other ground,
-    and sidewalks last.
-
-    Attributes:
-        junctions: the area of all junctions [m].
-        coverings: parts of the carriageway that are not road.
-        margins: lanes without a use, which stay free.
+    Where two overlap, road comes before parking, that before other ground, and
+    sidewalks last. Coverings are parts of the carriageway that are not road,
+    and margins are lanes without a use, which stay free.
     """
 
     def __init__(

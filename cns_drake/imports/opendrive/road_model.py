@@ -158,13 +158,9 @@ Shape = Arc | Spiral | Cubic
 
 @dataclass(frozen=True)
 class Piece:
-    """One element of a plan view.
+    """One element of a plan view, from s on along the road [m].
 
-    Attributes:
-        s: its start along the road [m].
-        x, y, heading: its first point in the world [m, rad].
-        length: its length [m].
-        shape: in the frame of that point.
+    Its shape is in the frame of its first point in the world [m, rad].
     """
 
     s: float

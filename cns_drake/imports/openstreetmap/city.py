@@ -155,15 +155,13 @@ def import_openstreetmap(
     limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
     found = [
         *make_buildings(buildings, local, year_attribute, faults, once=dressed),
-        *streets.street_surfaces(features.ways, local, faults, bridges),
-        *streets.crossing_stripes(
-            features.crossings, features.ways, local, faults
-        ),
-        *streets.ground_areas(features.areas, local, faults, dressed),
+        *streets.street_surfaces(features, local, bridges),
+        *streets.crossing_stripes(features, local),
+        *streets.ground_areas(features, local, dressed),
         *streets.sea(coasts, local, limits, faults),
         *streets.parapets(features.ways, bridges, local),
-        *_barriers(features.ways, local, faults),
-        *_trees(features.trees, local, faults),
+        *_barriers(features, local),
+        *_trees(features, local),
     ]
     also = bridges.left_out | {way.name for way in coasts}
     _count_unused(features, found, also)
@@ -254,9 +252,9 @@ def _count_unused(
 
 
 def _barriers(
-    ways: Iterable[reading.OsmWay], local: reading.Local, faults: ImportFaults
+    features: reading.OsmFeatures, local: Local
 ) -> Iterator[Imported]:
-    for name, tags, line, _ in ways:
+    for name, tags, line, _ in features.ways:
         kind = tags.get("barrier")
         if kind == "hedge":
             (width, usual), semantic_class = _HEDGE, "vegetation"
@@ -264,27 +262,24 @@ def _barriers(
             (width, usual), semantic_class = _WALL, "fence"
         else:
             continue
-        where = (name, faults)
+        where = (name, features.faults)
         high = tag_value(tags, "height", length, _TALLEST, where) or usual
         strip = LineString(local(line)).buffer(width / 2.0, cap_style="flat")
-        yield from streets.raised(
-            f"{kind}_{name}", semantic_class, "Barrier", [strip], high, where
-        )
+        look = streets.Look("Barrier", semantic_class, None, high)
+        yield from streets.raised(f"{kind}_{name}", look, [strip], where)
 
 
-def _trees(
-    trees: Iterable[reading.OsmNode],
-    local: reading.Local,
-    faults: ImportFaults,
-) -> Iterator[Imported]:
-    for name, tags, place in trees:
+def _trees(features: reading.OsmFeatures, local: Local) -> Iterator[Imported]:
+    for name, tags, place in features.trees:
         x, y = local(np.array([place]))[0].tolist()
         needles = tags.get("leaf_type") == "needleleaved"
         model = tree(
             # Editors give negative numbers to new things.
             np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
-            height=tag_value(tags, "height", length, _TALLEST, (name, faults))
+            height=tag_value(
+                tags, "height", length, _TALLEST, (name, features.faults)
+            )
             or None,
         )
         place_W = (round(x, 3), round(y, 3), 0.0)

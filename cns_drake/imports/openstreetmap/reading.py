@@ -86,17 +86,11 @@ class OsmArea(NamedTuple):
 class OsmFeatures:
     """The content of a file; places are longitude and latitude [deg].
 
-    Attributes:
-        areas: closed ways and multipolygons.
-        ways: with those of their places that are in the file.
-        trees: id, tags and place.
-        crossings: number of the node, and tags.
-        nodes: id, tags and place of all other nodes that have tags.
-        outers: id of each way that is an outline of a building's multipolygon
-            -> id of that.
-        kinds: id of each thing with tags -> its kind; nodes have `n` before
-            their number, ways `w` and relations `r`.
-        faults: counts of unreadable things.
+    Areas are closed ways and multipolygons. Ways have those of their places
+    that are in the file. Crossings are numbers of nodes with tags, and `nodes`
+    are all other ones that have tags. An outline of a building's multipolygon,
+    a way, leads to that in `outers`. All things with tags have a kind, by ids
+    with `n` before the number of a node, `w` of a way and `r` of a relation.
     """
 
     areas: list[OsmArea] = field(default_factory=list)

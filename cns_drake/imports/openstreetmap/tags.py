@@ -291,12 +291,7 @@ def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
 
 
 class LaneLayout(NamedTuple):
-    """Lanes of a street.
-
-    Attributes:
-        forward, backward: number of lanes along its line, and against it.
-        width: each lane's width [m].
-    """
+    """Lanes along the line of a street, and against it, of a width [m]."""
 
     forward: int
     backward: int

@@ -51,9 +51,7 @@ _Place = tuple[int, float]
 class StreetWalkways:
     """Strips of sidewalks and paths, and the crossings that join them.
 
-    Attributes:
-        walkways: all of them.
-        crossings: number of a street's node -> the crossing there.
+    A crossing has the number of the node of a street.
     """
 
     def __init__(
