@@ -18,6 +18,7 @@ Rgb = tuple[float, float, float]
 # Sharpest turn from one street into another.
 SHARPEST_TURN_DEG = 125.0
 RED_ROOF: Rgb = (0.55, 0.30, 0.24)
+_GROUND_CLASSES = ("road", "parking", "other-ground", "terrain")
 WATER: Rgb = (0.16, 0.34, 0.45)
 LAWN: Rgb = (0.42, 0.55, 0.30)
 
@@ -75,12 +76,7 @@ class Imported:
     @property
     def is_ground(self) -> bool:
         """Whether a car can drive over it, if it is flat."""
-        return self.structure.semantic_class in (
-            "road",
-            "parking",
-            "other-ground",
-            "terrain",
-        )
+        return self.structure.semantic_class in _GROUND_CLASSES
 
 
 @dataclass(frozen=True)

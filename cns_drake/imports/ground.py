@@ -106,11 +106,9 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
 
 def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
     """Returns the lowest corner (N, 3) of each solid of triangles (M, 3, 3)."""
-    found = []
-    for triangles in solids:
-        corners = triangles.reshape(-1, 3)
-        found.append(corners[corners[:, 2].argmin()])
-    return np.array(found).reshape(-1, 3)
+    corners = [triangles.reshape(-1, 3) for triangles in solids]
+    feet = [some[some[:, 2].argmin()] for some in corners]
+    return np.array(feet).reshape(-1, 3)
 
 
 def ground_of(
@@ -130,7 +128,9 @@ def ground_of(
     else:
         low = structures
         if below_bridges:
-            low = [one for one in structures if not _is_span(one)] or structures
+            spans = ("Bridge", "Tunnel")
+            firm = [o for o in structures if not o.kind.startswith(spans)]
+            low = firm or structures
         feet = [feet_of([o.triangles for o in low if not o.is_ground])]
         feet += [
             one.triangles.reshape(-1, 3)[::_EVERY_CORNER]
@@ -138,10 +138,6 @@ def ground_of(
             if one.is_ground
         ]
     return guess_ground(np.concatenate(feet), corners)
-
-
-def _is_span(one: Imported) -> bool:
-    return one.kind.startswith(("Bridge", "Tunnel"))
 
 
 def bottom_of(
@@ -155,8 +151,7 @@ def bottom_of(
     while name in taken:
         name += "_"
     # The guessed ground must not cover streets and water.
-    laid = [one.triangles for one in structures if one.is_ground]
-    covered = joined(laid)
+    covered = joined(one.triangles for one in structures if one.is_ground)
     lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
     model = Model(
         (Part("surface", MeshShape(name)),),

@@ -17,21 +17,14 @@ from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
 from cns_drake.imports import map_files
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
-from cns_drake.imports.drives.search import (
-    CellGraph,
-    StreetGraph,
-    WaypointDrive,
-    driven_path,
-    find_drives,
-    steerable_drive,
-)
+from cns_drake.imports.drives import search
+from cns_drake.imports.drives.free_space import find_free_space
+from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.ground import Ground, bottom_of, ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
 from cns_drake.imports.options import (
-    DriveOn,
     ImportFaults,
     ImportOptions,
     ImportReport,
@@ -84,7 +77,12 @@ def import_city(
     progress(f"{len(staged.kept)} structures; looking for streets")
     ground = ground_of(staged.kept, options.dressed)
     space = find_free_space(staged.kept, ground)
-    drives = own or _find_drives(city, space, options)
+    side = options.drive_on or ("left" if city.keeps_left else "right")
+    drives = (
+        own
+        or search.find_drives(search.StreetGraph(city.streets, space, side))
+        or search.find_drives(search.CellGraph(space))
+    )
     if options.within is not None:
         staged = staged.near(drives, options.within, city.faults)
         ground = ground_of(staged.kept, options.dressed)
@@ -107,7 +105,7 @@ def import_city(
             [*bare, *added],
             [o for o in added if o.kind not in ("Sidewalk", "Lane mark")],
             drives,
-            _side(city, options),
+            side,
         )
         if lanes is not None:
             (draft / LANES_NAME).write_text(lanes, "utf-8")
@@ -209,21 +207,6 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
     return import_openstreetmap(source, options.year_attribute, options.dressed)
 
 
-def _find_drives(
-    city: ForeignCity, space: FreeSpace, options: ImportOptions
-) -> list[WaypointDrive]:
-    """Returns drives in the lanes of streets, or else in free space."""
-    streets = StreetGraph(city.streets, space, _side(city, options))
-    return find_drives(streets) or find_drives(CellGraph(space))
-
-
-def _side(city: ForeignCity, options: ImportOptions) -> DriveOn:
-    """Returns the side of the streets on which traffic keeps."""
-    if options.drive_on is not None:
-        return options.drive_on
-    return "left" if city.keeps_left else "right"
-
-
 def drive_along(path: Path) -> WaypointDrive:
     """Returns a drive along waypoints of a file, without their heights.
 
@@ -232,7 +215,7 @@ def drive_along(path: Path) -> WaypointDrive:
     """
     points, _ = read_waypoints(path)
     control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
-    driven, radii = driven_path(control)
+    driven, radii = search.driven_path(control)
     radius, (x, y) = radii.min(), driven[radii.argmin()]
     if radius < TIGHTEST_RADIUS:
         raise InputError(
@@ -253,7 +236,9 @@ def _lifted(
     for drive in drives:
         xy = np.round(drive.waypoints, 3)
         waypoints = np.column_stack([xy, ground.height(xy)])
-        if isinstance(steerable_drive(waypoints, margin=1.0), WaypointDrive):
+        if isinstance(
+            search.steerable_drive(waypoints, margin=1.0), WaypointDrive
+        ):
             lifted.append(replace(drive, waypoints=waypoints))
         else:
             faults.add("drive too tight on its slope, left out", "drive")

@@ -61,16 +61,13 @@ def all_laid_bare(
     buildings: Sequence[Imported], ground: Ground, seed: int
 ) -> list[Bare]:
     """Returns all buildings, lower variants in the style of the original."""
-    whole = [
-        _laid_bare(one, ground, seed) for one in buildings if not one.original
-    ]
-    styles = {some.one.draw_name: some.style for some in whole}
-    lower = [
-        _laid_bare(one, ground, seed, styles.get(one.original))
-        for one in buildings
-        if one.original
-    ]
-    return whole + lower
+    found = []
+    styles: dict[str, Style] = {}
+    for one in sorted(buildings, key=lambda one: one.original != ""):
+        some = _laid_bare(one, ground, seed, styles.get(one.original))
+        styles[one.draw_name] = some.style
+        found.append(some)
+    return found
 
 
 def _laid_bare(
@@ -161,8 +158,12 @@ class DriveViews:
         number = np.repeat(np.arange(len(panels)), counts)
         place = np.concatenate([some for some, _ in pairs])
         distance = np.concatenate([some for _, some in pairs])
-        probes = np.stack([_probes(panel) for panel in panels])
-        is_seen = self._is_seen(probes[number], self._eyes[place])
+        probes = []
+        for panel in panels:
+            top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
+            x, z = _PARTS.T * [[panel.length], [top]]
+            probes.append(panel.place(x, z, _BEFORE))
+        is_seen = self._is_seen(np.stack(probes)[number], self._eyes[place])
         found = np.full(len(panels), np.inf)
         np.minimum.at(found, number[is_seen], distance[is_seen])
         return found
@@ -198,12 +199,6 @@ class DriveViews:
             query="OCCLUDED",
         )
         return np.asarray((hits < 0).reshape(len(eyes), -1).any(axis=1))
-
-
-def _probes(panel: Panel) -> np.ndarray:
-    """Returns places (P, 3) before a panel [m]."""
-    top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
-    return panel.place(_PARTS[:, 0] * panel.length, _PARTS[:, 1] * top, _BEFORE)
 
 
 # Walls that are farther from all drives have no windows, and roofs no
@@ -408,9 +403,6 @@ def _seen(
     return [panels[k] for k in order], distances[order]
 
 
-_TERRAIN = "TINRelief"
-
-
 @dataclass(frozen=True)
 class Dressing:
     """A dressed city, and the guessed ground with its class and colour.
@@ -423,27 +415,6 @@ class Dressing:
     origins: Mapping[str, str]
     facts: Mapping[str, Any]
     bottom: Sequence[Structure]
-
-
-def _laid(
-    staged: StagedCity,
-    city: ForeignCity,
-    drives: Sequence[WaypointDrive],
-    ground: Ground,
-    is_paved: bool,
-) -> list[Imported]:
-    """Returns streets and sidewalks that the file lacks."""
-    if not drives:
-        return []
-    laid = list(grounds.missing_sidewalks(staged.kept, city.streets, drives))
-    if is_paved and city.streets:
-        laid += grounds.paved_gaps([*staged.kept, *laid], drives)
-    elif is_paved and not any(
-        one.structure.semantic_class in ("road", "sidewalk")
-        for one in staged.kept
-    ):
-        laid += grounds.guessed_streets(staged.kept, drives, ground)
-    return laid
 
 
 def dress_city(
@@ -462,43 +433,46 @@ def dress_city(
     """
     always = set.intersection(*map(set, staged.standing.values()))
     is_paved = grounds.is_dense(staged.kept)
-    laid = _laid(staged, city, drives, ground, is_paved)
+    kept, streets = staged.kept, city.streets
+    # Streets and sidewalks that the file lacks.
+    laid: list[Imported] = []
+    if drives:
+        laid += grounds.missing_sidewalks(kept, streets, drives)
+        classes = {one.structure.semantic_class for one in kept}
+        if is_paved and streets:
+            laid += grounds.paved_gaps([*kept, *laid], drives)
+        elif is_paved and classes.isdisjoint(("road", "sidewalk")):
+            laid += grounds.guessed_streets(kept, drives, ground)
     paving = [
         one.triangles
-        for one in [*staged.kept, *laid]
+        for one in [*kept, *laid]
         if one.is_ground or one.kind == "Sidewalk"
     ]
     buildings = dress_buildings(
-        staged.kept, drives, city.streets, ground, seed, always, joined(paving)
+        kept, drives, streets, ground, seed, always, joined(paving)
     )
-    marks = list(grounds.lane_marks(city.streets, drives)) if drives else []
     added = [
         grounds.with_kerb(one) if one.kind == "Sidewalk" else one
         for one in laid
     ]
-    added += marks
-    bottom = bottom_of(staged.kept, ground)
+    if drives:
+        added += grounds.lane_marks(streets, drives)
+    bottom = bottom_of(kept, ground)
+    everything = [*kept, *added]
     things = dress_streets(
-        [*staged.kept, *added],
-        city.things,
-        city.streets,
-        drives,
-        ground,
-        bottom,
-        seed,
+        everything, city.things, streets, drives, ground, bottom, seed
     )
     changed = dict(buildings.buildings)
     at_random = buildings.at_random + Counter(one.kind for one in added)
-    # Whether the file has a ground's kind, not only its height.
-    has_kind = any(o.is_ground and o.kind != _TERRAIN for o in staged.kept)
-    if is_paved and not has_kind:
+    terrain = [one for one in kept if one.kind == "TINRelief"]
+    # Whether the file has only the height of a ground, not its kind.
+    if is_paved and sum(one.is_ground for one in kept) == len(terrain):
         changed |= {
             one: replace(one, structure=grounds.paved(one.structure))
-            for one in staged.kept
-            if one.kind == _TERRAIN
+            for one in terrain
         }
     if drives:
-        walks = [one for one in staged.kept if one.kind == "Sidewalk"]
+        walks = [one for one in kept if one.kind == "Sidewalk"]
         changed |= {
             one: grounds.with_kerb(one)
             for one in grounds.near_drives(walks, drives)
@@ -509,12 +483,8 @@ def dress_city(
             things.sources.remove(thing.source)
             city.faults.take_back(f"{thing.element}, left out")
     origins = {one.structure.name: "dressed" for one in changed.values()}
-    from_file = things.from_file
-    origins |= {
-        one.structure.name: "lot"
-        for one in added
-        if one.structure.name not in from_file
-    }
+    names = {one.structure.name for one in added} - things.from_file
+    origins |= dict.fromkeys(names, "lot")
     facts = {
         "seed": seed,
         "buildings": len(buildings.buildings),
@@ -522,12 +492,7 @@ def dress_city(
         "at_random": dict(sorted((at_random + things.at_random).items())),
         "without_room": things.no_room,
     }
-    moved = {
-        one: things.moved[one.structure.name]
-        for one in staged.kept
-        if one.structure.name in things.moved
-    }
-    dressed = staged.replaced({**changed, **moved}).joined(added)
+    dressed = staged.replaced({**changed, **things.moved}).joined(added)
     if len(dressed.kept) >= MAX_STRUCTURES:
         raise InputError(
             f"--plain: without it the city has {len(dressed.kept)} structures,"

@@ -505,21 +505,14 @@ def add_roof_pieces(
     out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
 ) -> None:
     """Adds the equipment of a roof with upper sides (M, 3, 3) [m]."""
-    if is_flat:
-        _equip(out, roof, style)
-    elif style.use in _CHIMNEYS:
-        _add_chimneys(out, roof)
-
-
-def _equip(out: Assembly, roof: np.ndarray, style: Style) -> None:
     items = _ITEMS.get(style.use, "").split()
-    found = _largest_level(roof)
-    if found is None or not items:
-        return
-    area, z = found
-    count = min(_MOST, len(items), int(area.area / _ROOF_EACH) + 1)
-    ring = np.array(area.exterior.coords)[:-1]
-    equip_roof(out, ring, z, items[:count])
+    if is_flat and items and (found := _largest_level(roof)) is not None:
+        area, z = found
+        count = min(_MOST, len(items), int(area.area / _ROOF_EACH) + 1)
+        ring = np.array(area.exterior.coords)[:-1]
+        equip_roof(out, ring, z, items[:count])
+    if not is_flat and style.use in _CHIMNEYS:
+        _add_chimneys(out, roof)
 
 
 def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:

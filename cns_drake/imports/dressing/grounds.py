@@ -167,13 +167,14 @@ def missing_sidewalks(
             if not part.buffer(-0.3).is_empty
         ]
         if surface:
-            yield make_imported(
-                f"sidewalk_{street.name}",
-                "sidewalk",
-                "Sidewalk",
-                {"surface": np.concatenate(surface)},
-                {},
-            )
+            laid = np.concatenate(surface)
+            yield _paved(f"sidewalk_{street.name}", "sidewalk", laid)
+
+
+def _paved(name: str, semantic_class: str, surface: np.ndarray) -> Imported:
+    """Returns a road, or a sidewalk, of triangles (N, 3, 3) [m]."""
+    kind = semantic_class.capitalize()
+    return make_imported(name, semantic_class, kind, {"surface": surface}, {})
 
 
 def _areas(geometry: BaseGeometry) -> MultiPolygon:
@@ -206,10 +207,12 @@ def guessed_streets(
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
-    walls = _area(
-        [one for one in near if one.structure.semantic_class == "building"],
-        paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL),
-    )
+    houses = [o for o in near if o.structure.semantic_class == "building"]
+    roofs = _upper_sides(houses, with_lower=False)
+    reach = paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL)
+    shapely.prepare(reach)
+    roofs = roofs[shapely.intersects(reach, roofs)]
+    walls = shapely.union_all(roofs, grid_size=_GRID)
     street = _cut(paths.buffer(HALF_STREET, 4), walls.buffer(_FROM_WALL, 1))
     beside = _cut(paths.buffer(HALF_STREET + _SIDEWALK, 4), street)
     beside = _cut(beside, walls)
@@ -227,30 +230,15 @@ def guessed_streets(
     below = below[looks_up(below)]
     outlines = np.asarray(shapely.polygons(below[:, [0, 1, 2, 0], :2]))
     tree = shapely.STRtree(outlines)
-    for name, kind, semantic_class, area, above in (
-        ("carriageway", "Road", "road", street, _ABOVE),
-        ("sidewalk", "Sidewalk", "sidewalk", sidewalks, KERB_HEIGHT),
+    for name, semantic_class, area, above in (
+        ("carriageway", "road", street, _ABOVE),
+        ("sidewalk", "sidewalk", sidewalks, KERB_HEIGHT),
     ):
         for number, part in enumerate(parts_of(area)):
             hit = np.sort(tree.query(part, "intersects"))
             surface = _laid(part, below[hit], outlines[hit], above)
             if len(surface):
-                yield make_imported(
-                    f"{name}_{number}",
-                    semantic_class,
-                    kind,
-                    {"surface": surface},
-                    {},
-                )
-
-
-def _area(structures: Sequence[Imported], near: BaseGeometry) -> BaseGeometry:
-    """Returns the area of structures near a place, from above."""
-    polygons = _upper_sides(structures, with_lower=False)
-    shapely.prepare(near)
-    return shapely.union_all(
-        polygons[shapely.intersects(near, polygons)], grid_size=_GRID
-    )
+                yield _paved(f"{name}_{number}", semantic_class, surface)
 
 
 def _laid(
@@ -334,13 +322,8 @@ def paved_gaps(
         )
     found = [some for some in surfaces.values() if some]
     for number, some in enumerate(found):
-        yield make_imported(
-            f"sidewalk_gap_{number}",
-            "sidewalk",
-            "Sidewalk",
-            {"surface": turned_up(np.concatenate(some))},
-            {},
-        )
+        surface = turned_up(np.concatenate(some))
+        yield _paved(f"sidewalk_gap_{number}", "sidewalk", surface)
 
 
 def _upper_sides(

@@ -88,10 +88,7 @@ def building_use(
     height of its walls [m^2, m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
-    if "shop" in tags:
-        words.append("shop")
-    if "office" in tags:
-        words.append("office")
+    words += [key for key in ("shop", "office") if key in tags]
     found = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
     for use, look in _LOOKS["uses"].items():
         if found & set(look["words"].split()):

@@ -50,29 +50,22 @@ class FreeSpace:
         low: (2,) where the grid begins, the corner of its first cell [m].
         clearance: (rows along y, columns along x) from the middle of each cell
             to the nearest obstacle [m]; 0 where no car may be.
-        on_roads: whether only roads of the file count.
         least: the clearance that a path needs [m].
         walls: the obstacles, seen from above.
     """
 
     low: np.ndarray
     clearance: np.ndarray
-    on_roads: bool
     least: float
     walls: STRtree
 
-    def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns row and column of places (N, 2), clipped to the grid."""
+    def clearance_at(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the clearance at places (N, 2), or the nearest ones [m]."""
         index = np.floor((xy - self.low) / CELL).astype(int)
         rows, columns = self.clearance.shape
-        return (
-            np.clip(index[:, 1], 0, rows - 1),
-            np.clip(index[:, 0], 0, columns - 1),
-        )
-
-    def clearance_at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the clearance at places (N, 2) [m]."""
-        return self.clearance[self.cells(xy)]
+        row = np.clip(index[:, 1], 0, rows - 1)
+        column = np.clip(index[:, 0], 0, columns - 1)
+        return self.clearance[row, column]
 
     def obstacle(self, path: np.ndarray) -> np.ndarray | None:
         """Returns the first (2,) place of a path without room for a car.
@@ -115,18 +108,17 @@ def find_free_space(
             blocked[cells] = True
             walls.append(triangles)
     free = ~(blocked | (in_water & ~on_road))
-    on_roads = False
+    least = _FROM_WALL
     paved = binary_closing(on_road, iterations=1) & ~blocked
     if _largest(_clearance(paved) >= _FROM_EDGE) * CELL**2 >= _LEAST_ROAD:
-        free, on_roads = paved, True
+        free, least = paved, _FROM_EDGE
     elif blocked.any():
         free &= _between(blocked)
     outlines = joined(walls)[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
         _clearance(free),
-        on_roads,
-        _FROM_EDGE if on_roads else _FROM_WALL,
+        least,
         STRtree(np.asarray(shapely.linearrings(outlines))),
     )
 

@@ -92,7 +92,8 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         aside = float(lengths[k] * np.sin(turns[k]))
         straight = before[: _straight_on(before, -ahead) + 1]
         chain = _kerb(behind, ahead)
-        if _reach(straight) < _BEFORE or len(chain) < 2:
+        reach = np.hypot(*np.diff(straight, axis=0).T).sum()
+        if reach < _BEFORE or len(chain) < 2:
             continue
         within = min(_LONGEST, _SLENDER * aside)
         dense = shapely.get_coordinates(
@@ -128,10 +129,6 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
         if goes_right and np.hypot(*step) < _STEP[1]:
             last += 1
     return xy[: last + 1]
-
-
-def _reach(xy: np.ndarray) -> float:
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
 
 
 class ImportedStreets:

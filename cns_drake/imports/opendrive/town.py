@@ -24,12 +24,8 @@ from cns_drake.city.plan.stages import Stages
 from cns_drake.imports import map_files
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.opendrive import imported_streets
+from cns_drake.imports.opendrive import imported_streets, lane_drives
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lane_drives import (
-    find_lane_drives,
-    lanes_for_traffic,
-)
 from cns_drake.imports.opendrive.lanes import (
     LaneBand,
     RoadHeights,
@@ -191,8 +187,8 @@ def _build(
         city,
         Stages.model_validate(stages),
         streets,
-        find_lane_drives(bands),
-        lanes_for_traffic(bands, kerb),
+        lane_drives.find_lane_drives(bands),
+        lane_drives.lanes_for_traffic(bands, kerb),
         _kinds(roads, things, decks, marks, generated),
         faults,
     )

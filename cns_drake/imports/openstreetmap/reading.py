@@ -1,6 +1,6 @@
 """Reads the parts of an OpenStreetMap file that make a city."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
@@ -172,7 +172,12 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
     closed = {name for name, _, _ in features.areas}
     shapeless = [name for name in wanted if name not in closed]
     if shapeless:
-        flat.update(_closed_without_area(features.ways))
+        # From these closed ways the reader makes no area.
+        flat |= {
+            way.name
+            for way in features.ways
+            if way.nodes[0] == way.nodes[-1] and _is_flat([hull_of(way.line)])
+        }
     for name in shapeless:
         fault = "without area" if name in flat else _OPEN
         features.faults.add(f"building {fault}, left out", name)
@@ -187,13 +192,6 @@ def _polygons(area: Any) -> list[Polygon]:
         ]
         found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
     return found
-
-
-def _closed_without_area(ways: Iterable[OsmWay]) -> Iterator[str]:
-    """Yields closed ways from which the reader makes no area."""
-    for way in ways:
-        if way.nodes[0] == way.nodes[-1] and _is_flat([hull_of(way.line)]):
-            yield way.name
 
 
 def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:

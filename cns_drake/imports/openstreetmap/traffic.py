@@ -492,12 +492,8 @@ def _beside(lanes: Sequence[_Lane]) -> Mapping[int, int]:
 
 
 def _direction(lane: _Lane, end: int) -> float:
-    step = (
-        lane.points[1] - lane.points[0]
-        if end == 0
-        else (lane.points[-1] - lane.points[-2])
-    )
-    return float(np.arctan2(step[1], step[0]))
+    a, b = lane.points[:2] if end == 0 else lane.points[-2:]
+    return float(np.arctan2(*(b - a)[::-1]))
 
 
 def _level(line: np.ndarray) -> np.ndarray:
