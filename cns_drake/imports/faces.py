@@ -216,12 +216,9 @@ def _ridge(
     start, end = (a + d) / 2.0, (b + c) / 2.0
     start[2] = end[2] = high
     if roof == "hipped":
-        inset = (end - start) * min(
-            0.45,
-            0.5
-            * float(np.linalg.norm(d - a))
-            / max(float(np.linalg.norm(end - start)), 1e-6),
-        )
+        across = float(np.linalg.norm(d - a))
+        along = max(float(np.linalg.norm(end - start)), 1e-6)
+        inset = (end - start) * min(0.45, 0.5 * across / along)
         start, end = start + inset, end - inset
     slopes = [
         np.array([[a, b, end], [a, end, start]]),

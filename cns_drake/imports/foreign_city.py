@@ -98,14 +98,9 @@ class Thing:
 class Street:
     """A street of a map; cars drive along its line, against it, or both.
 
-    Attributes:
-        line: (N, 2) its middle [m].
-        nodes: number of each place; streets with a common number meet there.
-        forward, backward: whether it is driven along its line, and against.
-        aside: from its middle to that of the outermost lane [m].
-        width: its carriageway's width; 0 if unknown [m].
-        name: that of its element in the file.
-        tags: its tags in the file.
+    The line (N, 2) is its middle, with a node at each place; streets with a
+    common node meet there. The outermost lane lies aside of the middle, and an
+    unknown width is 0 [m]. Name and tags are those of its element in the file.
     """
 
     line: np.ndarray
@@ -165,19 +160,12 @@ class StreetPlaces:
 class ForeignCity:
     """The content of a file.
 
-    Attributes:
-        structures: in the world of the map.
-        origin: the map's origin in the file's coordinates, as metres east,
-            north and up, or latitude and longitude [deg].
-        reference_system: that of the origin, as the file names it.
-        faults: counts of parts that were repaired or left out.
-        streets: streets with known lanes, in which drives are searched.
-        street_places: signals, crossings and paths, for traffic.
-        keeps_left: whether traffic keeps left, by the file.
-        things: small things, which only a dressed city gets; until then the
-            faults count them as left out.
-        axes: the file's coordinates in words, unless they are metres east,
-            north and up.
+    The origin of the map is in the file's coordinates, as metres east, north
+    and up, or latitude and longitude [deg]. Axes are these coordinates in
+    words, unless they are metres east, north and up. Faults count parts that
+    were repaired or left out. Drives are searched in streets with known lanes.
+    Small things get a place in a dressed city only; until then the faults count
+    them as left out.
     """
 
     structures: list[Imported]

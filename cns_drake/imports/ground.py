@@ -119,9 +119,7 @@ def ground_of(
     With `below_bridges`, bridges and tunnels have no feet, unless there is
     nothing else.
     """
-    corners = np.concatenate(
-        [one.triangles.reshape(-1, 3) for one in structures]
-    )
+    corners = joined(one.triangles for one in structures).reshape(-1, 3)
     terrain = [one for one in structures if one.kind == "TINRelief"]
     if terrain:
         feet = [one.triangles.reshape(-1, 3) for one in terrain]

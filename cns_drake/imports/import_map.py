@@ -24,11 +24,7 @@ from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.ground import Ground, bottom_of, ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
-from cns_drake.imports.options import (
-    ImportFaults,
-    ImportOptions,
-    ImportReport,
-)
+from cns_drake.imports.options import ImportFaults, ImportOptions, ImportReport
 from cns_drake.imports.staged_city import grow, stage_city
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS

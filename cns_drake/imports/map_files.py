@@ -20,6 +20,7 @@ from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import WATER, ForeignCity, Imported
 from cns_drake.imports.options import (
     REPORT_NAME,
@@ -50,6 +51,7 @@ def write_world(
     dressing: Dressing | None = None,
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
+
     Returns:
         Stage -> its numbers of structures and triangles.
     """
@@ -218,9 +220,7 @@ def draw_overview(
     The second drive is a thinner line on the first one, so that both are seen
     where they share a street.
     """
-    corners = np.concatenate(
-        [one.triangles.reshape(-1, 3) for one in structures]
-    )
+    corners = joined(one.triangles for one in structures).reshape(-1, 3)
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     if space is not None:
         low = space.low

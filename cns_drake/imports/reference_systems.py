@@ -31,14 +31,11 @@ _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSystem:
-    """The meaning of a file's three coordinates.
+    """The meaning of a file's three coordinates, each in words.
 
-    Attributes:
-        name: as the file has it; "" if it has none.
-        axes: each coordinate in words.
-        matrix: (3, 3) from coordinates to metres east, north and up.
-        heights_assumed: whether the system has no heights; they are then taken
-            to have the unit of the other coordinates.
+    A matrix (3, 3) leads from coordinates to metres east, north and up. The
+    name is as the file has it; "" if it has none. Heights are assumed to have
+    the unit of the other coordinates if the system has none.
     """
 
     name: str = ""

@@ -268,10 +268,7 @@ def dress_buildings(
 
 
 def _dressed(
-    some: Bare,
-    plans: Sequence[FacadePlan],
-    paths: BaseGeometry,
-    seed: int,
+    some: Bare, plans: Sequence[FacadePlan], paths: BaseGeometry, seed: int
 ) -> tuple[Model, Counter[str]]:
     """Returns the model of a building, and counts of random details."""
     structure, style = some.one.structure, some.style
@@ -322,12 +319,7 @@ def _plans(
     panels, to_drive = _seen(walls, views)
     if not panels:
         return {}
-    before = np.array(
-        [
-            panel.place(np.array(panel.length / 2), np.array(0.0), 1.0)
-            for panel in panels
-        ]
-    )
+    before = np.array([p.place(p.length / 2, 0.0, 1.0) for p in panels])
     heights = ground.height(before[:, :2])
     plans = [
         facade_pieces.plan_facade(
@@ -350,12 +342,8 @@ def _plans(
         plan.without(some)
         for plan, some in zip(plans, np.split(hidden, ends), strict=True)
     ]
-    ways = MultiLineString(
-        [
-            *(street.line for street in streets),
-            *(drive.path for drive in drives),
-        ]
-    )
+    lines = [street.line for street in streets]
+    ways = MultiLineString([*lines, *(drive.path for drive in drives)])
     to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for k, plan in enumerate(plans):
@@ -385,13 +373,8 @@ def _seen(
     The nearest come first, within the budget of triangles. Walls of each
     building are upright triangles (M, 3, 3) [m].
     """
-    panels = [
-        panel
-        for panel in find_panels(
-            walls, lambda limits: views.are_near(limits, _WALLS_WITHIN)
-        )
-        if panel.is_plane
-    ]
+    panels = find_panels(walls, lambda xy: views.are_near(xy, _WALLS_WITHIN))
+    panels = [panel for panel in panels if panel.is_plane]
     distances = views.distances(panels, _WALLS_WITHIN)
     order = np.argsort(distances, kind="stable")
     order = order[distances[order] <= _WALLS_WITHIN]

@@ -56,14 +56,10 @@ _ON_GROUND = 0.6
 
 
 class Opening(NamedTuple):
-    """A window or a door of a wall, in the panel's coordinates.
+    """A window or a door of a wall, in the panel's coordinates [m].
 
-    Attributes:
-        row: number of its storey.
-        nth: number of its bay from the nearer end of the wall.
-        x0, x1: limits of its bay [m].
-        z0, z1: bottom and top [m].
-        kind: `window`, `shop`, `door` or `gate`.
+    Its row is a storey, and `nth` the number of its bay from the nearer end of
+    the wall. The kind is `window`, `shop`, `door` or `gate`.
     """
 
     row: int
@@ -79,14 +75,9 @@ class Opening(NamedTuple):
 class FacadePlan:
     """A wall with its openings.
 
-    Attributes:
-        panel: the wall.
-        style: style of its building.
-        openings: its openings.
-        floor: height of the lowest floor in the panel [m].
-        ground: height of the ground in front, in the panel's coordinates [m].
-        to_drive: distance from the wall to the nearest drive [m].
-        top_is_free: whether nothing is built against its upper edge.
+    The lowest floor, and the ground in front, have heights in the panel, and
+    the nearest drive a distance [m]. The top is free if nothing is built
+    against its upper edge.
     """
 
     panel: Panel

@@ -219,10 +219,9 @@ def guessed_streets(
     half = _NARROWEST / 2.0
     wide = beside.buffer(-half, 2).buffer(half, 2)
     sidewalks = wide.intersection(beside)
-    terrain = [one.triangles for one in structures if one.kind == "TINRelief"]
-    if terrain:
-        below = turned_up(np.concatenate(terrain))
-    else:
+    terrain = (one for one in structures if one.kind == "TINRelief")
+    below = turned_up(joined(one.triangles for one in terrain))
+    if not len(below):
         mesh = ground.to_mesh()
         below = mesh.vertices[mesh.triangles()]
         heights = ground.height(below.reshape(-1, 3)[:, :2])

@@ -300,7 +300,7 @@ def park_along(
 ) -> None:
     """Parks cars along the right and the left of a street."""
     line = row.line
-    others = lines.difference(line.buffer(0.5)) if not lines.is_empty else lines
+    others = lines.difference(line.buffer(0.5))
     for side, is_allowed in zip((1.0, -1.0), row.may_park, strict=True):
         if not is_allowed:
             continue
@@ -311,9 +311,8 @@ def park_along(
             is_taken = rng.random() < _CARS
             yaw += float(rng.uniform(-0.02, 0.02))
             form = pick(_TABLES["vehicles"], rng)
-            is_clear = (
-                others.is_empty or others.distance(Point(xy)) > _FROM_CROSSING
-            )
+            # Without other streets the distance is NaN.
+            is_clear = not others.distance(Point(xy)) <= _FROM_CROSSING
             if is_taken and is_clear:
                 kind = f"car_{row.name}_{int(s)}_{'lr'[side > 0]}"
                 if placing.place(kind, form, xy, yaw, rng):
@@ -359,9 +358,8 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
 
 # Things farther from all drives are left out [m].
 _THINGS_WITHIN = 100.0
-# Lamps at random: their distance, and the range in which a lamp of the file
-# replaces one [m].
-_LAMP_EVERY, _LAMP_NEAR = 27.0, 35.0
+# Lamps at random: their distance, from those of the file too [m].
+_LAMP_EVERY = 27.0
 _SMALL_EVERY = 22.0
 
 
@@ -477,7 +475,7 @@ def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
         for offset in (row.half + FROM_EDGE, row.half - 0.4, 2.3):
             xy, yaw = place_along(row.line, s, side, offset)
             if any(
-                np.hypot(x - xy[0], y - xy[1]) < min(_LAMP_NEAR, _LAMP_EVERY)
+                np.hypot(x - xy[0], y - xy[1]) < _LAMP_EVERY
                 for x, y in placing.lamps
             ):
                 break

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 import shapely
@@ -34,14 +35,10 @@ _BENT, _PIECE_BENT = 0.05, 0.01
 class Panel:
     """A plane, upright wall or a piece of one, seen from outside.
 
-    Attributes:
-        building: number of its building.
-        origin: (3,) where x = z = 0 [m].
-        along: (2,) unit vector to the right, seen from outside.
-        length, height: those of its bounding rectangle [m].
-        outline: polygon in x and z [m]; None if it fills the rectangle.
-        triangles: (M, 3, 3) its original triangles [m].
-        is_plane: whether these are in one plane.
+    Its origin (3,) is where x = z = 0, and `along` (2,) a unit vector to the
+    right. The outline is a polygon in x and z, None if it fills the bounding
+    rectangle [m]. The original triangles (M, 3, 3) are those of a building with
+    a number.
     """
 
     building: int
@@ -65,10 +62,11 @@ class Panel:
         return WallFrame([start, start + self.length * self.along], 0)
 
     def place(
-        self, x: np.ndarray, z: np.ndarray, out: np.ndarray | float = 0.0
+        self, x: ArrayLike, z: ArrayLike, out: ArrayLike = 0.0
     ) -> np.ndarray:
         """Returns places (..., 3) at x, z and outwards of the panel [m]."""
-        places = np.empty((*np.shape(x), 3))
+        x, z, out = (np.asarray(one, dtype=float) for one in (x, z, out))
+        places = np.empty((*x.shape, 3))
         for k in range(2):
             places[..., k] = (
                 self.origin[k] + x * self.along[k] + out * self.outward[k]

@@ -44,14 +44,11 @@ _LEAST_ROAD = 800.0
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Room on a grid.
+    """Room on a grid that begins at (2,), the corner of its first cell [m].
 
-    Attributes:
-        low: (2,) where the grid begins, the corner of its first cell [m].
-        clearance: (rows along y, columns along x) from the middle of each cell
-            to the nearest obstacle [m]; 0 where no car may be.
-        least: the clearance that a path needs [m].
-        walls: the obstacles, seen from above.
+    The clearance (rows along y, columns along x) is that from the middle of
+    each cell to the nearest obstacle, 0 where no car may be, and a path needs
+    the least one [m]. Walls are the obstacles, seen from above.
     """
 
     low: np.ndarray

@@ -372,11 +372,9 @@ _ROUND, _SMOOTH_ASIDE = 7, 15
 class Lane:
     """A lane from one junction to the next.
 
-    Attributes:
-        line: (N, 2) the middle of its street, in driving direction [m].
-        begin, end: numbers of the junctions.
-        aside: offset of the lane to the right of that line [m].
-        way: number of the piece of street; its other lane has the same one.
+    Its line (N, 2) is the middle of its street, in driving direction, and the
+    lane lies aside to the right of it [m]. The other lane of a piece of street
+    has the same number of a way.
     """
 
     line: np.ndarray
@@ -452,13 +450,11 @@ class CellGraph(WayGraph):
         # A cell near a wall costs up to four times as much.
         price = 1.0 + (1.0 - np.minimum(clearance / _COMFORT, 1.0)) * 3.0
         starts, ends = [], []
-        for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
-            a = number[: wide.shape[0] - down]
-            b = number[down:]
-            if right > 0:
-                a, b = a[:, :-1], b[:, 1:]
-            elif right < 0:
-                a, b = a[:, 1:], b[:, :-1]
+        rows, columns = wide.shape
+        for down, aside in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            left, right = max(-aside, 0), max(aside, 0)
+            a = number[: rows - down, left : columns - right]
+            b = number[down:, right : columns - left]
             linked = (a >= 0) & (b >= 0)
             starts += [a[linked], b[linked]]
             ends += [b[linked], a[linked]]

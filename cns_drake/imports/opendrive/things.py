@@ -75,10 +75,8 @@ def _object(one: Element, name: str) -> Thing:
             f"{_LARGEST:g} m"
         )
     outline = next(one.all("outlines", "outline"), one.first("outline"))
-    corners = road_corners = None
-    if outline is not None:
-        corners = _corners(outline, "cornerLocal", "u", "v")
-        road_corners = _corners(outline, "cornerRoad", "s", "t")
+    corners = _corners(outline, "cornerLocal", "u", "v")
+    road_corners = _corners(outline, "cornerRoad", "s", "t")
     return Thing(
         name=name,
         is_signal=False,
@@ -94,8 +92,10 @@ def _object(one: Element, name: str) -> Thing:
 
 
 def _corners(
-    outline: Element, tag: str, first: str, second: str
+    outline: Element | None, tag: str, first: str, second: str
 ) -> np.ndarray | None:
+    if outline is None:
+        return None
     rows = [
         (one.number(first), one.number(second), one.number("height", 0.0))
         for one in outline.all(tag)

@@ -45,6 +45,8 @@ from cns_drake.imports.openstreetmap.tags import (
 )
 from cns_drake.imports.options import ImportFaults
 
+# What carries a lamp that is a thing of its own.
+_POSTS = ("pole", "straight_mast", "bent_mast", "mast")
 _TREE_DISTANCE = 8.0  # [m]
 # Sizes of barriers and trees [m].
 _TALLEST = 150.0
@@ -68,12 +70,7 @@ def object_of(tags: reading.Tags) -> str | None:
     name: str = found[0]
     if tags.get("fire_hydrant:type", "pillar") != "pillar":
         return None
-    if tags.get("lamp_mount", tags.get("support", "pole")) not in (
-        "pole",
-        "straight_mast",
-        "bent_mast",
-        "mast",
-    ):
+    if tags.get("lamp_mount", tags.get("support", "pole")) not in _POSTS:
         return None
     if name == "bus_shelter" and tags.get("shelter") != "yes":
         return "sign_rectangular"

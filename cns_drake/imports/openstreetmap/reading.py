@@ -124,8 +124,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 features.kinds[f"{letter}{one.id}"] = thing_kind(tags)
             if isinstance(one, osmium.osm.Area):
                 polygons = _polygons(one)
-                kind = "w" if one.from_way() else "r"
-                name = f"{kind}{one.orig_id()}"
+                name = f"{'w' if one.from_way() else 'r'}{one.orig_id()}"
                 if polygons and is_building(tags) and _is_flat(polygons):
                     flat.add(name)
                 elif polygons:
@@ -137,11 +136,8 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 nodes = [n for n in one.nodes if n.location.valid()]
                 missing = len(one.nodes) - len(nodes)
                 if missing and name not in wanted:
-                    features.faults.add(
-                        "place of a way that is not in the file, left out",
-                        name,
-                        missing,
-                    )
+                    gap = "place of a way that is not in the file, left out"
+                    features.faults.add(gap, name, missing)
                 if len(nodes) > 1:
                     line = np.array([(n.lon, n.lat) for n in nodes])
                     numbers = tuple(n.ref for n in nodes)

@@ -220,8 +220,6 @@ _BEFORE_CORNER, _JOINT, _FARTHEST_STOP = 1.0, 3.0, 25.0
 _SHORTEST = 1.0
 # A street's direction at its end is that of its last piece of this length [m].
 _ARM = 6.0
-# Streets for other traffic.
-_NO_TRAFFIC = frozenset({"track"})
 # An end of a stretch: its number, and 0 for the first end or -1 for the last.
 _Arm = tuple[int, int]
 # Traffic keeps to the streets near drives [m].
@@ -284,12 +282,9 @@ class _Lane:
 class StreetTraffic:
     """The lanes of streets, and what follows what.
 
-    Attributes:
-        stretches: the streets with traffic, cut at their junctions.
-        lanes: those of the stretches, then the ways between them.
-        links: pairs of lane numbers; the second lane follows the first.
-        beside: number of a lane -> that of the lane on its outer side, in the
-            same direction.
+    Lanes of stretches, streets cut at their junctions, come before the ways
+    between them. The second lane of a link follows the first. A lane may have
+    another one beside it, on its outer side and in the same direction.
     """
 
     def __init__(
@@ -451,7 +446,7 @@ def _stretches(
     used = [
         street
         for street in streets
-        if street.tags.get("highway") not in _NO_TRAFFIC
+        if street.tags.get("highway") != "track"
         and lane_layout(street.tags, street.width).width
     ]
     for street, line, ends in cut_at_nodes(used, crossed):
