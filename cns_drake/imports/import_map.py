@@ -183,7 +183,6 @@ def _import_roads(
 
     town = build_town(source, options.seed, progress, options.dressed)
     with draft_folder(output) as draft:
-        (draft / MESH_FOLDER).mkdir()
         report, sizes = write_town(draft, source, town, progress)
         map_files.write_report(draft, report)
         finish(draft, sizes)
