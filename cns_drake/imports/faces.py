@@ -306,7 +306,7 @@ def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _parts(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the ends of counted (N,) equal parts of N things.
+    """Returns the ends of equal parts, as many as counted (N,) of each thing.
 
     They are (M,) number of the thing, and (M,) share from 0 to 1.
     """

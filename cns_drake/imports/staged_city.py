@@ -133,8 +133,8 @@ class StagedCity:
     ) -> StagedCity:
         """Returns the city without structures far from drives.
 
-        The near part of a terrain stays. At most the distance lies between the
-        bounding box of a structure and a drive [m]. Others are counted.
+        Kept structures have a bounding box within the distance [m]; others are
+        counted. The near part of a terrain stays.
 
         Raises:
             InputError: if no structure is near, or there is no drive.

@@ -166,8 +166,8 @@ def _connected(
 ) -> np.ndarray:
     """Returns the number (M,) of the panel of each triangle (M, 3, 3) [m].
 
-    Unit normals (M, 3) of neighbours in one panel have at least a product. A
-    panel is part of one building, numbered (M,).
+    The product of the unit normals (M, 3) of neighbours in one panel has a
+    least value. A panel is part of one building, numbered (M,).
     """
     corners = np.rint(triangles * _MM).astype(np.int64).reshape(-1, 3)
     keyed = np.column_stack([np.repeat(building, 3), corners])

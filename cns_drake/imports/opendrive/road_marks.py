@@ -55,8 +55,8 @@ def moved_off_kerbs(
     """Returns how far (N,) lines are moved to the left [m].
 
     Where only one side of a border of lanes, places (N, 3), is carriageway,
-    they lie on that side. Unit vectors (N, 2) lead to its left, and the lines
-    reach so far to the left and to the right of it [m]. The carriageway is
+    they lie on that side. Unit vectors (N, 2) lead to its left, and `reach` is
+    how far the lines extend to its left and right [m]. The carriageway is
     prepared.
     """
     xy = border[:, :2].copy()

@@ -117,7 +117,7 @@ def laid(
 ) -> Iterator[Imported]:
     """Yields a level surface, if the areas have any.
 
-    The thing of the file that has it ends its name.
+    Its name ends with that of its element in the file, for the faults.
     """
     source = name.partition("_")[2]
     surface = [
@@ -137,7 +137,7 @@ def raised(
 ) -> Iterator[Imported]:
     """Yields a solid on the ground, if the areas have any.
 
-    The thing of the file that has it is the source, with its faults.
+    The source is the name of its element in the file, and the faults.
     """
     solids = [
         np.concatenate(extruded(polygon, 0.0, look.z, *source))

@@ -106,9 +106,8 @@ def tag_value(
 ) -> float | None:
     """Returns the value of a tag, as read; None if it has no valid one.
 
-    Values that cannot be parsed, or are not from the least to the most
-    plausible one, are counted for the name of the thing `where` they are,
-    unless they are counted elsewhere.
+    A valid one is plausible, from least to most. Others are counted for a
+    thing, whose name and counts are `where`, unless that is None.
     """
     text = tags.get(key)
     if text is None:
