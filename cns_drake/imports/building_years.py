@@ -1,17 +1,15 @@
-"""Years of construction of a city's objects, and stages made from them.
+"""Years of construction of a city's objects.
 
 Dates as OpenStreetMap has them:
 https://wiki.openstreetmap.org/wiki/Key:start_date"""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 import datetime
 from datetime import date
-from itertools import pairwise
 import re
 from typing import Any
 
-from cns_drake.base.errors import InputError
-from cns_drake.imports.options import ImportFaults, Undated
+from cns_drake.imports.options import ImportFaults
 
 # Position in a period of "early", "mid", "late" and of no such word.
 _PARTS = {"early": 0.2, "mid": 0.5, "late": 0.8, "": 0.5}
@@ -109,47 +107,6 @@ def _year(value: object) -> int | None:
     return year_of_date(str(value))
 
 
-def stage_names(years: Sequence[int]) -> list[str]:
-    """Returns the name of each stage, from 01 on; one without years.
-
-    Raises:
-        InputError: if years do not increase.
-    """
-    if any(a >= b for a, b in pairwise(years)):
-        listed = " ".join(map(str, years))
-        raise InputError(
-            f"--years: {listed}: each year must be after the one before"
-        )
-    return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
-
-
 def stands_today(until: int | None) -> bool:
     """Returns whether an object stands, by the year of its demolition."""
     return until is None or until > datetime.date.today().year
-
-
-def stands_at(
-    year: int | None,
-    until: int | None,
-    stage: int,
-    years: Sequence[int],
-    undated: Undated,
-) -> bool:
-    """Returns whether an object stands at a stage.
-
-    Args:
-        year: year in which it was built; None if unknown.
-        until: year in which it was demolished, if it was.
-        stage: number of the stage, from 0 on.
-        years: the stages' years; without any, everything of today stands.
-        undated: the stage of objects without a year.
-    """
-    if not years:
-        return stands_today(until)
-    if until is not None and years[stage] >= until:
-        return False
-    if year is not None:
-        return year <= years[stage]
-    if undated == "first":
-        return True
-    return undated == "last" and stage == len(years) - 1

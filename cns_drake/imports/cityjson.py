@@ -19,7 +19,7 @@ from cns_drake.base.files import check_regular
 from cns_drake.base.json_text import parse_json
 from cns_drake.imports import foreign_city
 from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.faces import face_triangles
+from cns_drake.imports.faces import face_triangles, joined
 from cns_drake.imports.foreign_city import ForeignCity, Imported, Rgb
 from cns_drake.imports.options import ImportFaults
 from cns_drake.imports.reference_systems import (
@@ -63,13 +63,10 @@ _LONGEST_NAME = 80
 
 
 class CityGeometry(NamedTuple):
-    """One geometry of an object.
+    """One geometry of an object; the level of detail is 0 if unknown.
 
-    Attributes:
-        lod: level of detail, such as 2.2; 0 if the file has none.
-        faces: all of them.
-        kinds: the type of each face, such as RoofSurface; "" if unknown.
-        is_solid: whether the faces close a solid.
+    Each face has a type, such as RoofSurface; "" if unknown. The faces of a
+    solid close it.
     """
 
     lod: float
@@ -428,13 +425,9 @@ def import_structures(
 ) -> list[Imported]:
     """Returns a structure for each object that has a surface.
 
-    A building with its parts is one.
-
-    Args:
-        city: the content of the file; its faults are extended.
-        origin: (3,) the world's origin in the file's coordinates [m].
-        lod: level of detail to take; the highest of each object if None.
-        year_attribute: see `construction_year`.
+    A building with its parts is one. The world has an origin (3,) in the file's
+    coordinates [m]. If the level of detail is None, each object has its highest
+    one.
     """
     groups = _families(city)
     names = _unique_names(groups)
@@ -554,7 +547,7 @@ def _surfaces(
 
 def _volume(faces: list[np.ndarray]) -> float:
     """Returns the volume that triangles (M, 3, 3) enclose [m^3]."""
-    triangles = np.concatenate([np.zeros((0, 3, 3)), *faces])
+    triangles = joined(faces)
     if len(triangles) == 0:
         return 0.0
     a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)

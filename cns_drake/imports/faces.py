@@ -2,7 +2,7 @@
 
 Solids may have the roofs that OpenStreetMap describes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -26,16 +26,18 @@ _LEAST_PART = 0.01  # [m^2]
 _CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
 
 
+def joined(some: Iterable[np.ndarray]) -> np.ndarray:
+    """Returns all triangles (M, 3, 3) of any number of arrays."""
+    return np.concatenate([np.zeros((0, 3, 3)), *some])
+
+
 def face_triangles(
     rings: Sequence[np.ndarray], name: str, faults: ImportFaults
 ) -> np.ndarray:
     """Returns a face as (M, 3, 3) triangles [m], turned as its outer ring.
 
-    Args:
-        rings: (N, 3) corners of the outer ring, then of holes [m], without
-            repeated corners.
-        name: the object's name, for the faults.
-        faults: counts repaired faces and those left out.
+    Rings (N, 3) are the outer one, then holes [m], without repeated corners.
+    Faces that are repaired or left out are counted.
     """
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
@@ -52,18 +54,18 @@ def face_triangles(
     if not normal.any():
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
-    outer, *holes = rings
-    holes = [hole for hole in holes if len(hole) >= 3]
-    if len(outer) == 3 and not holes:
+    outer = rings[0]
+    has_holes = any(len(hole) >= 3 for hole in rings[1:])
+    if len(outer) == 3 and not has_holes:
         return outer[None]
     heights = (outer - outer[0]) @ normal
     if np.ptp(heights) > 2.0 * _BENT * np.linalg.norm(normal):
         faults.add("face that is not plane, folded between its corners", name)
-    if len(outer) == 4 and not holes:
+    if len(outer) == 4 and not has_holes:
         corners = outer[_CORNERS_OF_FOUR]
         if (long_normals(corners) @ normal > 0.0).all():
             return corners[[1, 3]]
-    return _filled(_Plane(normal, rings), outer, holes, name, faults)
+    return _filled(normal, rings, name, faults)
 
 
 def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
@@ -79,72 +81,51 @@ def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
     return ring
 
 
-class _Plane:
-    """Two of the three axes, along which a face is seen from outside."""
-
-    def __init__(self, normal: np.ndarray, rings: Sequence[np.ndarray]):
-        axis = int(np.abs(normal).argmax())
-        self._axes = [(axis + 1) % 3, (axis + 2) % 3]
-        if normal[axis] < 0.0:
-            self._axes.reverse()
-        self._axis = axis
-        self._normal = normal
-        self._origin = rings[0].mean(axis=0)
-        self._corners = {
-            tuple(key): corner
-            for ring in rings
-            for key, corner in zip(
-                np.rint(self.flat(ring) * _MM).astype(np.int64).tolist(),
-                ring,
-                strict=True,
-            )
-        }
-
-    def flat(self, points: np.ndarray) -> np.ndarray:
-        """Returns points (..., 3) as (..., 2)."""
-        return points[..., self._axes]
-
-    def lifted(self, xy: np.ndarray) -> np.ndarray:
-        """Returns points (N, 2) in space; corners keep their exact places."""
-        result = np.empty((len(xy), 3))
-        keys = np.rint(xy * _MM).astype(np.int64).tolist()
-        for row, key, point in zip(result, keys, xy, strict=True):
-            corner = self._corners.get(tuple(key))
-            if corner is not None:
-                row[:] = corner
-                continue
-            row[self._axes] = point
-            row[self._axis] = self._origin[self._axis]
-            offset = self._normal @ (row - self._origin)
-            row[self._axis] -= offset / self._normal[self._axis]
-        return result
-
-
 def _filled(
-    plane: _Plane,
-    outer: np.ndarray,
-    holes: list[np.ndarray],
+    normal: np.ndarray,
+    rings: Sequence[np.ndarray],
     name: str,
     faults: ImportFaults,
 ) -> np.ndarray:
-    def flat(ring: np.ndarray) -> np.ndarray:
-        return np.rint(plane.flat(ring) * _MM) / _MM
-
-    polygon = Polygon(flat(outer), [flat(hole) for hole in holes])
+    """Returns the triangles of a face, cut as it is seen along an axis."""
+    axis = int(np.abs(normal).argmax())
+    axes = [(axis + 1) % 3, (axis + 2) % 3]
+    if normal[axis] < 0.0:
+        axes.reverse()
+    # In whole millimetres.
+    flat = [np.rint(ring[:, axes] * _MM) for ring in rings]
+    corners = {
+        tuple(key): corner
+        for keys, ring in zip(flat, rings, strict=True)
+        for key, corner in zip(keys.tolist(), ring, strict=True)
+    }
+    holes = [one / _MM for one in flat[1:] if len(one) >= 3]
+    polygon: BaseGeometry = Polygon(flat[0] / _MM, holes)
     if not polygon.is_valid:
         faults.add("face that crosses itself, repaired", name)
-        repaired = shapely.set_precision(make_valid(polygon), 1.0 / _MM)
-    else:
-        repaired = polygon
+        polygon = shapely.set_precision(make_valid(polygon), 1.0 / _MM)
     parts = [np.zeros((0, 3, 2))]
-    for part in shapely.get_parts(repaired):
+    for part in shapely.get_parts(polygon):
         if isinstance(part, Polygon) and part.area >= _LEAST_AREA:
             try:
                 parts.append(triangulate(part))
             except ValueError:
                 faults.add("part of a face that is in no plane, left out", name)
-    triangles = np.concatenate(parts)
-    return plane.lifted(triangles.reshape(-1, 2)).reshape(-1, 3, 3)
+    xy = np.concatenate(parts).reshape(-1, 2)
+    origin = rings[0].mean(axis=0)
+    lifted = np.empty((len(xy), 3))
+    for row, key, point in zip(
+        lifted, np.rint(xy * _MM).tolist(), xy, strict=True
+    ):
+        # Corners keep their exact places.
+        corner = corners.get(tuple(key))
+        if corner is not None:
+            row[:] = corner
+            continue
+        row[axes] = point
+        row[axis] = origin[axis]
+        row[axis] -= normal @ (row - origin) / normal[axis]
+    return lifted.reshape(-1, 3, 3)
 
 
 def flat_surface(
@@ -235,12 +216,9 @@ def _ridge(
     start, end = (a + d) / 2.0, (b + c) / 2.0
     start[2] = end[2] = high
     if roof == "hipped":
-        inset = (end - start) * min(
-            0.45,
-            0.5
-            * float(np.linalg.norm(d - a))
-            / max(float(np.linalg.norm(end - start)), 1e-6),
-        )
+        across = float(np.linalg.norm(d - a))
+        along = max(float(np.linalg.norm(end - start)), 1e-6)
+        inset = (end - start) * min(0.45, 0.5 * across / along)
         start, end = start + inset, end - inset
     slopes = [
         np.array([[a, b, end], [a, end, start]]),
@@ -284,12 +262,8 @@ def surface_samples(
 ) -> Iterator[np.ndarray]:
     """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
 
-    No place on a triangle is farther from all of them than the spacing.
-
-    Args:
-        triangles: to sample.
-        spacing: greatest distance from a place to a point [m].
-        window: (2,) least and greatest x and y; points outside are left out.
+    No place on a triangle is farther from all of them than the spacing. Points
+    outside of a window, least and greatest x and y (2,), are left out.
     """
     while len(triangles):
         if window is not None:
@@ -332,13 +306,9 @@ def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _parts(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the ends of equal parts of N things, as shares from 0 to 1.
+    """Returns the ends of equal parts, as many as counted (N,) of each thing.
 
-    Args:
-        counts: (N,) number of parts of each.
-
-    Returns:
-        (M,) number of the thing, and (M,) share.
+    They are (M,) number of the thing, and (M,) share from 0 to 1.
     """
     owner = np.repeat(np.arange(len(counts)), counts + 1)
     first = np.cumsum(counts + 1) - counts - 1

@@ -1,9 +1,11 @@
 """An imported city, independent of its file format."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 import hashlib
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,6 +18,7 @@ Rgb = tuple[float, float, float]
 # Sharpest turn from one street into another.
 SHARPEST_TURN_DEG = 125.0
 RED_ROOF: Rgb = (0.55, 0.30, 0.24)
+_GROUND_CLASSES = ("road", "parking", "other-ground", "terrain")
 WATER: Rgb = (0.16, 0.34, 0.45)
 LAWN: Rgb = (0.42, 0.55, 0.30)
 
@@ -73,24 +76,15 @@ class Imported:
     @property
     def is_ground(self) -> bool:
         """Whether a car can drive over it, if it is flat."""
-        return self.structure.semantic_class in (
-            "road",
-            "parking",
-            "other-ground",
-            "terrain",
-        )
+        return self.structure.semantic_class in _GROUND_CLASSES
 
 
 @dataclass(frozen=True)
 class Thing:
-    """A small thing of a file, such as a bench.
+    """A small thing of a file, such as a bench, at a place [m].
 
-    Attributes:
-        source: name of its element in the file.
-        element: kind of that element, as the file has it.
-        kind: a key of `cns_drake.city.placement.objects.OBJECTS`.
-        xy: its place [m].
-        yaw: its heading, if known [rad].
+    Its source is the name of its element in the file, and its kind a key of
+    `cns_drake.city.placement.objects.OBJECTS`. It may have a heading [rad].
     """
 
     source: str
@@ -104,14 +98,9 @@ class Thing:
 class Street:
     """A street of a map; cars drive along its line, against it, or both.
 
-    Attributes:
-        line: (N, 2) its middle [m].
-        nodes: number of each place; streets with a common number meet there.
-        forward, backward: whether it is driven along its line, and against.
-        aside: from its middle to that of the outermost lane [m].
-        width: its carriageway's width; 0 if unknown [m].
-        name: that of its element in the file.
-        tags: its tags in the file.
+    The line (N, 2) is its middle, with a node at each place; streets with a
+    common node meet there. The outermost lane lies aside of the middle, and an
+    unknown width is 0 [m]. Name and tags are those of its element in the file.
     """
 
     line: np.ndarray
@@ -124,14 +113,42 @@ class Street:
     tags: Mapping[str, str] = field(default_factory=dict)
 
 
+def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
+    """Returns node -> number of ends of streets there, two where one passes."""
+    ends: Counter[int] = Counter()
+    for street in streets:
+        last = len(street.nodes) - 1
+        for k, node in enumerate(street.nodes):
+            ends[node] += 1 if k in (0, last) else 2
+    return ends
+
+
+def cut_at_nodes(
+    streets: Sequence[Street], also: AbstractSet[int] = frozenset()
+) -> Iterator[tuple[Street, np.ndarray, tuple[int, int]]]:
+    """Yields pieces of streets: the street, the line, first and last node.
+
+    Streets are cut where they meet, and at other nodes.
+    """
+    uses = Counter(node for street in streets for node in street.nodes)
+    for street in streets:
+        last = len(street.nodes) - 1
+        cuts = [
+            k
+            for k, node in enumerate(street.nodes)
+            if k in (0, last) or uses[node] > 1 or node in also
+        ]
+        for first, after in pairwise(cuts):
+            ends = street.nodes[first], street.nodes[after]
+            yield street, street.line[first : after + 1], ends
+
+
 @dataclass(frozen=True)
 class StreetPlaces:
     """Places on and beside streets, for traffic.
 
-    Attributes:
-        crossed: numbers of the streets' nodes at which people cross.
-        signals: (N, 2) [m].
-        paths: (M, 2) middles of ways for people [m].
+    Numbers of the nodes of streets at which people cross, signals (N, 2), and
+    middles (M, 2) of ways for people [m].
     """
 
     crossed: AbstractSet[int] = frozenset()
@@ -143,19 +160,12 @@ class StreetPlaces:
 class ForeignCity:
     """The content of a file.
 
-    Attributes:
-        structures: in the world of the map.
-        origin: the map's origin in the file's coordinates, as metres east,
-            north and up, or latitude and longitude [deg].
-        reference_system: that of the origin, as the file names it.
-        faults: counts of parts that were repaired or left out.
-        streets: streets with known lanes, in which drives are searched.
-        street_places: signals, crossings and paths, for traffic.
-        keeps_left: whether traffic keeps left, by the file.
-        things: small things, which only a dressed city gets; until then the
-            faults count them as left out.
-        axes: the file's coordinates in words, unless they are metres east,
-            north and up.
+    The origin of the map is in the file's coordinates, as metres east, north
+    and up, or latitude and longitude [deg]. Axes are these coordinates in
+    words, unless they are metres east, north and up. Faults count parts that
+    were repaired or left out. Drives are searched in streets with known lanes.
+    Small things get a place in a dressed city only; until then the faults count
+    them as left out.
     """
 
     structures: list[Imported]
@@ -182,17 +192,9 @@ def make_imported(
 ) -> Imported:
     """Returns a structure of triangles in the world.
 
-    Args:
-        name: unique in the city.
-        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        kind: type of its object.
-        surfaces: part -> its triangles (M, 3, 3) [m]; empty parts are left
-            out, not all are empty.
-        colours: part -> diffuse colour; by default that of the class.
-        year: in which it was built, if known.
-        until: in which it was demolished, if it was.
-        tags: its tags or attributes in the file.
-        lod: level of detail; 0 if unknown.
+    Its name is unique in the city. Each part of its surface has triangles (M,
+    3, 3) [m]; empty parts are left out, and not all are empty. A part without a
+    colour has that of the class, a key of `scene.semantics.CLASS_IDS`.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -206,6 +208,16 @@ def make_imported(
     )
     structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
     return Imported(structure, kind, year, triangles, until, tags or {}, lod)
+
+
+def boxes_of(structures: Sequence[Imported]) -> np.ndarray:
+    """Returns the least and greatest coordinates (N, 2, 3) of each [m]."""
+    return np.array(
+        [
+            (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))
+            for one in structures
+        ]
+    )
 
 
 def to_mesh(triangles: np.ndarray) -> Mesh:

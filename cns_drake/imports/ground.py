@@ -13,7 +13,7 @@ from shapely.geometry import Point
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
-from cns_drake.imports.faces import surface_samples
+from cns_drake.imports.faces import joined, surface_samples
 from cns_drake.imports.foreign_city import Imported
 
 # Cells of a guessed ground, and how far it reaches beyond the city [m].
@@ -32,13 +32,7 @@ _EVERY_CORNER = 7
 
 
 class Ground:
-    """Heights on a grid.
-
-    Attributes:
-        xs, ys: (C,) and (R,) of the grid [m].
-        z: (R, C) heights there [m].
-        cell: distance of its lines [m].
-    """
+    """Heights z (R, C) on a grid of xs (C,) and ys (R,), evenly spaced [m]."""
 
     def __init__(self, xs: np.ndarray, ys: np.ndarray, z: np.ndarray):
         self.xs, self.ys, self.z = xs, ys, z
@@ -85,11 +79,9 @@ class Ground:
 
 
 def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
-    """Returns a smooth ground through places whose height is known.
+    """Returns a smooth ground through feet (N, 3), one or more [m].
 
-    Args:
-        feet: (N, 3) places on the ground [m], one or more.
-        corners: (M, 3) those of all structures; the ground reaches beyond [m].
+    It reaches beyond the corners (M, 3) of all structures [m].
     """
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
@@ -114,11 +106,9 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
 
 def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
     """Returns the lowest corner (N, 3) of each solid of triangles (M, 3, 3)."""
-    found = []
-    for triangles in solids:
-        corners = triangles.reshape(-1, 3)
-        found.append(corners[corners[:, 2].argmin()])
-    return np.array(found).reshape(-1, 3)
+    corners = [triangles.reshape(-1, 3) for triangles in solids]
+    feet = [some[some[:, 2].argmin()] for some in corners]
+    return np.array(feet).reshape(-1, 3)
 
 
 def ground_of(
@@ -129,16 +119,16 @@ def ground_of(
     With `below_bridges`, bridges and tunnels have no feet, unless there is
     nothing else.
     """
-    corners = np.concatenate(
-        [one.triangles.reshape(-1, 3) for one in structures]
-    )
+    corners = joined(one.triangles for one in structures).reshape(-1, 3)
     terrain = [one for one in structures if one.kind == "TINRelief"]
     if terrain:
         feet = [one.triangles.reshape(-1, 3) for one in terrain]
     else:
         low = structures
         if below_bridges:
-            low = [one for one in structures if not _is_span(one)] or structures
+            spans = ("Bridge", "Tunnel")
+            firm = [o for o in structures if not o.kind.startswith(spans)]
+            low = firm or structures
         feet = [feet_of([o.triangles for o in low if not o.is_ground])]
         feet += [
             one.triangles.reshape(-1, 3)[::_EVERY_CORNER]
@@ -146,10 +136,6 @@ def ground_of(
             if one.is_ground
         ]
     return guess_ground(np.concatenate(feet), corners)
-
-
-def _is_span(one: Imported) -> bool:
-    return one.kind.startswith(("Bridge", "Tunnel"))
 
 
 def bottom_of(
@@ -163,8 +149,7 @@ def bottom_of(
     while name in taken:
         name += "_"
     # The guessed ground must not cover streets and water.
-    laid = [one.triangles for one in structures if one.is_ground]
-    covered = np.concatenate([np.zeros((0, 3, 3)), *laid])
+    covered = joined(one.triangles for one in structures if one.is_ground)
     lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
     model = Model(
         (Part("surface", MeshShape(name)),),

@@ -17,25 +17,15 @@ from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
 from cns_drake.imports import map_files
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.drives.city_drives import CellGraph, StreetGraph
-from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
-from cns_drake.imports.drives.search import (
-    WaypointDrive,
-    driven_path,
-    find_drives,
-    steerable_drive,
-)
+from cns_drake.imports.drives import search
+from cns_drake.imports.drives.free_space import find_free_space
+from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.ground import Ground, bottom_of, ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
-from cns_drake.imports.options import (
-    DriveOn,
-    ImportFaults,
-    ImportOptions,
-    ImportReport,
-)
-from cns_drake.imports.staged_city import StagedCity, grow, stage_city
+from cns_drake.imports.options import ImportFaults, ImportOptions, ImportReport
+from cns_drake.imports.staged_city import grow, stage_city
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
@@ -45,6 +35,9 @@ Progress = Callable[[str], None]
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 
 
+# Threads of linear algebra would only wait for each other: the matrices are
+# small, and several processes work here.
+@threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
 def import_city(
     source: Path,
     output: Path,
@@ -67,20 +60,6 @@ def import_city(
         InputError: if the file or the options cannot be used, or the folder
             is there or cannot be written.
     """
-    # Threads of linear algebra would only wait for each other: the matrices are
-    # small, and several processes work here.
-    with threadpool_limits(limits=1):
-        return _import_city(source, output, options, progress, finish)
-
-
-def _import_city(
-    source: Path,
-    output: Path,
-    options: ImportOptions,
-    progress: Progress,
-    finish: Finish,
-) -> ImportReport:
-    """Writes a map folder of a file; see `import_city`."""
     _check(source, output, options)
     own = None if options.along is None else [drive_along(options.along)]
     progress(f"reading {source}")
@@ -94,7 +73,12 @@ def _import_city(
     progress(f"{len(staged.kept)} structures; looking for streets")
     ground = ground_of(staged.kept, options.dressed)
     space = find_free_space(staged.kept, ground)
-    drives = own or _find_drives(city, space, options)
+    side = options.drive_on or ("left" if city.keeps_left else "right")
+    drives = (
+        own
+        or search.find_drives(search.StreetGraph(city.streets, space, side))
+        or search.find_drives(search.CellGraph(space))
+    )
     if options.within is not None:
         staged = staged.near(drives, options.within, city.faults)
         ground = ground_of(staged.kept, options.dressed)
@@ -117,7 +101,7 @@ def _import_city(
             [*bare, *added],
             [o for o in added if o.kind not in ("Sidewalk", "Lane mark")],
             drives,
-            _side(city, options),
+            side,
         )
         if lanes is not None:
             (draft / LANES_NAME).write_text(lanes, "utf-8")
@@ -127,11 +111,28 @@ def _import_city(
             city, options, list(staged.standing), changes, dressing
         )
         map_files.write_facts(draft, source, facts, city.faults)
-        report = _report(staged, drives, city.faults)
+        report = ImportReport(
+            kinds=dict(Counter(one.kind for one in staged.kept)),
+            # All but buildings may share their meshes.
+            triangles=sum(
+                one.structure.model.num_triangles
+                if one.kind.startswith("Building")
+                else len(one.triangles)
+                for one in staged.kept
+            ),
+            stages={stage: len(o) for stage, o in staged.standing.items()},
+            undated=staged.undated,
+            dated=staged.dated,
+            drives=tuple(drive.length for drive in drives),
+            faults=city.faults.rows(),
+        )
         map_files.write_report(draft, report)
+        when = [f" in {year}" for year in options.years] or [""]
+        if options.grow is not None:
+            when = [", not all of it built", ""]
         map_files.write_drives(
             draft,
-            _titles(staged, options),
+            dict(zip(staged.standing, when, strict=True)),
             [drive.waypoints for drive in drives],
         )
         finish(draft, sizes)
@@ -182,7 +183,6 @@ def _import_roads(
 
     town = build_town(source, options.seed, progress, options.dressed)
     with draft_folder(output) as draft:
-        (draft / MESH_FOLDER).mkdir()
         report, sizes = write_town(draft, source, town, progress)
         map_files.write_report(draft, report)
         finish(draft, sizes)
@@ -202,21 +202,6 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
     return import_openstreetmap(source, options.year_attribute, options.dressed)
 
 
-def _find_drives(
-    city: ForeignCity, space: FreeSpace, options: ImportOptions
-) -> list[WaypointDrive]:
-    """Returns drives in the lanes of streets, or else in free space."""
-    streets = StreetGraph(city.streets, space, _side(city, options))
-    return find_drives(streets) or find_drives(CellGraph(space))
-
-
-def _side(city: ForeignCity, options: ImportOptions) -> DriveOn:
-    """Returns the side of the streets on which traffic keeps."""
-    if options.drive_on is not None:
-        return options.drive_on
-    return "left" if city.keeps_left else "right"
-
-
 def drive_along(path: Path) -> WaypointDrive:
     """Returns a drive along waypoints of a file, without their heights.
 
@@ -225,7 +210,7 @@ def drive_along(path: Path) -> WaypointDrive:
     """
     points, _ = read_waypoints(path)
     control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
-    driven, radii = driven_path(control)
+    driven, radii = search.driven_path(control)
     radius, (x, y) = radii.min(), driven[radii.argmin()]
     if radius < TIGHTEST_RADIUS:
         raise InputError(
@@ -246,36 +231,10 @@ def _lifted(
     for drive in drives:
         xy = np.round(drive.waypoints, 3)
         waypoints = np.column_stack([xy, ground.height(xy)])
-        if isinstance(steerable_drive(waypoints, margin=1.0), WaypointDrive):
+        if isinstance(
+            search.steerable_drive(waypoints, margin=1.0), WaypointDrive
+        ):
             lifted.append(replace(drive, waypoints=waypoints))
         else:
             faults.add("drive too tight on its slope, left out", "drive")
     return lifted
-
-
-def _titles(city: StagedCity, options: ImportOptions) -> dict[str, str]:
-    """Returns stage -> words for its time, the end of a title."""
-    when = [f" in {year}" for year in options.years] or [""]
-    if options.grow is not None:
-        when = [", not all of it built", ""]
-    return dict(zip(city.standing, when, strict=True))
-
-
-def _report(
-    city: StagedCity, drives: Sequence[WaypointDrive], faults: ImportFaults
-) -> ImportReport:
-    return ImportReport(
-        kinds=dict(Counter(one.kind for one in city.kept)),
-        # All but buildings may share their meshes.
-        triangles=sum(
-            one.structure.model.num_triangles
-            if one.kind.startswith("Building")
-            else len(one.triangles)
-            for one in city.kept
-        ),
-        stages={stage: len(some) for stage, some in city.standing.items()},
-        undated=city.undated,
-        dated=city.dated,
-        drives=tuple(drive.length for drive in drives),
-        faults=faults.rows(),
-    )

@@ -20,6 +20,7 @@ from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import WATER, ForeignCity, Imported
 from cns_drake.imports.options import (
     REPORT_NAME,
@@ -50,6 +51,7 @@ def write_world(
     dressing: Dressing | None = None,
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
+
     Returns:
         Stage -> its numbers of structures and triangles.
     """
@@ -115,7 +117,7 @@ def city_facts(
 
     If the first stage was drawn, its changes are among them.
     """
-    facts = {
+    facts: dict[str, object] = {
         "reference_system": city.reference_system or "unknown",
         **({"axes": list(city.axes)} if city.axes else {}),
         "origin": list(city.origin),
@@ -123,8 +125,11 @@ def city_facts(
         "years": dict(zip(stages, options.years, strict=False)),
     }
     if changes is not None:
-        draws = {"grow": options.grow, "seed": options.seed}
-        facts["first_stage_at_random"] = {**draws, **changes}
+        facts["first_stage_at_random"] = {
+            "grow": options.grow,
+            "seed": options.seed,
+            **changes,
+        }
     if dressing is not None:
         facts["dressing"] = dict(dressing.facts)
     return facts
@@ -178,11 +183,8 @@ def write_drives(
 ) -> None:
     """Writes routes, and scenarios of each through every stage.
 
-    Args:
-        folder: the map's folder, with the map's name.
-        stages: stage -> words for its time, the end of a title.
-        routes: waypoints (N, 3) of at most two [m].
-        cruise: speed on each [m/s].
+    A stage has words for its time, the end of a title. At most two routes have
+    waypoints (N, 3) [m], and a speed each [m/s].
     """
     for letter, waypoints in zip("ab", routes, strict=False):
         rows = [f"{x:.3f},{y:.3f},{z:.3f}" for x, y, z in waypoints]
@@ -218,9 +220,7 @@ def draw_overview(
     The second drive is a thinner line on the first one, so that both are seen
     where they share a street.
     """
-    corners = np.concatenate(
-        [one.triangles.reshape(-1, 3) for one in structures]
-    )
+    corners = joined(one.triangles for one in structures).reshape(-1, 3)
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     if space is not None:
         low = space.low

@@ -32,11 +32,6 @@ class ImportFaults:
         self._counts[kind] += number
         self._examples.setdefault(kind, _printable(example))
 
-    def extend(self, others: ImportFaults) -> None:
-        """Adds the counts of others, found later."""
-        self._counts += others._counts
-        self._examples = {**others._examples, **self._examples}
-
     def take_back(self, kind: str) -> None:
         """Counts one fault less of a kind that has some."""
         kind = _printable(kind)
@@ -96,13 +91,9 @@ class ImportOptions:
 class ImportReport:
     """The result of an import.
 
-    Attributes:
-        kinds: type of object -> number of structures.
-        triangles: number of triangles of all structures.
-        stages: stage -> number of structures.
-        undated, dated: buildings without a year, and with one.
-        drives: lengths of the proposed drives [m].
-        faults: kind, number, example.
+    Numbers of structures by type of object and by stage, of triangles, and of
+    buildings without a year and with one; lengths of the proposed drives [m];
+    kind, number and example of faults.
     """
 
     kinds: dict[str, int]

@@ -31,14 +31,11 @@ _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSystem:
-    """The meaning of a file's three coordinates.
+    """The meaning of a file's three coordinates, each in words.
 
-    Attributes:
-        name: as the file has it; "" if it has none.
-        axes: each coordinate in words.
-        matrix: (3, 3) from coordinates to metres east, north and up.
-        heights_assumed: whether the system has no heights; they are then taken
-            to have the unit of the other coordinates.
+    A matrix (3, 3) leads from coordinates to metres east, north and up. The
+    name is as the file has it; "" if it has none. Heights are assumed to have
+    the unit of the other coordinates if the system has none.
     """
 
     name: str = ""
@@ -58,14 +55,11 @@ class ReferenceSystem:
         return points @ self.matrix.T
 
     def as_used(self, point: np.ndarray) -> ReferenceSystem:
-        """Returns the system as a file uses it.
+        """Returns the system as a file with a point (3,) uses it.
 
         Many programs write east first against the definition. That is assumed
-        only if a point is in the system's area of use with its first two
-        coordinates exchanged, and not otherwise.
-
-        Args:
-            point: (3,) coordinates of the file.
+        only if the point is in the area of use with its first two coordinates
+        exchanged, and not otherwise.
         """
         if not self.axes[0].startswith(("north", "south")):
             return self
@@ -96,13 +90,11 @@ class ReferenceSystem:
 def reference_system(name: str, where: str) -> ReferenceSystem:
     """Returns the axes and units of a reference system.
 
-    Args:
-        name: an EPSG code, or a URL or URN of one, as the file has it.
-        where: the beginning of an error's message.
+    Its name is an EPSG code, or a URL or URN of one, as the file has it.
 
     Raises:
-        InputError: naming the system, if it is unknown, is in degrees, or has
-            axes that are not east, north and up.
+        InputError: naming place and system, if it is unknown, is in degrees, or
+            has axes that are not east, north and up.
     """
     if not name:
         return ReferenceSystem()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,14 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape
-from cns_drake.imports.building_years import (
-    stage_names,
-    stands_at,
-    stands_today,
-)
+from cns_drake.imports.building_years import stands_today
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.foreign_city import ForeignCity, Imported, random_share
+from cns_drake.imports.foreign_city import (
+    ForeignCity,
+    Imported,
+    boxes_of,
+    random_share,
+)
 from cns_drake.imports.options import ImportFaults, ImportOptions
 
 # A building that shares so much of the smaller outline stands in the place of
@@ -111,15 +113,10 @@ def _shares(one: BaseGeometry, other: BaseGeometry) -> bool:
 
 @dataclass(frozen=True)
 class StagedCity:
-    """The structures of a city, stage by stage.
+    """The structures of a city: those of each stage, and those of any.
 
-    Attributes:
-        standing: stage -> its structures.
-        kept: the structures of any stage.
-        undated: number of buildings without a year.
-        dated: number of buildings with a year.
-        gone: buildings that stand no more, if there is but one stage, that
-            of today.
+    Buildings have a year, dated, or none. If there is but one stage, that of
+    today, `gone` are the buildings that stand no more.
     """
 
     standing: dict[str, list[Imported]]
@@ -136,12 +133,8 @@ class StagedCity:
     ) -> StagedCity:
         """Returns the city without structures far from drives.
 
-        Of a terrain, the near part stays.
-
-        Args:
-            drives: the city's drives.
-            distance: greatest distance of a structure's bounding box [m].
-            faults: counts structures left out.
+        Kept structures have a bounding box within the distance [m]; others are
+        counted. The near part of a terrain stays.
 
         Raises:
             InputError: if no structure is near, or there is no drive.
@@ -253,25 +246,41 @@ def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
     A structure that is gone without a date stood at all stages but the last, as
     far as its year, or the lack of one, allows.
     """
-    years, undated = options.years, options.undated
+    years, until = options.years, one.until
     if one.is_gone:
-        past = years[:-1]
-        return stage < len(past) and stands_at(
-            one.year, None, stage, past, undated
+        years, until = years[:-1], None
+        if stage >= len(years):
+            return False
+    if not years:
+        return stands_today(until)
+    if until is not None and years[stage] >= until:
+        return False
+    if one.year is not None:
+        return one.year <= years[stage]
+    if options.undated == "first":
+        return True
+    return options.undated == "last" and stage == len(years) - 1
+
+
+def stage_names(years: Sequence[int]) -> list[str]:
+    """Returns the name of each stage, from 01 on; one without years.
+
+    Raises:
+        InputError: if years do not increase.
+    """
+    if any(a >= b for a, b in pairwise(years)):
+        listed = " ".join(map(str, years))
+        raise InputError(
+            f"--years: {listed}: each year must be after the one before"
         )
-    return stands_at(one.year, one.until, stage, years, undated)
+    return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
 
 
 def _together(city: ForeignCity) -> list[Imported]:
     """Returns the structures of a city without those far away."""
     if not city.structures:
         return []
-    boxes = np.array(
-        [
-            (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))
-            for one in city.structures
-        ]
-    )
+    boxes = boxes_of(city.structures)
     middle = np.median(boxes.mean(axis=1), axis=0)
     kept = []
     for one, reach in zip(

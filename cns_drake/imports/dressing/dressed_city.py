@@ -17,11 +17,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
-from cns_drake.city.geometry.upper_sides import (
-    UpperSides,
-    looks_up,
-    turned_up,
-)
+from cns_drake.city.geometry.upper_sides import UpperSides, looks_up, turned_up
 from cns_drake.imports.dressing import facade_pieces, grounds
 from cns_drake.imports.dressing.facade_pieces import FacadePlan
 from cns_drake.imports.dressing.street_dressing import dress_streets
@@ -30,9 +26,9 @@ from cns_drake.imports.dressing.wall_panels import (
     Panel,
     find_panels,
     is_upright,
-    joined,
 )
 from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import (
     ForeignCity,
     Imported,
@@ -65,16 +61,13 @@ def all_laid_bare(
     buildings: Sequence[Imported], ground: Ground, seed: int
 ) -> list[Bare]:
     """Returns all buildings, lower variants in the style of the original."""
-    whole = [
-        _laid_bare(one, ground, seed) for one in buildings if not one.original
-    ]
-    styles = {some.one.draw_name: some.style for some in whole}
-    lower = [
-        _laid_bare(one, ground, seed, styles.get(one.original))
-        for one in buildings
-        if one.original
-    ]
-    return whole + lower
+    found = []
+    styles: dict[str, Style] = {}
+    for one in sorted(buildings, key=lambda one: one.original != ""):
+        some = _laid_bare(one, ground, seed, styles.get(one.original))
+        styles[one.draw_name] = some.style
+        found.append(some)
+    return found
 
 
 def _laid_bare(
@@ -127,13 +120,9 @@ class DriveViews:
         ground: Ground,
         solids: np.ndarray,
     ):
-        """Prepares the views.
+        """Prepares the views of at least one drive.
 
-        Args:
-            drives: at least one.
-            ground: below them.
-            solids: (M, 3, 3) triangles that hide other things at all stages
-                [m].
+        Solids (M, 3, 3) hide other things at all stages [m].
         """
         paths = [LineString(drive.path) for drive in drives]
         self._xy = shapely.get_coordinates(shapely.segmentize(paths, _SPACING))
@@ -148,24 +137,19 @@ class DriveViews:
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
     def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
-        """Returns which (N,) boxes have a place nearby.
+        """Returns which (N,) boxes have a viewing place within a distance [m].
 
-        Args:
-            limits: (N, 2, 2) least and greatest x and y [m].
-            distance: from a place to the circle about a box, at most [m].
+        Limits (N, 2, 2) are their least and greatest x and y [m]; a circle
+        about each box counts.
         """
         middles = limits.mean(axis=1)
         reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns panels' distances (N,) from the nearest viewing place [m].
+        """Returns distances (N,) of panels from the nearest viewing place [m].
 
-        The distance is infinite if no place within `most` sees the panel.
-
-        Args:
-            panels: N walls.
-            most: the greatest distance [m].
+        They are infinite if no place within `most` sees the panel.
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]
@@ -174,8 +158,12 @@ class DriveViews:
         number = np.repeat(np.arange(len(panels)), counts)
         place = np.concatenate([some for some, _ in pairs])
         distance = np.concatenate([some for _, some in pairs])
-        probes = np.stack([_probes(panel) for panel in panels])
-        is_seen = self._is_seen(probes[number], self._eyes[place])
+        probes = []
+        for panel in panels:
+            top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
+            x, z = _PARTS.T * [[panel.length], [top]]
+            probes.append(panel.place(x, z, _BEFORE))
+        is_seen = self._is_seen(np.stack(probes)[number], self._eyes[place])
         found = np.full(len(panels), np.inf)
         np.minimum.at(found, number[is_seen], distance[is_seen])
         return found
@@ -213,12 +201,6 @@ class DriveViews:
         return np.asarray((hits < 0).reshape(len(eyes), -1).any(axis=1))
 
 
-def _probes(panel: Panel) -> np.ndarray:
-    """Returns places (P, 3) before a panel [m]."""
-    top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
-    return panel.place(_PARTS[:, 0] * panel.length, _PARTS[:, 1] * top, _BEFORE)
-
-
 # Walls that are farther from all drives have no windows, and roofs no
 # equipment [m].
 _WALLS_WITHIN, _ROOFS_WITHIN = 60.0, 100.0
@@ -234,12 +216,10 @@ _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 @dataclass(frozen=True)
 class DressedBuildings:
-    """The result of dressing buildings.
+    """The dressed buildings, by what they were before.
 
-    Attributes:
-        buildings: before -> after.
-        at_random: kind of added detail -> its number.
-        by_file: kind of look that the file gives -> number of buildings.
+    Beside them are counts of added details by kind, and of buildings by the
+    kind of look that the file gives.
     """
 
     buildings: Mapping[Imported, Imported]
@@ -260,22 +240,14 @@ def dress_buildings(
 
     A building looks the same in each stage and each import, since its random
     draws depend on its name. Only the choice of walls with windows depends on
-    the drives, whose neighbourhood gets them.
-
-    Args:
-        structures: those of all stages.
-        drives: through the city; without any no wall has windows.
-        streets: streets of the file; doors and shops face them.
-        ground: below the city.
-        seed: seed of the random draws.
-        always: structures of all stages, which hide what is behind them; all
-            structures if None.
-        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
-            which doors stand [m].
+    the drives, whose neighbourhood gets them. Structures of all stages,
+    `always`, hide what is behind them; all structures do if it is None. Doors
+    and shops face streets, and doors stand above the paving, triangles (M, 3,
+    3) of terrain, streets and sidewalks [m].
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = all_laid_bare(buildings, ground, seed)
-    walls: Mapping[int, list[tuple[FacadePlan, float]]] = {}
+    walls: Mapping[int, list[FacadePlan]] = {}
     if drives and bare:
         lasting = set(buildings if always is None else always)
         hiding = [b.triangles for b in buildings if b in lasting]
@@ -296,15 +268,9 @@ def dress_buildings(
 
 
 def _dressed(
-    some: Bare,
-    plans: Sequence[tuple[FacadePlan, float]],
-    paths: BaseGeometry,
-    seed: int,
+    some: Bare, plans: Sequence[FacadePlan], paths: BaseGeometry, seed: int
 ) -> tuple[Model, Counter[str]]:
-    """Returns the model of a building, and counts of details added at random.
-
-    Plans of its dressed walls come with distances to the drives [m].
-    """
+    """Returns the model of a building, and counts of random details."""
     structure, style = some.one.structure, some.style
     footprint = structure.model.footprint
     out = Assembly(Site(Polygon(), structure.name), some.rng)
@@ -317,21 +283,19 @@ def _dressed(
         sign=style.sign,
         trim=style.trim,
     )
-    planned = {
-        one.tobytes() for plan, _ in plans for one in plan.panel.triangles
-    }
+    planned = {one.tobytes() for plan in plans for one in plan.panel.triangles}
     bare = [one for one in some.walls if one.tobytes() not in planned]
     walls = np.array(bare).reshape(-1, 3, 3)
     out.add_to("body", to_mesh(walls), to_mesh(some.rest))
     out.add_to("roof", to_mesh(some.roof))
     counts: Counter[str] = Counter()
-    for plan, distance in plans:
+    for plan in plans:
         # A name that does not depend on the map's origin.
         panel = plan.panel
         heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
         wall = f"wall {panel.length:.1f} {heading:.0f}"
         rng = random_generator(seed, wall, some.one.draw_name)
-        counts += facade_pieces.add_facade(out, plan, distance, rng)
+        counts += facade_pieces.add_facade(out, plan, rng)
     has_own_roof = some.one.lod >= _OWN_ROOF or not len(some.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
         facade_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
@@ -346,11 +310,8 @@ def _plans(
     ground: Ground,
     views: DriveViews,
     paving: UpperSides,
-) -> dict[int, list[tuple[FacadePlan, float]]]:
-    """Returns the walls to dress, and their distance to the drives [m].
-
-    The key is the number of the building.
-    """
+) -> dict[int, list[FacadePlan]]:
+    """Returns the number of a building -> its walls to dress."""
     walls = [
         some.walls if some.one.lod < _OWN_WINDOWS else np.zeros((0, 3, 3))
         for some in bare
@@ -358,12 +319,7 @@ def _plans(
     panels, to_drive = _seen(walls, views)
     if not panels:
         return {}
-    before = np.array(
-        [
-            panel.place(np.array(panel.length / 2), np.array(0.0), 1.0)
-            for panel in panels
-        ]
-    )
+    before = np.array([p.place(p.length / 2, 0.0, 1.0) for p in panels])
     heights = ground.height(before[:, :2])
     plans = [
         facade_pieces.plan_facade(
@@ -371,8 +327,11 @@ def _plans(
             bare[panel.building].style,
             bare[panel.building].base,
             float(height),
+            float(distance),
         )
-        for panel, height in zip(panels, heights, strict=True)
+        for panel, height, distance in zip(
+            panels, heights, to_drive, strict=True
+        )
     ]
     solids = [some.one.triangles for some in bare]
     upper = UpperSides(np.concatenate(solids))
@@ -383,18 +342,13 @@ def _plans(
         plan.without(some)
         for plan, some in zip(plans, np.split(hidden, ends), strict=True)
     ]
-    ways = MultiLineString(
-        [
-            *(street.line for street in streets),
-            *(drive.path for drive in drives),
-        ]
-    )
+    lines = [street.line for street in streets]
+    ways = MultiLineString([*lines, *(drive.path for drive in drives)])
     to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for k, plan in enumerate(plans):
         groups[plan.panel.building].append(k)
-    found: dict[int, list[tuple[FacadePlan, float]]] = {}
-    for number, members in groups.items():
+    for members in groups.values():
         possible = [k for k in members if plans[k].on_street]
         # The wall with the building's door.
         front = min(possible, key=lambda k: (to_way[k], k), default=None)
@@ -404,8 +358,11 @@ def _plans(
                 plan = facade_pieces.with_shops(plan, paving)
             if k == front:
                 plan = facade_pieces.with_doors(plan, paving)
-            found.setdefault(number, []).append((plan, float(to_drive[k])))
-    return found
+            plans[k] = plan
+    return {
+        number: [plans[k] for k in members]
+        for number, members in groups.items()
+    }
 
 
 def _seen(
@@ -413,19 +370,11 @@ def _seen(
 ) -> tuple[list[Panel], np.ndarray]:
     """Returns the plane walls that drives see from near, and how near [m].
 
-    The nearest come first, within the budget of triangles.
-
-    Args:
-        walls: walls of each building, upright triangles (M, 3, 3) [m].
-        views: from the drives.
+    The nearest come first, within the budget of triangles. Walls of each
+    building are upright triangles (M, 3, 3) [m].
     """
-    panels = [
-        panel
-        for panel in find_panels(
-            walls, lambda limits: views.are_near(limits, _WALLS_WITHIN)
-        )
-        if panel.is_plane
-    ]
+    panels = find_panels(walls, lambda xy: views.are_near(xy, _WALLS_WITHIN))
+    panels = [panel for panel in panels if panel.is_plane]
     distances = views.distances(panels, _WALLS_WITHIN)
     order = np.argsort(distances, kind="stable")
     order = order[distances[order] <= _WALLS_WITHIN]
@@ -437,46 +386,18 @@ def _seen(
     return [panels[k] for k in order], distances[order]
 
 
-_TERRAIN = "TINRelief"
-
-
 @dataclass(frozen=True)
 class Dressing:
-    """A dressed city.
+    """A dressed city, and the guessed ground with its class and colour.
 
-    Attributes:
-        city: dressed.
-        origins: name of a structure -> `dressed` or `lot`; all others are as
-            the file has them.
-        facts: counts of parts from the file and at random, to be written.
-        bottom: the guessed ground, with its class and colour.
+    Names of structures have the origin `dressed` or `lot`; all others are as
+    the file has them. Facts count parts from the file and at random.
     """
 
     city: StagedCity
     origins: Mapping[str, str]
     facts: Mapping[str, Any]
     bottom: Sequence[Structure]
-
-
-def _laid(
-    staged: StagedCity,
-    city: ForeignCity,
-    drives: Sequence[WaypointDrive],
-    ground: Ground,
-    is_paved: bool,
-) -> list[Imported]:
-    """Returns streets and sidewalks that the file lacks."""
-    if not drives:
-        return []
-    laid = list(grounds.missing_sidewalks(staged.kept, city.streets, drives))
-    if is_paved and city.streets:
-        laid += grounds.paved_gaps([*staged.kept, *laid], drives)
-    elif is_paved and not any(
-        one.structure.semantic_class in ("road", "sidewalk")
-        for one in staged.kept
-    ):
-        laid += grounds.guessed_streets(staged.kept, drives, ground)
-    return laid
 
 
 def dress_city(
@@ -495,43 +416,46 @@ def dress_city(
     """
     always = set.intersection(*map(set, staged.standing.values()))
     is_paved = grounds.is_dense(staged.kept)
-    laid = _laid(staged, city, drives, ground, is_paved)
+    kept, streets = staged.kept, city.streets
+    # Streets and sidewalks that the file lacks.
+    laid: list[Imported] = []
+    if drives:
+        laid += grounds.missing_sidewalks(kept, streets, drives)
+        classes = {one.structure.semantic_class for one in kept}
+        if is_paved and streets:
+            laid += grounds.paved_gaps([*kept, *laid], drives)
+        elif is_paved and classes.isdisjoint(("road", "sidewalk")):
+            laid += grounds.guessed_streets(kept, drives, ground)
     paving = [
         one.triangles
-        for one in [*staged.kept, *laid]
+        for one in [*kept, *laid]
         if one.is_ground or one.kind == "Sidewalk"
     ]
     buildings = dress_buildings(
-        staged.kept, drives, city.streets, ground, seed, always, joined(paving)
+        kept, drives, streets, ground, seed, always, joined(paving)
     )
-    marks = list(grounds.lane_marks(city.streets, drives)) if drives else []
     added = [
         grounds.with_kerb(one) if one.kind == "Sidewalk" else one
         for one in laid
     ]
-    added += marks
-    bottom = bottom_of(staged.kept, ground)
+    if drives:
+        added += grounds.lane_marks(streets, drives)
+    bottom = bottom_of(kept, ground)
+    everything = [*kept, *added]
     things = dress_streets(
-        [*staged.kept, *added],
-        city.things,
-        city.streets,
-        drives,
-        ground,
-        bottom,
-        seed,
+        everything, city.things, streets, drives, ground, bottom, seed
     )
     changed = dict(buildings.buildings)
     at_random = buildings.at_random + Counter(one.kind for one in added)
-    # Whether the file has a ground's kind, not only its height.
-    has_kind = any(o.is_ground and o.kind != _TERRAIN for o in staged.kept)
-    if is_paved and not has_kind:
+    terrain = [one for one in kept if one.kind == "TINRelief"]
+    # Whether the file has only the height of a ground, not its kind.
+    if is_paved and sum(one.is_ground for one in kept) == len(terrain):
         changed |= {
             one: replace(one, structure=grounds.paved(one.structure))
-            for one in staged.kept
-            if one.kind == _TERRAIN
+            for one in terrain
         }
     if drives:
-        walks = [one for one in staged.kept if one.kind == "Sidewalk"]
+        walks = [one for one in kept if one.kind == "Sidewalk"]
         changed |= {
             one: grounds.with_kerb(one)
             for one in grounds.near_drives(walks, drives)
@@ -542,12 +466,8 @@ def dress_city(
             things.sources.remove(thing.source)
             city.faults.take_back(f"{thing.element}, left out")
     origins = {one.structure.name: "dressed" for one in changed.values()}
-    from_file = things.from_file
-    origins |= {
-        one.structure.name: "lot"
-        for one in added
-        if one.structure.name not in from_file
-    }
+    names = {one.structure.name for one in added} - things.from_file
+    origins |= dict.fromkeys(names, "lot")
     facts = {
         "seed": seed,
         "buildings": len(buildings.buildings),
@@ -555,12 +475,7 @@ def dress_city(
         "at_random": dict(sorted((at_random + things.at_random).items())),
         "without_room": things.no_room,
     }
-    moved = {
-        one: things.moved[one.structure.name]
-        for one in staged.kept
-        if one.structure.name in things.moved
-    }
-    dressed = staged.replaced({**changed, **moved}).joined(added)
+    dressed = staged.replaced({**changed, **things.moved}).joined(added)
     if len(dressed.kept) >= MAX_STRUCTURES:
         raise InputError(
             f"--plain: without it the city has {len(dressed.kept)} structures,"

@@ -56,14 +56,10 @@ _ON_GROUND = 0.6
 
 
 class Opening(NamedTuple):
-    """A window or a door of a wall, in the panel's coordinates.
+    """A window or a door of a wall, in the panel's coordinates [m].
 
-    Attributes:
-        row: number of its storey.
-        nth: number of its bay from the nearer end of the wall.
-        x0, x1: limits of its bay [m].
-        z0, z1: bottom and top [m].
-        kind: `window`, `shop`, `door` or `gate`.
+    Its row is a storey, and `nth` the number of its bay from the nearer end of
+    the wall. The kind is `window`, `shop`, `door` or `gate`.
     """
 
     row: int
@@ -79,13 +75,9 @@ class Opening(NamedTuple):
 class FacadePlan:
     """A wall with its openings.
 
-    Attributes:
-        panel: the wall.
-        style: style of its building.
-        openings: its openings.
-        floor: height of the lowest floor in the panel [m].
-        ground: height of the ground in front, in the panel's coordinates [m].
-        top_is_free: whether nothing is built against its upper edge.
+    The lowest floor, and the ground in front, have heights in the panel, and
+    the nearest drive a distance [m]. The top is free if nothing is built
+    against its upper edge.
     """
 
     panel: Panel
@@ -93,6 +85,7 @@ class FacadePlan:
     openings: Sequence[Opening]
     floor: float
     ground: float
+    to_drive: float
     top_is_free: bool = True
 
     @property
@@ -104,6 +97,11 @@ class FacadePlan:
         """The openings on the ground floor."""
         on_ground = self.stands_on_ground
         return [o for o in self.openings if o.row == 0 and on_ground]
+
+    def is_in_the_way(self, z: float, reach: float) -> bool:
+        """Returns whether a part at z would hang over a car's path [m]."""
+        is_low = z - self.ground < _TALLEST_CAR
+        return is_low and self.to_drive < reach + _BESIDE
 
     def probes(self) -> np.ndarray:
         """Returns places (N + 1, 3) before the openings, and at the top."""
@@ -142,12 +140,12 @@ class FacadePlan:
 
 
 def plan_facade(
-    panel: Panel, style: Style, base: float, ground: float
+    panel: Panel, style: Style, base: float, ground: float, to_drive: float
 ) -> FacadePlan:
     """Returns a wall full of windows.
 
     Base and ground are the heights of the lowest floor of the building, and of
-    the ground before the panel [m].
+    the ground before the panel; the nearest drive is `to_drive` away [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
     cells = bays.stretches(panel.length, style.pitch, _MARGIN)
@@ -168,7 +166,7 @@ def plan_facade(
                 Opening(row, min(k, len(cells) - 1 - k), x0, x1, low, high)
                 for k, (x0, x1) in enumerate(cells)
             ]
-    return FacadePlan(panel, style, openings, floor, ground)
+    return FacadePlan(panel, style, openings, floor, ground, to_drive)
 
 
 def with_shops(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
@@ -245,15 +243,9 @@ _EXACT, _LEAST_AREA = 1e-3, 1e-4
 
 
 def add_facade(
-    out: Assembly,
-    plan: FacadePlan,
-    to_drive: float,
-    rng: np.random.Generator,
+    out: Assembly, plan: FacadePlan, rng: np.random.Generator
 ) -> Counter[str]:
-    """Adds all parts of a wall; returns how many details of each kind.
-
-    The nearest drive is `to_drive` away [m].
-    """
+    """Adds all parts of a wall; returns how many details of each kind."""
     counts: Counter[str] = Counter()
     panel, style = plan.panel, plan.style
     has_balconies = style.balconies and bool(rng.random() < 0.6)
@@ -266,18 +258,18 @@ def add_facade(
             for o in plan.openings
         ]
         plan = replace(plan, openings=openings)
-    plan, reliefs, area = _in_outline(plan, to_drive)
+    plan, reliefs, area = _in_outline(plan)
     if not reliefs:
         out.add_to("body", to_mesh(panel.triangles))
     else:
-        _add_wall(out, panel, reliefs, area, to_drive < _RECESSES_WITHIN)
+        _add_wall(out, panel, reliefs, area, plan.to_drive < _RECESSES_WITHIN)
         counts["windows"] = sum(o.kind == "window" for o in plan.openings)
         counts["doors"] = sum(o.kind in ("door", "gate") for o in plan.openings)
         if has_balconies:
-            counts["balconies"] = _add_balconies(out, plan, to_drive)
-        counts += _add_signs(out, plan, to_drive, rng)
+            counts["balconies"] = _add_balconies(out, plan)
+        counts += _add_signs(out, plan, rng)
     if panel.outline is None and plan.top_is_free:
-        if to_drive < _RECESSES_WITHIN:
+        if plan.to_drive < _RECESSES_WITHIN:
             counts["plinths"] = _add_plinth(out, plan, reliefs)
         if style.cornice and panel.height > _LEAST_WALL:
             is_gutter = style.cornice < _GUTTER
@@ -296,7 +288,7 @@ def _put(out: Assembly, material: str, panel: Panel, *meshes: Mesh) -> None:
 
 
 def _in_outline(
-    plan: FacadePlan, to_drive: float
+    plan: FacadePlan,
 ) -> tuple[FacadePlan, list[tuple[Relief, str]], tuple[float, ...]]:
     """Returns a plan without the rows that leave the outline of its panel.
 
@@ -310,9 +302,7 @@ def _in_outline(
     if outline is not None:
         outline = shapely.buffer(outline, _EXACT, join_style="mitre")
     while True:
-        reliefs = [
-            r for o in plan.openings for r in _reliefs(o, plan, to_drive)
-        ]
+        reliefs = [r for o in plan.openings for r in _reliefs(o, plan)]
         if outline is None or not reliefs:
             return plan, reliefs, area
         sides = np.array([(r.x0, r.z0, r.x1, r.z1) for r, _ in reliefs])
@@ -326,9 +316,7 @@ def _in_outline(
         plan = replace(plan, openings=kept)
 
 
-def _reliefs(
-    opening: Opening, plan: FacadePlan, to_drive: float
-) -> list[tuple[Relief, str]]:
+def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
     """Returns the reliefs of an opening, with the materials of their fronts."""
     style, kind = plan.style, opening.kind
     x0, x1, z0 = opening.x0, opening.x1, opening.z0
@@ -342,8 +330,8 @@ def _reliefs(
         depth = style.depth + _DOOR_DEEPER
         bay = bays.house_door(_DOOR_WIDTH, 0.0, height, depth)
     else:
-        has_bars = to_drive < _BARS_WITHIN
-        has_sill = to_drive < _SILLS_WITHIN and z0 > 0.2
+        has_bars = plan.to_drive < _BARS_WITHIN
+        has_sill = plan.to_drive < _SILLS_WITHIN and z0 > 0.2
         bay = bays.window(
             style.width,
             0.0,
@@ -364,7 +352,7 @@ def _reliefs(
         elif kind in ("door", "gate") and depth > 0.0:
             material = "doors"
         found.append((lifted(relief, z0), material))
-    if to_drive < _RECESSES_WITHIN:
+    if plan.to_drive < _RECESSES_WITHIN:
         return found
     first = next((pair for pair in found if pair[1] in _ON_WALL), None)
     if first is None:
@@ -435,14 +423,14 @@ def _has_balcony(opening: Opening) -> bool:
     return opening.row >= 1 and opening.nth % 2 == 1
 
 
-def _add_balconies(out: Assembly, plan: FacadePlan, to_drive: float) -> int:
+def _add_balconies(out: Assembly, plan: FacadePlan) -> int:
     count = 0
     for o in filter(_has_balcony, plan.openings):
         middle, z = (o.x0 + o.x1) / 2, o.z0 - 0.02
         half = min(_BALCONY_WIDTH, 1.5 * (o.x1 - o.x0)) / 2
         x0 = max(0.1, middle - half)
         x1 = min(plan.panel.length - 0.1, middle + half)
-        if not _in_the_way(z - plan.ground, _BALCONY_REACH, to_drive):
+        if not plan.is_in_the_way(z, _BALCONY_REACH):
             mesh = details.balcony(x0, x1, _BALCONY_REACH, z)
             _put(out, "trim", plan.panel, mesh)
             count += 1
@@ -450,10 +438,7 @@ def _add_balconies(out: Assembly, plan: FacadePlan, to_drive: float) -> int:
 
 
 def _add_signs(
-    out: Assembly,
-    plan: FacadePlan,
-    to_drive: float,
-    rng: np.random.Generator,
+    out: Assembly, plan: FacadePlan, rng: np.random.Generator
 ) -> Counter[str]:
     """Adds the signs and awnings above shop windows."""
     shops = [o for o in plan.openings if o.kind == "shop"]
@@ -470,14 +455,10 @@ def _add_signs(
     shape = (_JAMB, _AWNING_REACH, high - _AWNING_HEIGHT, high)
     cells = [(o.x0, o.x1) for o in shops]
     awnings = details.awnings(panel.frame, cells, rng, 0.4, shape)
-    if _in_the_way(low - plan.ground, _AWNING_REACH, to_drive):
+    if plan.is_in_the_way(low, _AWNING_REACH):
         awnings = []
     out.add_to("sign", *awnings)
     return Counter({"shop windows": len(shops), "awnings": len(awnings)})
-
-
-def _in_the_way(height: float, reach: float, to_drive: float) -> bool:
-    return height < _TALLEST_CAR and to_drive < reach + _BESIDE
 
 
 # A roof is level if the z of its unit normal is at least the first; level parts
@@ -515,21 +496,14 @@ def add_roof_pieces(
     out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
 ) -> None:
     """Adds the equipment of a roof with upper sides (M, 3, 3) [m]."""
-    if is_flat:
-        _equip(out, roof, style)
-    elif style.use in _CHIMNEYS:
-        _add_chimneys(out, roof)
-
-
-def _equip(out: Assembly, roof: np.ndarray, style: Style) -> None:
     items = _ITEMS.get(style.use, "").split()
-    found = _largest_level(roof)
-    if found is None or not items:
-        return
-    area, z = found
-    count = min(_MOST, len(items), int(area.area / _ROOF_EACH) + 1)
-    ring = np.array(area.exterior.coords)[:-1]
-    equip_roof(out, ring, z, items[:count])
+    if is_flat and items and (found := _largest_level(roof)) is not None:
+        area, z = found
+        count = min(_MOST, len(items), int(area.area / _ROOF_EACH) + 1)
+        ring = np.array(area.exterior.coords)[:-1]
+        equip_roof(out, ring, z, items[:count])
+    if not is_flat and style.use in _CHIMNEYS:
+        _add_chimneys(out, roof)
 
 
 def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:

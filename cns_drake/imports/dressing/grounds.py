@@ -1,6 +1,5 @@
 """The ground of a dressed city: kerbs, sidewalks, streets, paving, marks."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -13,10 +12,15 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape, Part, Structure
 from cns_drake.city.geometry.upper_sides import looks_up, turned_up
-from cns_drake.imports.dressing.wall_panels import joined
 from cns_drake.imports.drives.search import WaypointDrive
-from cns_drake.imports.faces import flat_surface, parts_of
-from cns_drake.imports.foreign_city import Imported, Rgb, Street, make_imported
+from cns_drake.imports.faces import flat_surface, joined, parts_of
+from cns_drake.imports.foreign_city import (
+    Imported,
+    Rgb,
+    Street,
+    ends_at_nodes,
+    make_imported,
+)
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.options import ImportFaults
 
@@ -163,13 +167,14 @@ def missing_sidewalks(
             if not part.buffer(-0.3).is_empty
         ]
         if surface:
-            yield make_imported(
-                f"sidewalk_{street.name}",
-                "sidewalk",
-                "Sidewalk",
-                {"surface": np.concatenate(surface)},
-                {},
-            )
+            laid = np.concatenate(surface)
+            yield _paved(f"sidewalk_{street.name}", "sidewalk", laid)
+
+
+def _paved(name: str, semantic_class: str, surface: np.ndarray) -> Imported:
+    """Returns a road, or a sidewalk, of triangles (N, 3, 3) [m]."""
+    kind = semantic_class.capitalize()
+    return make_imported(name, semantic_class, kind, {"surface": surface}, {})
 
 
 def _areas(geometry: BaseGeometry) -> MultiPolygon:
@@ -202,20 +207,21 @@ def guessed_streets(
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
-    walls = _area(
-        [one for one in near if one.structure.semantic_class == "building"],
-        paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL),
-    )
+    houses = [o for o in near if o.structure.semantic_class == "building"]
+    roofs = _upper_sides(houses, with_lower=False)
+    reach = paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL)
+    shapely.prepare(reach)
+    roofs = roofs[shapely.intersects(reach, roofs)]
+    walls = shapely.union_all(roofs, grid_size=_GRID)
     street = _cut(paths.buffer(HALF_STREET, 4), walls.buffer(_FROM_WALL, 1))
     beside = _cut(paths.buffer(HALF_STREET + _SIDEWALK, 4), street)
     beside = _cut(beside, walls)
     half = _NARROWEST / 2.0
     wide = beside.buffer(-half, 2).buffer(half, 2)
     sidewalks = wide.intersection(beside)
-    terrain = [one.triangles for one in structures if one.kind == "TINRelief"]
-    if terrain:
-        below = turned_up(np.concatenate(terrain))
-    else:
+    terrain = (one for one in structures if one.kind == "TINRelief")
+    below = turned_up(joined(one.triangles for one in terrain))
+    if not len(below):
         mesh = ground.to_mesh()
         below = mesh.vertices[mesh.triangles()]
         heights = ground.height(below.reshape(-1, 3)[:, :2])
@@ -223,43 +229,24 @@ def guessed_streets(
     below = below[looks_up(below)]
     outlines = np.asarray(shapely.polygons(below[:, [0, 1, 2, 0], :2]))
     tree = shapely.STRtree(outlines)
-    for name, kind, semantic_class, area, above in (
-        ("carriageway", "Road", "road", street, _ABOVE),
-        ("sidewalk", "Sidewalk", "sidewalk", sidewalks, KERB_HEIGHT),
+    for name, semantic_class, area, above in (
+        ("carriageway", "road", street, _ABOVE),
+        ("sidewalk", "sidewalk", sidewalks, KERB_HEIGHT),
     ):
         for number, part in enumerate(parts_of(area)):
             hit = np.sort(tree.query(part, "intersects"))
             surface = _laid(part, below[hit], outlines[hit], above)
             if len(surface):
-                yield make_imported(
-                    f"{name}_{number}",
-                    semantic_class,
-                    kind,
-                    {"surface": surface},
-                    {},
-                )
-
-
-def _area(structures: Sequence[Imported], near: BaseGeometry) -> BaseGeometry:
-    """Returns the area of structures near a place, from above."""
-    polygons = _upper_sides(structures, with_lower=False)
-    shapely.prepare(near)
-    return shapely.union_all(
-        polygons[shapely.intersects(near, polygons)],
-        grid_size=_GRID,
-    )
+                yield _paved(f"{name}_{number}", semantic_class, surface)
 
 
 def _laid(
     area: BaseGeometry, ground: np.ndarray, outlines: np.ndarray, above: float
 ) -> np.ndarray:
-    """Returns an area laid on a ground, as triangles (N, 3, 3) [m].
+    """Returns an area laid above a ground, as triangles (N, 3, 3) [m].
 
-    Args:
-        area: from above.
-        ground: triangles (M, 3, 3) that look upwards and meet it [m].
-        outlines: (M,) theirs from above.
-        above: height above it [m].
+    Triangles (M, 3, 3) of the ground look upwards and meet the area; outlines
+    (M,) are theirs from above.
     """
     pieces = shapely.intersection(outlines, area, grid_size=_GRID)
     found = [np.zeros((0, 3, 3))]
@@ -318,8 +305,7 @@ def paved_gaps(
         ):
             continue
         taken = shapely.union_all(
-            other[other_tree.query(part, "intersects")],
-            grid_size=_GRID,
+            other[other_tree.query(part, "intersects")], grid_size=_GRID
         )
         free = _cut(part, taken)
         inside = free.buffer(-_NARROWEST_GAP / 2.0, 2)
@@ -335,13 +321,8 @@ def paved_gaps(
         )
     found = [some for some in surfaces.values() if some]
     for number, some in enumerate(found):
-        yield make_imported(
-            f"sidewalk_gap_{number}",
-            "sidewalk",
-            "Sidewalk",
-            {"surface": turned_up(np.concatenate(some))},
-            {},
-        )
+        surface = turned_up(np.concatenate(some))
+        yield _paved(f"sidewalk_gap_{number}", "sidewalk", surface)
 
 
 def _upper_sides(
@@ -406,13 +387,12 @@ def lane_marks(
 
 def _junctions(streets: Sequence[Street]) -> shapely.MultiPoint:
     """Returns the places where more than two ends of streets meet."""
-    ends: Counter[int] = Counter()
-    places = {}
-    for street in streets:
-        last = len(street.nodes) - 1
-        for k, node in enumerate(street.nodes):
-            ends[node] += 1 if k in (0, last) else 2
-            places[node] = street.line[k]
+    ends = ends_at_nodes(streets)
+    places = {
+        node: place
+        for street in streets
+        for node, place in zip(street.nodes, street.line, strict=True)
+    }
     return shapely.MultiPoint([places[n] for n in ends if ends[n] > 2])
 
 

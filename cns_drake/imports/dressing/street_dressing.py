@@ -1,8 +1,9 @@
 """Small things along streets: those of the file, and others at random."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from shapely.geometry import LineString, MultiLineString, MultiPoint, Point
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.round_shapes import revolved
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import Occupancy, placed
@@ -18,7 +20,6 @@ from cns_drake.city.geometry.structures import (
     CylinderShape,
     MeshShape,
     Model,
-    Part,
     SphereShape,
     Structure,
     ground_triangles,
@@ -27,8 +28,8 @@ from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.imports.dressing.grounds import HALF_STREET
-from cns_drake.imports.dressing.wall_panels import joined
 from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import (
     Imported,
     Street,
@@ -37,6 +38,7 @@ from cns_drake.imports.foreign_city import (
 )
 from cns_drake.imports.ground import Ground
 
+_TABLES = parse_yaml(Path(__file__).with_name("streets.yaml").read_bytes())
 # A thing on a carriageway is moved beside it, to this distance from its edge
 # [m].
 FROM_EDGE = 0.6
@@ -91,19 +93,16 @@ def without_curves(model: Model) -> Model:
             r, is_disc = shape.radius, shape.length < shape.radius
             name = _DISC if is_disc else _POST
             sides = _SIDES_OF_DISC if is_disc else _SIDES
-            part = _with_mesh(part, name, (r, r, shape.length))
+            scaled = MeshShape(name, (r, r, shape.length))
+            part = replace(part, shape=scaled)
             meshes[name] = _turned([1.0], [0.5], sides)
         elif isinstance(shape, SphereShape):
-            part = _with_mesh(part, _BALL, (shape.radius,) * 3)
+            r = shape.radius
+            part = replace(part, shape=MeshShape(_BALL, (r, r, r)))
             low = np.sqrt(0.5)
             meshes[_BALL] = _turned([0.0, low, 1.0], [1.0, low, 0.0], _SIDES)
         parts.append(part)
     return replace(model, parts=tuple(parts), meshes=meshes)
-
-
-def _with_mesh(part: Part, name: str, scale: tuple[float, ...]) -> Part:
-    x, y, z = scale
-    return replace(part, shape=MeshShape(name, (x, y, z)))
 
 
 def _turned(radius: list[float], z: list[float], sides: int) -> Mesh:
@@ -122,25 +121,22 @@ _FROM_WALL, _BETWEEN = 0.25, 0.2
 _STEEPEST, _BRIDGE = 0.5, 1.0
 # Radius about the middle of a trunk that nothing else takes [m].
 _TRUNK = 0.4
+# Classes of structures against which nothing stands.
+_SOLID = ("building", "fence", "other-structure")
 
 
 @dataclass
 class StreetThings:
     """The placed things.
 
-    Attributes:
-        structures: in the world.
-        from_file: names of structures from the file.
-        moved: name of a tree of the file -> the same beside the carriageway.
-        sources: sources of the file's things that were placed.
-        by_file, at_random: kind -> how many.
-        no_room: how many of the file's things would stand in the way of a
-            drive, in a wall or in each other.
+    Those from the file are counted, those at random, and those of the file that
+    would stand in the way of a drive, in a wall or in each other. Trees of the
+    file that were on a carriageway are moved beside it.
     """
 
     structures: list[Imported] = field(default_factory=list)
     from_file: set[str] = field(default_factory=set)
-    moved: dict[str, Imported] = field(default_factory=dict)
+    moved: dict[Imported, Imported] = field(default_factory=dict)
     sources: set[str] = field(default_factory=set)
     by_file: Counter[str] = field(default_factory=Counter)
     at_random: Counter[str] = field(default_factory=Counter)
@@ -162,21 +158,16 @@ class StreetRoom:
         self._ground = ground
         self.paths = MultiLineString([drive.path for drive in drives])
         shapely.prepare(self.paths)
-        solids = [
-            one.triangles
-            for one in structures
-            if one.structure.semantic_class
-            in ("building", "fence", "other-structure")
-        ]
-        paved = [
-            one.triangles
-            for one in structures
-            if one.is_ground or one.kind == "Sidewalk"
-        ]
-        self._solids = UpperSides(joined(solids))
-        roads = [one.triangles for one in structures if one.kind == "Road"]
-        self._roads = UpperSides(turned_up(joined(roads)))
-        laid = joined([*paved, ground_triangles(bottom)])
+
+        def triangles(is_wanted: Callable[[Imported], bool]) -> np.ndarray:
+            return joined(o.triangles for o in structures if is_wanted(o))
+
+        solids = triangles(lambda o: o.structure.semantic_class in _SOLID)
+        self._solids = UpperSides(solids)
+        roads = triangles(lambda o: o.kind == "Road")
+        self._roads = UpperSides(turned_up(roads))
+        paved = triangles(lambda o: o.is_ground or o.kind == "Sidewalk")
+        laid = joined([paved, ground_triangles(bottom)])
         self._laid = UpperSides(turned_up(laid))
         self._taken = Occupancy()
         self._names = {one.structure.name for one in structures}
@@ -275,32 +266,6 @@ ROWS_WITHIN = 70.0
 _CAR_EVERY, _CARS, _FROM_KERB, _FROM_CROSSING = (5.8, 7.2), 0.6, 1.05, 5.0
 # A car along a row; a bay across one, its width and length; between bays [m].
 _ROW_PITCH, _BAY, _AISLE = 6.2, (2.6, 5.0), 5.5
-# Weights of parked vehicles.
-_FORMS = {
-    "city_car": 3.0,
-    "hatchback": 4.0,
-    "saloon": 3.0,
-    "estate": 4.0,
-    "suv": 2.0,
-    "van": 2.0,
-    "box_truck": 0.3,
-}
-_NO_PARKING = (
-    "no",
-    "no_parking",
-    "no_stopping",
-    "separate",
-    "drawn_separately",
-    "street_side",
-    "lay_by",
-)
-_PARKING_KEYS = (
-    "parking:{}",
-    "parking:{}:restriction",
-    "parking:lane:{}",
-    "parking:condition:{}",
-)
-_WITHOUT_CARS = ("service", "track", "motorway", "trunk", "living_street")
 
 
 def may_park_on(side: str, street: Street) -> bool:
@@ -308,14 +273,14 @@ def may_park_on(side: str, street: Street) -> bool:
 
     https://wiki.openstreetmap.org/wiki/Street_parking
     """
-    if street.tags.get("highway", "") in _WITHOUT_CARS:
+    if street.tags.get("highway", "") in _TABLES["streets without parked cars"]:
         return False
     values = {
         street.tags.get(key.format(which))
         for which in (side, "both")
-        for key in _PARKING_KEYS
+        for key in _TABLES["parking keys"]
     }
-    return not values & set(_NO_PARKING)
+    return not values & set(_TABLES["no parking"])
 
 
 class Row(NamedTuple):
@@ -335,7 +300,7 @@ def park_along(
 ) -> None:
     """Parks cars along the right and the left of a street."""
     line = row.line
-    others = lines.difference(line.buffer(0.5)) if not lines.is_empty else lines
+    others = lines.difference(line.buffer(0.5))
     for side, is_allowed in zip((1.0, -1.0), row.may_park, strict=True):
         if not is_allowed:
             continue
@@ -345,10 +310,9 @@ def park_along(
             yaw += 0.0 if side > 0 else np.pi
             is_taken = rng.random() < _CARS
             yaw += float(rng.uniform(-0.02, 0.02))
-            form = pick(_FORMS, rng)
-            is_clear = (
-                others.is_empty or others.distance(Point(xy)) > _FROM_CROSSING
-            )
+            form = pick(_TABLES["vehicles"], rng)
+            # Without other streets the distance is NaN.
+            is_clear = not others.distance(Point(xy)) <= _FROM_CROSSING
             if is_taken and is_clear:
                 kind = f"car_{row.name}_{int(s)}_{'lr'[side > 0]}"
                 if placing.place(kind, form, xy, yaw, rng):
@@ -384,7 +348,7 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
             x = (k - (count - 1) / 2.0) * pitch + float(rng.uniform(-0.2, 0.2))
             place = middle + x * along + offset * across
             yaw = heading + float(rng.uniform(-0.02, 0.02))
-            form = pick(_FORMS, rng)
+            form = pick(_TABLES["vehicles"], rng)
             if rng.random() > _CARS or not area.contains(Point(place)):
                 continue
             xy = (float(place[0]), float(place[1]))
@@ -394,21 +358,9 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
 
 # Things farther from all drives are left out [m].
 _THINGS_WITHIN = 100.0
-# Lamps at random: their distance, and the range in which a lamp of the file
-# replaces one [m].
-_LAMP_EVERY, _LAMP_NEAR = 27.0, 35.0
+# Lamps at random: their distance, from those of the file too [m].
+_LAMP_EVERY = 27.0
 _SMALL_EVERY = 22.0
-_SMALL = {
-    "litter_bin": 3.0,
-    "bench": 2.0,
-    "bicycle_rack": 2.0,
-    "bollard": 2.0,
-    "cabinet": 1.0,
-    "post_box": 0.5,
-    "hydrant": 1.0,
-    "sign_round": 2.0,
-    "sign_rectangular": 1.0,
-}
 
 
 def dress_streets(
@@ -486,7 +438,7 @@ def _off_carriageway(
         structure=replace(structure, xyz=(x, y, z)),
         triangles=tree.triangles + np.array([x - xy[0], y - xy[1], 0.0]),
     )
-    placing.found.moved[structure.name] = moved
+    placing.found.moved[tree] = moved
     return moved
 
 
@@ -523,7 +475,7 @@ def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
         for offset in (row.half + FROM_EDGE, row.half - 0.4, 2.3):
             xy, yaw = place_along(row.line, s, side, offset)
             if any(
-                np.hypot(x - xy[0], y - xy[1]) < min(_LAMP_NEAR, _LAMP_EVERY)
+                np.hypot(x - xy[0], y - xy[1]) < _LAMP_EVERY
                 for x, y in placing.lamps
             ):
                 break
@@ -541,7 +493,7 @@ def _furnish(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
     s = float(rng.uniform(3.0, 12.0))
     while s < row.line.length:
         side = 1.0 if rng.random() < 0.5 else -1.0
-        kind = pick(_SMALL, rng)
+        kind = pick(_TABLES["small things"], rng)
         xy, yaw = place_along(row.line, s, side, row.half + FROM_EDGE)
         yaw += side * np.pi / 2.0
         if placing.place(f"{kind}_{row.name}_{int(s)}", kind, xy, yaw, rng):

@@ -52,18 +52,10 @@ _SMALL = 45.0  # [m^2]
 class Style:
     """How a building is dressed; lengths in metres.
 
-    Attributes:
-        use: the use of the building.
-        storey: height of a storey.
-        pitch: distance of windows from middle to middle.
-        width, sill, height: those of a window; its sill from the floor.
-        depth: depth of its recess.
-        wall, roof, glass, frame, trim, door, sign: colours.
-        shops: whether the ground floor has shops on the street.
-        balconies: whether every other window has a balcony.
-        plinth: its height; 0 for none.
-        cornice: its height; 0 for none.
-        by_tag: the fields that come from the file.
+    Windows have a pitch from middle to middle, a sill above their floor and the
+    depth of their recess. The ground floor may have shops on the street, and
+    every other window a balcony. A plinth or cornice without a height is none.
+    Fields that come from the file are listed in `by_tag`.
     """
 
     use: Use
@@ -96,10 +88,7 @@ def building_use(
     height of its walls [m^2, m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
-    if "shop" in tags:
-        words.append("shop")
-    if "office" in tags:
-        words.append("office")
+    words += [key for key in ("shop", "office") if key in tags]
     found = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
     for use, look in _LOOKS["uses"].items():
         if found & set(look["words"].split()):

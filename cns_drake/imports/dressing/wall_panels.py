@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 import shapely
@@ -14,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades.details import WallFrame
 from cns_drake.city.geometry.upper_sides import long_normals, unit_normals
+from cns_drake.imports.faces import joined
 
 # A face is upright if the z of its unit normal is below this.
 _UPRIGHT = 0.02
@@ -33,14 +35,10 @@ _BENT, _PIECE_BENT = 0.05, 0.01
 class Panel:
     """A plane, upright wall or a piece of one, seen from outside.
 
-    Attributes:
-        building: number of its building.
-        origin: (3,) where x = z = 0 [m].
-        along: (2,) unit vector to the right, seen from outside.
-        length, height: those of its bounding rectangle [m].
-        outline: polygon in x and z [m]; None if it fills the rectangle.
-        triangles: (M, 3, 3) its original triangles [m].
-        is_plane: whether these are in one plane.
+    Its origin (3,) is where x = z = 0, and `along` (2,) a unit vector to the
+    right. The outline is a polygon in x and z, None if it fills the bounding
+    rectangle [m]. The original triangles (M, 3, 3) are those of a building with
+    a number.
     """
 
     building: int
@@ -64,26 +62,17 @@ class Panel:
         return WallFrame([start, start + self.length * self.along], 0)
 
     def place(
-        self, x: np.ndarray, z: np.ndarray, out: np.ndarray | float = 0.0
+        self, x: ArrayLike, z: ArrayLike, out: ArrayLike = 0.0
     ) -> np.ndarray:
-        """Returns places (..., 3) of the panel's coordinates [m].
-
-        Args:
-            x, z: along the panel and up, from its origin [m].
-            out: distance outwards [m].
-        """
-        places = np.empty((*np.shape(x), 3))
+        """Returns places (..., 3) at x, z and outwards of the panel [m]."""
+        x, z, out = (np.asarray(one, dtype=float) for one in (x, z, out))
+        places = np.empty((*x.shape, 3))
         for k in range(2):
             places[..., k] = (
                 self.origin[k] + x * self.along[k] + out * self.outward[k]
             )
         places[..., 2] = self.origin[2] + z
         return places
-
-
-def joined(some: Iterable[np.ndarray]) -> np.ndarray:
-    """Returns all triangles (M, 3, 3) of any number of arrays."""
-    return np.concatenate([np.zeros((0, 3, 3)), *some])
 
 
 def is_upright(triangles: np.ndarray) -> np.ndarray:
@@ -98,11 +87,9 @@ def find_panels(
 ) -> list[Panel]:
     """Returns the panels of the walls of buildings.
 
-    Args:
-        walls: walls of each building, upright triangles (M, 3, 3) that look
-            outwards [m].
-        is_wanted: maps the least and greatest x and y of N panels, (N, 2, 2)
-            [m], to which (N,) are wanted; all if None.
+    Walls of each building are upright triangles (M, 3, 3) that look outwards
+    [m]. If not all panels are wanted, `is_wanted` maps the least and greatest x
+    and y of N of them, (N, 2, 2) [m], to (N,) bool.
     """
     triangles = joined(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
@@ -148,10 +135,8 @@ def _plane_pieces(
 ) -> list[Panel]:
     """Divides a wall that bends into pieces, each as long as it is plane.
 
-    Args:
-        wall: the whole wall.
-        facets: (M,) number of the plane piece of each triangle.
-        triangles, normals, areas: see `_panel`.
+    Facets (M,) number the plane piece of each triangle; for the others see
+    `_panel`.
     """
     x = (triangles[..., :2] - wall.origin[:2]).mean(axis=1) @ wall.along
     starts = [x[facets == number].min() for number in range(facets.max() + 1)]
@@ -179,13 +164,10 @@ def _connected(
     building: np.ndarray,
     least: float,
 ) -> np.ndarray:
-    """Returns the number (M,) of each triangle's panel.
+    """Returns the number (M,) of the panel of each triangle (M, 3, 3) [m].
 
-    Args:
-        triangles: (M, 3, 3) [m].
-        normals: (M, 3), of unit length.
-        building: (M,) number of its building.
-        least: product of the normals of neighbours in one panel.
+    The product of the unit normals (M, 3) of neighbours in one panel has a
+    least value. A panel is part of one building, numbered (M,).
     """
     corners = np.rint(triangles * _MM).astype(np.int64).reshape(-1, 3)
     keyed = np.column_stack([np.repeat(building, 3), corners])
@@ -212,13 +194,10 @@ def _panel(
     areas: np.ndarray,
     bent: float = _BENT,
 ) -> Panel:
-    """Returns the panel of connected triangles.
+    """Returns the panel of connected triangles (M, 3, 3) of a building [m].
 
-    Args:
-        building: its number.
-        triangles: (M, 3, 3) [m].
-        normals, areas: (M, 3) as long as the areas, and these (M,) [m^2].
-        bent: how far the triangles of a plane may lie apart across it [m].
+    Normals (M, 3) are as long as the areas (M,) [m^2]. The triangles of a plane
+    lie apart across it by no more than `bent` [m].
     """
     corners = triangles.reshape(-1, 3)
     # The mean over areas: small triangles have imprecise normals.

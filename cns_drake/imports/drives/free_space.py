@@ -13,8 +13,8 @@ from scipy.ndimage import (
 import shapely
 from shapely import STRtree
 
-from cns_drake.imports.faces import surface_samples
-from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.faces import joined, surface_samples
+from cns_drake.imports.foreign_city import Imported, boxes_of
 from cns_drake.imports.ground import Ground
 
 CELL = 1.0  # [m]
@@ -44,41 +44,30 @@ _LEAST_ROAD = 800.0
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Room on a grid.
+    """Room on a grid that begins at (2,), the corner of its first cell [m].
 
-    Attributes:
-        low: (2,) where the grid begins, the corner of its first cell [m].
-        clearance: (rows along y, columns along x) from the middle of each cell
-            to the nearest obstacle [m]; 0 where no car may be.
-        on_roads: whether only roads of the file count.
-        least: the clearance that a path needs [m].
-        walls: the obstacles, seen from above.
+    The clearance (rows along y, columns along x) is that from the middle of
+    each cell to the nearest obstacle, 0 where no car may be, and a path needs
+    the least one [m]. Walls are the obstacles, seen from above.
     """
 
     low: np.ndarray
     clearance: np.ndarray
-    on_roads: bool
     least: float
     walls: STRtree
 
-    def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns row and column of places (N, 2), clipped to the grid."""
+    def clearance_at(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the clearance at places (N, 2), or the nearest ones [m]."""
         index = np.floor((xy - self.low) / CELL).astype(int)
         rows, columns = self.clearance.shape
-        return (
-            np.clip(index[:, 1], 0, rows - 1),
-            np.clip(index[:, 0], 0, columns - 1),
-        )
-
-    def clearance_at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the clearance at places (N, 2) [m]."""
-        return self.clearance[self.cells(xy)]
+        row = np.clip(index[:, 1], 0, rows - 1)
+        column = np.clip(index[:, 0], 0, columns - 1)
+        return self.clearance[row, column]
 
     def obstacle(self, path: np.ndarray) -> np.ndarray | None:
-        """Returns the first (2,) place of a path where a car has no room.
+        """Returns the first (2,) place of a path without room for a car.
 
-        Args:
-            path: (N, 2) places, close together [m].
+        The places (N, 2) of the path are close together [m].
         """
         narrow = self.clearance_at(path) < self.least - _SLACK
         hit = self.walls.query(shapely.points(path), "dwithin", _HALF_CAR)[0]
@@ -106,8 +95,8 @@ def find_free_space(
         (in_water, [o for o in structures if _is_water(o)]),
     ):
         # All at once: thousands of small groups would take far longer.
-        triangles = [one.triangles for one in some]
-        for row, column in _cells(_joined(triangles), window):
+        surfaces = joined(one.triangles for one in some)
+        for row, column in _cells(surfaces, window):
             covered[row, column] = True
     walls = []
     for one in structures:
@@ -116,28 +105,23 @@ def find_free_space(
             blocked[cells] = True
             walls.append(triangles)
     free = ~(blocked | (in_water & ~on_road))
-    on_roads = False
+    least = _FROM_WALL
     paved = binary_closing(on_road, iterations=1) & ~blocked
     if _largest(_clearance(paved) >= _FROM_EDGE) * CELL**2 >= _LEAST_ROAD:
-        free, on_roads = paved, True
+        free, least = paved, _FROM_EDGE
     elif blocked.any():
         free &= _between(blocked)
-    outlines = _joined(walls)[:, [0, 1, 2, 0], :2]
+    outlines = joined(walls)[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
         _clearance(free),
-        on_roads,
-        _FROM_EDGE if on_roads else _FROM_WALL,
+        least,
         STRtree(np.asarray(shapely.linearrings(outlines))),
     )
 
 
 def _is_water(one: Imported) -> bool:
     return one.kind.startswith("Water")
-
-
-def _joined(triangles: Sequence[np.ndarray]) -> np.ndarray:
-    return np.concatenate([np.zeros((0, 3, 3)), *triangles])
 
 
 def _cells(
@@ -210,12 +194,7 @@ def _largest(cells: np.ndarray) -> int:
 
 def _window(structures: Sequence[Imported]) -> _Window:
     """Returns the corners of the window in which room is searched."""
-    boxes = np.array(
-        [
-            (s.triangles.min(axis=(0, 1)), s.triangles.max(axis=(0, 1)))
-            for s in structures
-        ]
-    )[:, :, :2]
+    boxes = boxes_of(structures)[:, :, :2]
     middle = np.median(boxes.mean(axis=1), axis=0)
     low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)
     high = np.minimum(boxes[:, 1].max(axis=0), middle + _FARTHEST)

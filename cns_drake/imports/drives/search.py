@@ -2,19 +2,30 @@
 
 The first drive is about the longest of the shortest ways. The second one shares
 its middle, and leaves it by an arm at either end. A `WayGraph` defines the
-pieces of a way: cells between buildings, or lanes of streets."""
+pieces of a way: lanes of streets, or else cells of free space."""
 
 from abc import ABC, abstractmethod
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise, product
 
 import numpy as np
 from scipy.interpolate import BSpline
+from scipy.ndimage import uniform_filter1d
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
+from shapely.geometry import LineString
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports.drives.free_space import CELL, FreeSpace
+from cns_drake.imports.foreign_city import (
+    SHARPEST_TURN_DEG,
+    Street,
+    cut_at_nodes,
+)
+from cns_drake.imports.options import DriveOn
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import make_waypoint_path
@@ -80,12 +91,10 @@ class WaypointDrive:
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointDrive | Obstacle:
-    """Returns the drive along waypoints, or the obstacle.
+    """Returns the drive along waypoints (N, 2) or (N, 3), or the obstacle [m].
 
-    Args:
-        waypoints: (N, 2) or (N, 3), at least two [m].
-        room: checked on the whole path.
-        margin: least radius of bends, in tightest radii of the car.
+    The whole path needs room, and bends a margin: their least radius, in
+    tightest radii of the car.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))
@@ -117,8 +126,7 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
 def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns the places (M, 2) of a path, and the radii (M,) of its bends.
 
-    Args:
-        points: (N, 2) the control points of its spline, evenly spaced [m].
+    The control points (N, 2) of its spline are evenly spaced [m].
     """
     reach = _DEGREE // 2
     points = np.concatenate(
@@ -142,6 +150,7 @@ class WayGraph(ABC):
 
     Attributes:
         lengths: (N,) lengths of the pieces [m].
+        is_open: (N,) whether a car can drive along them, as far as is known.
     """
 
     def __init__(
@@ -151,26 +160,21 @@ class WayGraph(ABC):
         after: np.ndarray,
         costs: np.ndarray | None = None,
     ):
-        """Makes the graph.
+        """Links pieces of lengths (N,); `before` (L,) leads into `after` [m].
 
-        Args:
-            lengths: (N,) lengths of the pieces [m].
-            before, after: (L,) numbers of pieces; `before` leads into `after`.
-            costs: (L,) from middle to middle; the length if None [m].
+        Costs (L,) are from middle to middle, lengths if None [m].
         """
         self.lengths = lengths
         if costs is None:
             costs = (lengths[before] + lengths[after]) / 2.0
         self._links = (before, after, costs)
-        self._is_open = np.ones(len(lengths), dtype=bool)
+        self.is_open = np.ones(len(lengths), dtype=bool)
 
     @abstractmethod
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
         """Returns (N,) bool: the pieces that an arm must not use.
 
-        Args:
-            pieces: the pieces in use by drives.
-            joint: the piece among them where the arm begins.
+        Drives use some pieces; the arm begins at one of them, the joint.
         """
 
     @abstractmethod
@@ -200,20 +204,12 @@ class WayGraph(ABC):
 
     def links(self, closed: np.ndarray | None = None) -> csr_array:
         """Returns costs from piece to piece, without those closed (N,)."""
-        is_open = self._is_open if closed is None else self._is_open & ~closed
+        is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links
         kept = is_open[before] & is_open[after]
         size = (len(self.lengths), len(self.lengths))
         pairs = (before[kept], after[kept])
         return coo_array((costs[kept], pairs), size).tocsr()
-
-    def close(self, pieces: np.ndarray) -> None:
-        """Removes pieces that no car can drive along."""
-        self._is_open[pieces] = False
-
-    def open_pieces(self) -> np.ndarray:
-        """Returns the numbers of the pieces that are not closed."""
-        return np.flatnonzero(self._is_open)
 
 
 def find_drives(graph: WayGraph) -> list[WaypointDrive]:
@@ -225,7 +221,7 @@ def find_drives(graph: WayGraph) -> list[WaypointDrive]:
         first = graph.drive(way)
         if isinstance(first, WaypointDrive):
             break
-        graph.close(graph.blocked(way, first))
+        graph.is_open[graph.blocked(way, first)] = False
     else:
         return []
     for candidate in islice(_seconds(graph, way), _MOST_TRIES):
@@ -237,7 +233,7 @@ def find_drives(graph: WayGraph) -> list[WaypointDrive]:
 
 def _longest(graph: WayGraph) -> list[int]:
     """Returns about the longest of the shortest ways, [] if there is none."""
-    pieces = graph.open_pieces()
+    pieces = np.flatnonzero(graph.is_open)
     if len(pieces) == 0:
         return []
     links = graph.links()
@@ -295,14 +291,14 @@ def _seconds(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
         begins = every[(part[:-1] >= low) & (part[:-1] <= middle)]
         ends = every[(part[1:] >= 1.0 - middle) & (part[1:] <= high)][::-1]
         for begin in (*_some(begins, along), None):
-            start = begin if begin is not None else _nearest(part[:-1], low)
+            start = _nearest(part[:-1], low) if begin is None else begin
             head: list[int] = []
             if begin is not None:
                 head = _arm(graph, first, first[begin], backwards=True)
                 if not head:
                     continue
             for end in (*_some(ends, along), None):
-                stop = end if end is not None else _nearest(part[1:], high)
+                stop = _nearest(part[1:], high) if end is None else end
                 if begin is None and end is None:
                     continue
                 if part[stop + 1] - part[start] < _LEAST_SHARED:
@@ -344,3 +340,248 @@ def _arm(
         links = links.T.tocsr()
     way = _farthest(graph, links, joint, _LONGEST_ARM)
     return way if graph.length(way[1:]) >= _SHORTEST_ARM else []
+
+
+# Paths prefer this distance from walls [m].
+_COMFORT = 6.0
+# An arm keeps this distance from the drive it leaves, except at the joint [m].
+_ARM_APART = 10.0
+# Cells within this distance of an obstacle are closed [m].
+_OBSTRUCTED = 3.0
+# Greatest distance of waypoints, for their heights, and least distance from
+# corners [m].
+_WAYPOINT_SPACING = 15.0
+# Tolerances, tried in turn, of waypoints against the found path [m].
+_SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
+# Cells in a running mean, chosen by trial.
+_STRAIGHTENED = (5, 11, 17)
+_LANE_SPACING = 1.0
+# Share of their lateral offset that cars keep in a turn: in narrow streets and
+# sharp corners they have to swing out.
+_AT_TURNS = (1.0, 0.6, 0.2)
+# Distance of the start and end of a turn from its sharpest place [m].
+_TURN = 12.0
+_SHARP_DEG_PER_M = 4.0
+# Tolerances, tried in turn, of waypoints against the lanes [m].
+_TOLERANCES = (0.2, 0.4, 0.8, 1.2)
+# Lengths of the means that round corners, and lateral offsets [m].
+_ROUND, _SMOOTH_ASIDE = 7, 15
+
+
+@dataclass(frozen=True, eq=False)
+class Lane:
+    """A lane from one junction to the next.
+
+    Its line (N, 2) is the middle of its street, in driving direction, and the
+    lane lies aside to the right of it [m]. The other lane of a piece of street
+    has the same number of a way.
+    """
+
+    line: np.ndarray
+    begin: int
+    end: int
+    aside: float
+    way: int
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
+
+
+def make_lanes(streets: Sequence[Street]) -> list[Lane]:
+    """Returns the lanes of streets that meet."""
+    lanes: list[Lane] = []
+    for way, (street, line, (begin, end)) in enumerate(cut_at_nodes(streets)):
+        if street.forward:
+            lanes.append(Lane(line, begin, end, street.aside, way))
+        if street.backward:
+            lanes.append(Lane(line[::-1], end, begin, street.aside, way))
+    return [lane for lane in lanes if lane.length > 0.0]
+
+
+def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns pairs of lane numbers; the first lane leads into the second."""
+    starts: defaultdict[int, list[int]] = defaultdict(list)
+    for number, lane in enumerate(lanes):
+        starts[lane.begin].append(number)
+    pairs = [
+        (number, after)
+        for number, lane in enumerate(lanes)
+        for after in starts[lane.end]
+        if _leads_on(lane, lanes[after])
+    ]
+    before, after = np.array(pairs, dtype=int).reshape(-1, 2).T
+    return before, after
+
+
+def _leads_on(lane: Lane, after: Lane) -> bool:
+    if lane.way == after.way:
+        return False
+    a, b = lane.line[-1] - lane.line[-2], after.line[1] - after.line[0]
+    cross, dot = a[0] * b[1] - a[1] * b[0], a @ b
+    return bool(abs(np.degrees(np.arctan2(cross, dot))) <= SHARPEST_TURN_DEG)
+
+
+def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
+    """Returns a line along lanes: x, y and lateral offset (N, 3) [m].
+
+    Each lane leads into the next; points are about a spacing apart [m].
+    """
+    parts = []
+    for lane in lanes:
+        line = evenly_spaced(lane.line, spacing)
+        parts.append(np.column_stack([line, np.full(len(line), lane.aside)]))
+    rows = np.concatenate(parts)
+    steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
+    return rows[np.append(True, steps > 1e-6)]
+
+
+class CellGraph(WayGraph):
+    """Cells with room, each linked to the eight beside it."""
+
+    def __init__(self, space: FreeSpace):
+        self._space = space
+        wide = space.clearance >= space.least
+        row, column = np.nonzero(wide)
+        self._xy = space.middle(row, column)
+        number = np.full(wide.shape, -1)
+        number[wide] = np.arange(len(row))
+        clearance = space.clearance[wide]
+        # A cell near a wall costs up to four times as much.
+        price = 1.0 + (1.0 - np.minimum(clearance / _COMFORT, 1.0)) * 3.0
+        starts, ends = [], []
+        rows, columns = wide.shape
+        for down, aside in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            left, right = max(-aside, 0), max(aside, 0)
+            a = number[: rows - down, left : columns - right]
+            b = number[down:, right : columns - left]
+            linked = (a >= 0) & (b >= 0)
+            starts += [a[linked], b[linked]]
+            ends += [b[linked], a[linked]]
+        start, end = np.concatenate(starts), np.concatenate(ends)
+        length = np.linalg.norm(self._xy[start] - self._xy[end], axis=1)
+        cost = length * (price[start] + price[end]) / 2.0
+        super().__init__(np.full(len(row), CELL), start, end, cost)
+
+    def along(self, way: Sequence[int]) -> np.ndarray:
+        steps = np.linalg.norm(np.diff(self._xy[list(way)], axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
+        driven = cKDTree(self._xy[pieces])
+        distance, _ = driven.query(self._xy, distance_upper_bound=_ARM_APART)
+        here = np.linalg.norm(self._xy - self._xy[joint], axis=1)
+        return np.isfinite(distance) & (here > 1.5 * _ARM_APART)
+
+    def is_simple(self, way: Sequence[int]) -> bool:
+        return len(set(way)) == len(way)
+
+    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
+        return simplified_drive(self._xy[list(way)], self._space)
+
+    def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
+        distance = np.linalg.norm(self._xy[list(way)] - place, axis=1)
+        limit = max(_OBSTRUCTED, float(distance.min()))
+        return np.array(way)[distance <= limit]
+
+
+def simplified_drive(
+    xy: np.ndarray,
+    space: FreeSpace,
+    tolerances: Sequence[float] = _SIMPLIFICATIONS,
+) -> WaypointDrive | Obstacle:
+    """Returns a drive with as few waypoints as the room allows.
+
+    It passes places (N, 2), about 1 m apart, within tolerances that are tried
+    in turn [m].
+    """
+    found: WaypointDrive | Obstacle = xy[len(xy) // 2]
+    for straightened, tolerance in product(_STRAIGHTENED, tolerances):
+        if len(xy) < 4 * straightened:
+            break
+        kernel = np.ones(straightened) / straightened
+        smooth = np.column_stack(
+            [np.convolve(column, kernel, mode="valid") for column in xy.T]
+        )
+        line = LineString(smooth).simplify(tolerance)
+        found = steerable_drive(
+            _densified(np.array(line.coords)), space.obstacle
+        )
+        if isinstance(found, WaypointDrive):
+            break
+    return found
+
+
+def _densified(corners: np.ndarray) -> np.ndarray:
+    """Returns waypoints with others between those that lie far apart."""
+    points = [corners[:1]]
+    for a, b in pairwise(corners):
+        length = float(np.linalg.norm(b - a))
+        number = int((length - _WAYPOINT_SPACING) // _WAYPOINT_SPACING)
+        if number > 0:
+            # No waypoints are near the corners, whose arcs need room.
+            parts = np.linspace(0.0, 1.0, number + 2)[1:-1]
+            points.append(a + parts[:, None] * (b - a))
+        points.append(b[None])
+    return np.concatenate(points)
+
+
+class StreetGraph(WayGraph):
+    """Lanes of streets from junction to junction.
+
+    One-way streets are driven in their direction, all others in the outermost
+    lane.
+    """
+
+    def __init__(
+        self, streets: Sequence[Street], space: FreeSpace, drive_on: DriveOn
+    ):
+        """Makes the graph of streets that meet at common nodes."""
+        # A street with a wrong place on another continent would never end.
+        self.lanes = [
+            one for one in make_lanes(streets) if one.length <= LONGEST
+        ]
+        self._ways = np.array([lane.way for lane in self.lanes], dtype=int)
+        self._space = space
+        self._side = 1.0 if drive_on == "right" else -1.0
+        lengths = np.array([lane.length for lane in self.lanes])
+        super().__init__(lengths, *lane_links(self.lanes))
+
+    def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
+        closed = np.isin(self._ways, self._ways[pieces])
+        closed[joint] = False
+        return closed
+
+    def is_simple(self, way: Sequence[int]) -> bool:
+        lanes = [self.lanes[k] for k in way]
+        passed = [lane.begin for lane in lanes] + [lanes[-1].end]
+        return len(set(passed)) == len(passed)
+
+    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
+        rows = lane_path([self.lanes[k] for k in way], _LANE_SPACING)
+        middle = uniform_filter1d(rows[:, :2], _ROUND, axis=0, mode="nearest")
+        along = np.gradient(middle, axis=0)
+        along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+        heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+        bends = np.abs(np.gradient(heading)) > np.radians(_SHARP_DEG_PER_M)
+        reach = int(_TURN / _LANE_SPACING)
+        near = np.convolve(bends, np.ones(2 * reach + 1), mode="same") > 0
+        right = np.column_stack([along[:, 1], -along[:, 0]]) * self._side
+        found: WaypointDrive | Obstacle = middle[len(middle) // 2]
+        for tolerance, share in product(_TOLERANCES, _AT_TURNS):
+            aside = rows[:, 2] * np.where(near, share, 1.0)
+            aside = uniform_filter1d(aside, _SMOOTH_ASIDE, mode="nearest")
+            places = middle + aside[:, None] * right
+            found = simplified_drive(places, self._space, (tolerance,))
+            if isinstance(found, WaypointDrive):
+                break
+        return found
+
+    def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
+        from_line = [
+            np.linalg.norm(
+                lane_path([self.lanes[k]], 1.0)[:, :2] - place, axis=1
+            ).min()
+            for k in way
+        ]
+        return np.array([way[int(np.argmin(from_line))]])

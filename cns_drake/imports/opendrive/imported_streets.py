@@ -72,8 +72,7 @@ def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
 def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
     """Yields the corners of areas where an edge steps to the left.
 
-    Args:
-        xy: (N, 2) corners of a ring with the carriageway on its left [m].
+    A ring of corners (N, 2) has the carriageway on its left [m].
     """
     steps = np.roll(xy, -1, axis=0) - xy
     lengths = np.hypot(*steps.T)
@@ -93,7 +92,8 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         aside = float(lengths[k] * np.sin(turns[k]))
         straight = before[: _straight_on(before, -ahead) + 1]
         chain = _kerb(behind, ahead)
-        if _reach(straight) < _BEFORE or len(chain) < 2:
+        reach = np.hypot(*np.diff(straight, axis=0).T).sum()
+        if reach < _BEFORE or len(chain) < 2:
             continue
         within = min(_LONGEST, _SLENDER * aside)
         dense = shapely.get_coordinates(
@@ -119,11 +119,8 @@ def _straight_on(xy: np.ndarray, ahead: np.ndarray) -> int:
 def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     """Returns the first corners (M, 2) of an edge that goes straight on.
 
-    Where it soon steps back, the corner behind that step is the last one.
-
-    Args:
-        xy: (N, 2) corners of a ring, with the carriageway on its left [m].
-        ahead: (2,) unit vector.
+    A ring of corners (N, 2) has the carriageway on its left [m]. Where it soon
+    steps back, the corner behind that step is the last one.
     """
     last = _straight_on(xy, ahead)
     if 0 < last < len(xy) - 2 and _straight_on(xy[last + 1 :], ahead):
@@ -134,20 +131,12 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     return xy[: last + 1]
 
 
-def _reach(xy: np.ndarray) -> float:
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
-
-
 class ImportedStreets:
-    """Areas of lanes on the ground, by kind.
+    """Areas of lanes on the ground, by kind [m].
 
-    Where two overlap, road comes before parking, that before other ground,
-    and sidewalks last.
-
-    Attributes:
-        junctions: the area of all junctions [m].
-        coverings: parts of the carriageway that are not road.
-        margins: lanes without a use, which stay free.
+    Where two overlap, road comes before parking, that before other ground, and
+    sidewalks last. Coverings are parts of the carriageway that are not road,
+    and margins are lanes without a use, which stay free.
     """
 
     def __init__(

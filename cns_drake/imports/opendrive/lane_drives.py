@@ -39,27 +39,21 @@ class BandGraph(search.WayGraph):
     """Lanes of sections in driving direction, each with its successors."""
 
     def __init__(self, bands: Sequence[LaneBand]):
-        self._bands = [band for band in bands if _is_driven(band)]
-        self._lines = [_driven_line(band) for band in self._bands]
+        self.bands = [band for band in bands if _is_driven(band)]
+        self.lines = [_driven_line(band) for band in self.bands]
         lengths = [
             np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
-            for line in self._lines
+            for line in self.lines
         ]
         # The key that a drive may use once: a road, or a lane of a junction.
-        self._roads = np.array([band.road.name for band in self._bands])
-        super().__init__(np.array(lengths), *self._link())
-
-    def driven(self) -> list[tuple[LaneBand, np.ndarray]]:
-        """Returns each lane with its middle (N, 3) in driving direction [m]."""
-        return list(zip(self._bands, self._lines, strict=True))
-
-    def followers(self) -> list[tuple[int, int]]:
-        """Returns pairs of lane numbers; the second lane follows the first."""
+        self._roads = np.array([band.road.name for band in self.bands])
         before, after = self._link()
-        return list(zip(before.tolist(), after.tolist(), strict=True))
+        # The second lane of a pair follows the first.
+        self.followers = list(zip(before.tolist(), after.tolist(), strict=True))
+        super().__init__(np.array(lengths), before, after)
 
     def _link(self) -> tuple[np.ndarray, np.ndarray]:
-        lines = self._lines
+        lines = self.lines
         starts = np.array([line[0] for line in lines]).reshape(-1, 3)
         ends = np.array([line[-1] for line in lines]).reshape(-1, 3)
         pairs = []
@@ -86,7 +80,7 @@ class BandGraph(search.WayGraph):
         seen: set[str] = set()
         last = ""
         for k in way:
-            road = self._bands[k].road
+            road = self.bands[k].road
             place = road.name if road.junction is None else f" {road.junction}"
             if place != last and place in seen:
                 return False
@@ -95,11 +89,11 @@ class BandGraph(search.WayGraph):
         return True
 
     def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
-        line = np.concatenate([self._lines[k] for k in way])
+        line = np.concatenate([self.lines[k] for k in way])
         points = search.evenly_spaced(_forwards(line), _SPACING)[
             : int(search.LONGEST / _SPACING) + 1
         ]
-        limits = [limit for k in way for _, limit in self._bands[k].road.limits]
+        limits = [limit for k in way for _, limit in self.bands[k].road.limits]
         found: WaypointDrive | Obstacle = points[0, :2]
         for window in _SMOOTHING:
             found = search.steerable_drive(_smoothed(points, window))
@@ -109,7 +103,7 @@ class BandGraph(search.WayGraph):
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
         distances = [
-            float(np.hypot(*(self._lines[k][:, :2] - place).T).min())
+            float(np.hypot(*(self.lines[k][:, :2] - place).T).min())
             for k in way
         ]
         return np.array([way[int(np.argmin(distances))]])
@@ -180,9 +174,9 @@ def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:
             min((limit for _, limit in band.road.limits), default=_LIMIT),
             band.road.junction is not None,
         )
-        for band, line in graph.driven()
+        for band, line in zip(graph.bands, graph.lines, strict=True)
     ]
-    joined = join_lanes(lanes, graph.followers())
+    joined = join_lanes(lanes, graph.followers)
     if not joined.pieces:
         return None
     walks = [band for band in bands if band.lane.kind in _SIDEWALKS]

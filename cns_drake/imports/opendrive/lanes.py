@@ -6,11 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 import math
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.imports.opendrive.road_model import (
     Cubics,
     ImportedRoad,
@@ -18,31 +20,10 @@ from cns_drake.imports.opendrive.road_model import (
     LaneSection,
 )
 
+# Types of lanes and objects.
+TYPES = parse_yaml(Path(__file__).with_name("types.yaml").read_bytes())
 # Cars drive on them, each in one direction.
-DRIVEN = frozenset(
-    (
-        "driving",
-        "entry",
-        "exit",
-        "onRamp",
-        "offRamp",
-        "connectingRamp",
-        "slipLane",
-    )
-)
-# Type -> class; all others are road.
-_CLASSES = {
-    "parking": "parking",
-    "sidewalk": "sidewalk",
-    "walking": "sidewalk",
-    "curb": "sidewalk",
-    "biking": "sidewalk",
-    "median": "other-ground",
-    "border": "other-ground",
-    "restricted": "other-ground",
-    "tram": "other-ground",
-    "rail": "other-ground",
-}
+DRIVEN = frozenset(TYPES["driven lanes"])
 _RAISED = frozenset({"sidewalk", "walking", "curb"})
 # From this height on a lane has a kerb [m].
 _LEAST_KERB = 0.03
@@ -77,7 +58,8 @@ _ARRAYS = ("inner", "outer", "middle", "heading", "roll", "grade", "s")
 
 def lane_class(kind: str) -> str | None:
     """Returns the semantic class of a lane, None for type none."""
-    return None if kind == "none" else _CLASSES.get(kind, "road")
+    classes: dict[str, str] = TYPES["lanes"]
+    return None if kind == "none" else classes.get(kind, "road")
 
 
 def is_raised(kind: str, height: float) -> bool:

@@ -54,13 +54,10 @@ def moved_off_kerbs(
 ) -> np.ndarray:
     """Returns how far (N,) lines are moved to the left [m].
 
-    Where only one side of a border is carriageway, they lie on that side.
-
-    Args:
-        border: (N, 3) places of a border of lanes [m].
-        left: (N, 2) unit vectors to its left.
-        reach: how far the lines reach to the left and to the right of it [m].
-        carriageway: prepared.
+    Where only one side of a border of lanes, places (N, 3), is carriageway,
+    they lie on that side. Unit vectors (N, 2) lead to its left, and `reach` is
+    how far the lines extend to its left and right [m]. The carriageway is
+    prepared.
     """
     xy = border[:, :2].copy()
     # A kerb may cross the very end.
@@ -85,11 +82,9 @@ def as_triangles(quads: np.ndarray) -> np.ndarray:
 
 
 def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
-    """Returns the parts of quads on a carriageway, as triangles (M, 3, 3) [m].
+    """Returns the parts of quads (K, 4, 3) on a prepared carriageway [m].
 
-    Args:
-        quads: (K, 4, 3), seen from above [m].
-        carriageway: prepared.
+    They are triangles (M, 3, 3), cut as seen from above.
     """
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
@@ -125,15 +120,11 @@ def road_marks(
     heights: Callable[[np.ndarray], np.ndarray] | None = None,
     carriageway: BaseGeometry | None = None,
 ) -> Iterator[Structure]:
-    """Yields the marks of each road.
+    """Yields the marks of each road, whose names begin with a prefix.
 
-    Args:
-        prefix: how the names begin.
-        bands: lanes of the roads.
-        heights: gives the ground's at (N, 2) places [m]; the marks lie on the
-            borders of lanes if None.
-        carriageway: with kerbs all around, which the marks do not leave; lanes
-            have no kerbs if None [m].
+    Heights give the ground's at (N, 2) places [m]; marks lie on the borders of
+    lanes without them. They do not leave a carriageway with kerbs all around,
+    if there is one.
     """
     if carriageway is not None:
         shapely.prepare(carriageway)
@@ -192,15 +183,10 @@ def _painted(
     end: float,
     carriageway: BaseGeometry | None,
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yields colours, and the quads (K, 4, 3) on a border [m].
+    """Yields colours, and the quads (K, 4, 3) on a border (N, 3) [m].
 
-    Args:
-        border: (N, 3) places [m].
-        s, heading: (N,) the road's there [m, rad].
-        marks: along it.
-        side: positive if outwards is to the left.
-        end: where the last mark ends along the road [m].
-        carriageway: see `road_marks`.
+    The road has headings (N,) at distances s (N,) along it [rad, m]; its last
+    mark ends at `end`. The side is positive if outwards is to the left.
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]

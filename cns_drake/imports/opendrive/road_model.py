@@ -3,7 +3,7 @@
 The course is made of lines, arcs, spirals and cubic curves: ASAM OpenDRIVE 1.7,
 chapter 8, https://www.asam.net/standards/detail/opendrive"""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
@@ -18,6 +18,16 @@ _TURN = 0.5
 _MOST_TURN = 10_000.0
 _PANELS = 64
 _NEWTON_STEPS = 8
+
+
+def _integral(
+    rate: Callable[[np.ndarray], np.ndarray],
+    begin: np.ndarray,
+    size: np.ndarray,
+) -> np.ndarray:
+    """Returns the integrals (N,) of a rate over panels."""
+    nodes = begin[:, None] + size[:, None] * (_NODES + 1.0) / 2.0
+    return size / 2.0 * (rate(nodes) @ _WEIGHTS)
 
 
 # A curve has `evaluate`, which returns (N, 3) u, v [m] and heading [rad] in the
@@ -74,16 +84,9 @@ class Spiral:
 
     def _steps(self, begin: np.ndarray, length: np.ndarray) -> np.ndarray:
         """Returns (N, 2) from s = begin (N,) on, over lengths (N,) [m]."""
-        s = begin[:, None] + length[:, None] * (_NODES + 1.0) / 2.0
-        heading = self._heading(s)
-        scale = length / 2.0
-        return np.stack(
-            [
-                scale * (np.cos(heading) @ _WEIGHTS),
-                scale * (np.sin(heading) @ _WEIGHTS),
-            ],
-            axis=1,
-        )
+        u = _integral(lambda s: np.cos(self._heading(s)), begin, length)
+        v = _integral(lambda s: np.sin(self._heading(s)), begin, length)
+        return np.stack([u, v], axis=1)
 
 
 class Cubic:
@@ -100,13 +103,10 @@ class Cubic:
     ):
         """Prepares the arc length.
 
-        Args:
-            u, v: four coefficients each, of p^0 first [m].
-            last: p at the end.
-            length: the curve's length in the file [m].
-            by_parameter: whether p is the distance itself.
-            stretched: whether the whole curve is scaled to that length; else it
-                ends where the length is reached.
+        Each coordinate has four coefficients, of p^0 first [m], and p is `last`
+        at the end, or the distance itself by `by_parameter`. The whole curve is
+        stretched to its length in the file [m], or else ends where that is
+        reached.
         """
         self._u, self._v = (np.polynomial.Polynomial(one) for one in (u, v))
         self._du, self._dv = self._u.deriv(), self._v.deriv()
@@ -134,8 +134,7 @@ class Cubic:
         return np.hypot(self._du(p), self._dv(p))
 
     def _arc(self, begin: np.ndarray, size: np.ndarray) -> np.ndarray:
-        p = begin[:, None] + size[:, None] * (_NODES + 1.0) / 2.0
-        return size / 2.0 * (self._speed(p) @ _WEIGHTS)
+        return _integral(self._speed, begin, size)
 
     def _parameter(self, arc: np.ndarray) -> np.ndarray:
         """Returns the parameter at an arc length, by Newton's rule."""
@@ -159,13 +158,9 @@ Shape = Arc | Spiral | Cubic
 
 @dataclass(frozen=True)
 class Piece:
-    """One element of a plan view.
+    """One element of a plan view, from s on along the road [m].
 
-    Attributes:
-        s: its start along the road [m].
-        x, y, heading: its first point in the world [m, rad].
-        length: its length [m].
-        shape: in the frame of that point.
+    Its shape is in the frame of its first point in the world [m, rad].
     """
 
     s: float
@@ -301,12 +296,9 @@ class Lane:
 
 @dataclass(frozen=True)
 class LaneSection:
-    """A stretch of road with the same lanes.
+    """A stretch of road with the same lanes, from start to end [m].
 
-    Attributes:
-        start, end: along the road [m].
-        lanes: without the middle one, by their number.
-        middle_marks: on the middle, one after the other.
+    The middle one is not among its lanes by number, but has marks.
     """
 
     start: float
@@ -381,9 +373,7 @@ class ImportedRoad:
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Returns (N, 5) x, y, z, heading and roll of the reference line.
 
-        Args:
-            s: (N,) along the road [m].
-            inside: see `Cubics.at`.
+        For distances (N,) along the road [m], see `Cubics.at`.
         """
         starts = np.array([piece.s for piece in self.pieces])
         index = np.searchsorted(starts, inside, side="right") - 1
@@ -400,12 +390,9 @@ class ImportedRoad:
     def points(
         self, s: np.ndarray, inside: np.ndarray, t: np.ndarray
     ) -> np.ndarray:
-        """Returns (N, 3) places beside the reference line [m].
+        """Returns (N, 3) places t (N,) to the left of the reference line [m].
 
-        Args:
-            s: (N,) along the road [m].
-            inside: see `Cubics.at`.
-            t: (N,) to the left of it [m].
+        For distances (N,) along the road [m], see `Cubics.at`.
         """
         x, y, z, heading, roll = self.reference(s, inside).T
         across = t * np.cos(roll)
@@ -421,12 +408,10 @@ class ImportedRoad:
 
 @dataclass(frozen=True)
 class RoadMap:
-    """All roads of a file.
+    """All roads of a file, in its order.
 
-    Attributes:
-        roads: in the order of the file.
-        reference_system: as the file names it.
-        origin: (3,) the world's origin in the file's coordinates [m].
+    The reference system is as the file names it, and the origin that of the
+    world in its coordinates [m].
     """
 
     roads: tuple[ImportedRoad, ...]

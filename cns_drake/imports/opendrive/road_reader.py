@@ -211,16 +211,16 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
             f"{path}: {size / 1000:.0f} km across; cut out a piece of at most"
             f" {_LARGEST / 1000:.0f} km"
         )
-    origin = np.zeros(2)
+    x = y = 0.0
     if np.abs(ends).max() > _FAR:
-        origin = np.round((low + high) / 2.0)
+        x, y = np.round((low + high) / 2.0).tolist()
     reference = top.first("header", "geoReference")
     return road_model.RoadMap(
-        tuple(_moved(road, origin) for road in roads),
+        tuple(_moved(road, x, y) for road in roads),
         " ".join((reference.text or "").split())
         if reference is not None
         else "",
-        (float(origin[0]), float(origin[1]), 0.0),
+        (x, y, 0.0),
     )
 
 
@@ -257,13 +257,10 @@ def _stem(own: str) -> str:
 
 
 def _moved(
-    road: road_model.ImportedRoad, origin: np.ndarray
+    road: road_model.ImportedRoad, x: float, y: float
 ) -> road_model.ImportedRoad:
-    pieces = tuple(
-        replace(piece, x=piece.x - origin[0], y=piece.y - origin[1])
-        for piece in road.pieces
-    )
-    return replace(road, pieces=pieces)
+    pieces = [replace(p, x=p.x - x, y=p.y - y) for p in road.pieces]
+    return replace(road, pieces=tuple(pieces))
 
 
 def _road(

@@ -16,6 +16,7 @@ from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import tree
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.foreign_city import make_imported
+from cns_drake.imports.opendrive.lanes import TYPES
 from cns_drake.imports.opendrive.road_model import ImportedRoad, Thing
 from cns_drake.imports.options import ImportFaults
 
@@ -23,25 +24,6 @@ _MOST_REPEATS = 10_000
 # An object repeated without a distance is cut into pieces of this length [m].
 _PIECE = 4.0
 _LARGEST = 1000.0  # [m]
-# Traffic signs of the Vienna convention, by the beginning of their type,
-# numbered as in most files.
-_SIGNS = (
-    (("206", "stop"), "sign_stop"),
-    (("205", "1"), "sign_triangular"),
-    (("2",), "sign_round"),
-)
-# Beginning of a type -> class; all others are other objects.
-_CLASSES = (
-    (("building",), "building"),
-    (
-        ("barrier", "railing", "guard", "fence", "wall", "soundbarrier"),
-        "fence",
-    ),
-    (("vegetation", "bush", "hedge", "plant"), "vegetation"),
-    (("pole", "streetlamp", "lamp", "permanentdelineator"), "pole"),
-    (("gantry", "bridge", "tunnel"), "other-structure"),
-    (("trafficisland",), "other-ground"),
-)
 # These are painted, or flat on the ground.
 _FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
 _LEAST_HEIGHT = 0.05
@@ -93,10 +75,8 @@ def _object(one: Element, name: str) -> Thing:
             f"{_LARGEST:g} m"
         )
     outline = next(one.all("outlines", "outline"), one.first("outline"))
-    corners = road_corners = None
-    if outline is not None:
-        corners = _corners(outline, "cornerLocal", "u", "v")
-        road_corners = _corners(outline, "cornerRoad", "s", "t")
+    corners = _corners(outline, "cornerLocal", "u", "v")
+    road_corners = _corners(outline, "cornerRoad", "s", "t")
     return Thing(
         name=name,
         is_signal=False,
@@ -112,8 +92,10 @@ def _object(one: Element, name: str) -> Thing:
 
 
 def _corners(
-    outline: Element, tag: str, first: str, second: str
+    outline: Element | None, tag: str, first: str, second: str
 ) -> np.ndarray | None:
+    if outline is None:
+        return None
     rows = [
         (one.number(first), one.number(second), one.number("height", 0.0))
         for one in outline.all(tag)
@@ -176,7 +158,10 @@ def thing_structures(
         name = thing.name
         x, y, z, heading = _place(road, thing)
         if thing.is_signal:
-            builder = OBJECTS[_signal_object(thing)]
+            key = _by_type(thing.kind, "signs", "sign_rectangular")
+            if thing.is_dynamic:
+                key = "traffic_light_post"
+            builder = OBJECTS[key]
             facing = heading + thing.heading
             facing += 0.0 if thing.faces_back else _HALF_TURN
             if thing.is_dynamic:
@@ -221,13 +206,12 @@ def _place(
     return round(x, 3), round(y, 3), round(z + low, 3), heading
 
 
-def _signal_object(thing: Thing) -> str:
-    if thing.is_dynamic:
-        return "traffic_light_post"
-    for beginnings, name in _SIGNS:
-        if thing.kind.startswith(beginnings):
-            return name
-    return "sign_rectangular"
+def _by_type(kind: str, table: str, otherwise: str) -> str:
+    """Returns the name in a table for the beginning of a type."""
+    for name, beginnings in TYPES[table].items():
+        if kind.startswith(tuple(beginnings)):
+            return str(name)
+    return otherwise
 
 
 def _solid(
@@ -278,20 +262,13 @@ def _solid(
     ]
     one = make_imported(
         name,
-        _class_of(thing.kind),
+        _by_type(thing.kind, "objects", "other-object"),
         "Object",
         {"body": np.concatenate(solids)},
         {},
     ).structure
     model = Model(one.model.parts, one.model.meshes, shapely.union_all(pieces))
     return Structure(name, one.semantic_class, model, one.xyz, 0.0, ("object",))
-
-
-def _class_of(kind: str) -> str:
-    for beginnings, semantic_class in _CLASSES:
-        if kind.startswith(beginnings):
-            return semantic_class
-    return "other-object"
 
 
 def _rng(name: str) -> np.random.Generator:

@@ -1,5 +1,6 @@
 """A town on an imported road network, and its files."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +24,8 @@ from cns_drake.city.plan.stages import Stages
 from cns_drake.imports import map_files
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.opendrive import imported_streets
+from cns_drake.imports.opendrive import imported_streets, lane_drives
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lane_drives import (
-    find_lane_drives,
-    lanes_for_traffic,
-)
 from cns_drake.imports.opendrive.lanes import (
     LaneBand,
     RoadHeights,
@@ -68,18 +65,10 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Town:
-    """A town, and the result of its import.
+    """A town in all its stages, and the counts of its import.
 
-    Attributes:
-        roads: the file's roads.
-        seed: the seed of the random draws.
-        city: everything, in all stages.
-        stages: the differences between the stages.
-        streets: the areas of the roads that lie on the ground.
-        drives: two, or fewer, through it.
-        lanes: the text of the file of lanes; None without lanes for traffic.
-        kinds: kind of thing -> number.
-        faults: counts of repaired and omitted parts.
+    Streets are on the ground, and there are at most two drives. The text of the
+    file of lanes is None without lanes for traffic.
     """
 
     roads: RoadMap
@@ -177,11 +166,7 @@ def _build(
             ),
             structures=(
                 *street_surfaces(
-                    streets,
-                    surface,
-                    kerb,
-                    streets.coverings,
-                    ends,
+                    streets, surface, kerb, streets.coverings, ends
                 ),
                 *decks,
                 *things,
@@ -202,8 +187,8 @@ def _build(
         city,
         Stages.model_validate(stages),
         streets,
-        find_lane_drives(bands),
-        lanes_for_traffic(bands, kerb),
+        lane_drives.find_lane_drives(bands),
+        lane_drives.lanes_for_traffic(bands, kerb),
         _kinds(roads, things, decks, marks, generated),
         faults,
     )
@@ -267,32 +252,26 @@ def _kinds(
     marks: Sequence[Structure],
     generated: Sequence[Structure],
 ) -> dict[str, int]:
-    junctions = {road.junction for road in roads.roads} - {None}
+    junctions = [
+        road.junction for road in roads.roads if road.junction is not None
+    ]
+    drawn = Counter(one.semantic_class for one in generated)
     kinds = {
-        "roads": sum(road.junction is None for road in roads.roads),
-        "roads in junctions": sum(
-            road.junction is not None for road in roads.roads
-        ),
-        "junctions": len(junctions),
+        "roads": len(roads.roads) - len(junctions),
+        "roads in junctions": len(junctions),
+        "junctions": len(set(junctions)),
         "signals": sum("signal" in one.tags for one in things),
         "objects": sum("object" in one.tags for one in things),
         "bridges": sum(one.semantic_class == "road" for one in decks),
         "roads with marks": len(marks),
-        "buildings, drawn at random": sum(
-            one.semantic_class == "building" for one in generated
-        ),
-        "plants, drawn at random": sum(
-            one.semantic_class == "vegetation" for one in generated
-        ),
+        "buildings, drawn at random": drawn["building"],
+        "plants, drawn at random": drawn["vegetation"],
     }
     return {kind: number for kind, number in kinds.items() if number}
 
 
 def write_town(
-    draft: Path,
-    source: Path,
-    town: Town,
-    progress: Callable[[str], None],
+    draft: Path, source: Path, town: Town, progress: Callable[[str], None]
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
     """Writes all files of a town to its folder, which has the map's name.
 

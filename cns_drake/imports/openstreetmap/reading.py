@@ -1,6 +1,6 @@
 """Reads the parts of an OpenStreetMap file that make a city."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
@@ -61,6 +61,10 @@ class Local:
         return shapely.transform(polygon, self)
 
 
+# A node: its id, tags and place [deg].
+OsmNode = tuple[str, Tags, tuple[float, float]]
+
+
 class OsmWay(NamedTuple):
     """A way: its id, tags, places [deg] and the numbers of its nodes."""
 
@@ -82,28 +86,18 @@ class OsmArea(NamedTuple):
 class OsmFeatures:
     """The content of a file; places are longitude and latitude [deg].
 
-    Attributes:
-        areas: closed ways and multipolygons.
-        ways: with those of their places that are in the file.
-        trees: id, tags and place.
-        crossings: number of the node, and tags.
-        nodes: id, tags and place of all other nodes that have tags.
-        outers: id of each way that is an outline of a building's multipolygon
-            -> id of that.
-        kinds: id of each thing with tags -> its kind; nodes have `n` before
-            their number, ways `w` and relations `r`.
-        faults: counts of unreadable things.
+    Areas are closed ways and multipolygons. Ways have those of their places
+    that are in the file. Crossings are numbers of nodes with tags, and `nodes`
+    are all other ones that have tags. An outline of a building's multipolygon,
+    a way, leads to that in `outers`. All things with tags have a kind, by ids
+    with `n` before the number of a node, `w` of a way and `r` of a relation.
     """
 
     areas: list[OsmArea] = field(default_factory=list)
     ways: list[OsmWay] = field(default_factory=list)
-    trees: list[tuple[str, Tags, tuple[float, float]]] = field(
-        default_factory=list
-    )
+    trees: list[OsmNode] = field(default_factory=list)
     crossings: list[tuple[int, Tags]] = field(default_factory=list)
-    nodes: list[tuple[str, Tags, tuple[float, float]]] = field(
-        default_factory=list
-    )
+    nodes: list[OsmNode] = field(default_factory=list)
     outers: dict[str, str] = field(default_factory=dict)
     kinds: dict[str, str] = field(default_factory=dict)
     faults: ImportFaults = field(default_factory=ImportFaults)
@@ -130,8 +124,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 features.kinds[f"{letter}{one.id}"] = thing_kind(tags)
             if isinstance(one, osmium.osm.Area):
                 polygons = _polygons(one)
-                kind = "w" if one.from_way() else "r"
-                name = f"{kind}{one.orig_id()}"
+                name = f"{'w' if one.from_way() else 'r'}{one.orig_id()}"
                 if polygons and is_building(tags) and _is_flat(polygons):
                     flat.add(name)
                 elif polygons:
@@ -143,11 +136,8 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 nodes = [n for n in one.nodes if n.location.valid()]
                 missing = len(one.nodes) - len(nodes)
                 if missing and name not in wanted:
-                    features.faults.add(
-                        "place of a way that is not in the file, left out",
-                        name,
-                        missing,
-                    )
+                    gap = "place of a way that is not in the file, left out"
+                    features.faults.add(gap, name, missing)
                 if len(nodes) > 1:
                     line = np.array([(n.lon, n.lat) for n in nodes])
                     numbers = tuple(n.ref for n in nodes)
@@ -161,14 +151,12 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                         if member.type == "w" and member.role != "inner"
                     }
             elif isinstance(one, osmium.osm.Node) and one.location.valid():
-                if tags.get("natural") == "tree":
-                    place = (one.lon, one.lat)
-                    features.trees.append((f"n{one.id}", tags, place))
-                elif tags.get("highway") == "crossing":
+                is_tree = tags.get("natural") == "tree"
+                if not is_tree and tags.get("highway") == "crossing":
                     features.crossings.append((one.id, tags))
                 elif tags:
-                    place = (one.lon, one.lat)
-                    features.nodes.append((f"n{one.id}", tags, place))
+                    node = (f"n{one.id}", tags, (one.lon, one.lat))
+                    (features.trees if is_tree else features.nodes).append(node)
     except (
         RuntimeError,
         ValueError,
@@ -180,7 +168,12 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
     closed = {name for name, _, _ in features.areas}
     shapeless = [name for name in wanted if name not in closed]
     if shapeless:
-        flat.update(_closed_without_area(features.ways))
+        # From these closed ways the reader makes no area.
+        flat |= {
+            way.name
+            for way in features.ways
+            if way.nodes[0] == way.nodes[-1] and _is_flat([hull_of(way.line)])
+        }
     for name in shapeless:
         fault = "without area" if name in flat else _OPEN
         features.faults.add(f"building {fault}, left out", name)
@@ -195,13 +188,6 @@ def _polygons(area: Any) -> list[Polygon]:
         ]
         found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
     return found
-
-
-def _closed_without_area(ways: Iterable[OsmWay]) -> Iterator[str]:
-    """Yields closed ways from which the reader makes no area."""
-    for way in ways:
-        if way.nodes[0] == way.nodes[-1] and _is_flat([hull_of(way.line)]):
-            yield way.name
 
 
 def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:

@@ -48,7 +48,6 @@ _FROM_EDGE, _THICK, _HIGH = 0.2, 0.25, 1.0
 _BESIDE_BRIDGE = 2.0
 _SIDEWALK = 2.0
 _KERB = 0.12
-_STONE = (0.62, 0.60, 0.57)
 _WHITE = (0.86, 0.86, 0.84)
 # Width of the stripes of a zebra crossing, and of the gaps [m].
 _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
@@ -58,10 +57,8 @@ _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 class Bridges:
     """Ids of ways for cars and people above or below the ground.
 
-    Attributes:
-        over_streets: bridges over another street, or a railway.
-        level: all other bridges, at the height of the ground beside them.
-        tunnels: below it.
+    Bridges over another street, or a railway, and all others, at the level of
+    the ground beside them; and tunnels.
     """
 
     over_streets: AbstractSet[str] = frozenset()
@@ -101,56 +98,65 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
     return Bridges(over, level, tunnels)
 
 
-def laid(
-    name: str,
-    semantic_class: str,
-    kind: str,
-    areas: Iterable[Polygon],
-    z: float,
-    faults: ImportFaults,
-    rgb: Rgb | None = None,
-) -> Iterator[Imported]:
-    """Yields a level surface, if the areas have any; z in metres.
+class Look(NamedTuple):
+    """Kind, class, colour and height [m] of what is on the ground."""
 
-    The thing of the file that has it ends its name.
+    kind: str
+    semantic_class: str
+    rgb: Rgb | None
+    z: float
+
+
+_ROAD = Look("Road", "road", None, 0.0)
+_WALK = Look("Sidewalk", "sidewalk", None, _KERB)
+_PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _HIGH)
+
+
+def laid(
+    name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
+) -> Iterator[Imported]:
+    """Yields a level surface, if the areas have any.
+
+    Its name ends with that of its element in the file, for the faults.
     """
     source = name.partition("_")[2]
     surface = [
-        flat_surface(polygon, z, source, faults)
+        flat_surface(polygon, look.z, source, faults)
         for area in areas
         for polygon in sound_parts(area, source, faults)
     ]
     if surface:
-        triangles = {"surface": np.concatenate(surface)}
-        yield make_imported(
-            name, semantic_class, kind, triangles, {"surface": rgb}
-        )
+        yield _made(name, look, "surface", surface)
 
 
 def raised(
     name: str,
-    semantic_class: str,
-    kind: str,
+    look: Look,
     areas: Iterable[BaseGeometry],
-    height: float,
     source: tuple[str, ImportFaults],
-    rgb: Rgb | None = None,
 ) -> Iterator[Imported]:
-    """Yields a solid on the ground, if the areas have any; height in metres.
+    """Yields a solid on the ground, if the areas have any.
 
-    The thing of the file that has it is the source, with its faults.
+    The source is the name of its element in the file, and the faults.
     """
     solids = [
-        np.concatenate(extruded(polygon, 0.0, height, *source))
+        np.concatenate(extruded(polygon, 0.0, look.z, *source))
         for area in areas
         for part in parts_of(area)
         for polygon in sound_parts(part, *source)
     ]
     if solids:
-        triangles = {"body": np.concatenate(solids)}
-        yield make_imported(
-            name, semantic_class, kind, triangles, {"body": rgb}
-        )
+        yield _made(name, look, "body", solids)
+
+
+def _made(
+    name: str, look: Look, part: str, triangles: Sequence[np.ndarray]
+) -> Imported:
+    surfaces = {part: np.concatenate(triangles)}
+    colours = {part: look.rgb}
+    return make_imported(
+        name, look.semantic_class, look.kind, surfaces, colours
+    )
 
 
 def parapets(
@@ -168,18 +174,14 @@ def parapets(
             edge = course.offset_curve(side * aside)
             strips.append(edge.buffer(_THICK / 2.0, cap_style="flat"))
         source = (name, ImportFaults())
-        yield from raised(
-            f"parapet_{name}", "fence", "Parapet", strips, _HIGH, source, _STONE
-        )
+        yield from raised(f"parapet_{name}", _PARAPET, strips, source)
 
 
 def street_surfaces(
-    ways: Iterable[OsmWay],
-    local: Local,
-    faults: ImportFaults,
-    bridges: Bridges,
+    features: reading.OsmFeatures, local: Local, bridges: Bridges
 ) -> Iterator[Imported]:
     """Yields carriageways, and the sidewalks and paths beside them."""
+    faults = features.faults
     for kind, ids in (
         ("bridge over a street or railway, left out", bridges.over_streets),
         ("tunnel, left out", bridges.tunnels),
@@ -188,7 +190,7 @@ def street_surfaces(
             faults.add(kind, name)
     roads: list[tuple[str, BaseGeometry]] = []
     walks: list[tuple[str, BaseGeometry]] = []
-    for name, tags, line, _ in ways:
+    for name, tags, line, _ in features.ways:
         if _is_elsewhere(name, tags, bridges):
             continue
         width = street_width(tags, (name, faults))
@@ -209,13 +211,10 @@ def street_surfaces(
                 walks.append((f"{name}_{'lr'[side < 0]}", strip))
     paved = shapely.union_all([area for _, area in roads])
     for name, area in roads:
-        areas = parts_of(area)
-        yield from laid(f"road_{name}", "road", "Road", areas, 0.0, faults)
+        yield from laid(f"road_{name}", _ROAD, parts_of(area), faults)
     for name, area in walks:
         areas = parts_of(area.difference(paved))
-        yield from laid(
-            f"walk_{name}", "sidewalk", "Sidewalk", areas, _KERB, faults
-        )
+        yield from laid(f"walk_{name}", _WALK, areas, faults)
 
 
 def _is_elsewhere(name: str, tags: reading.Tags, bridges: Bridges) -> bool:
@@ -271,14 +270,11 @@ def street_places(features: reading.OsmFeatures, local: Local) -> StreetPlaces:
 
 
 def crossing_stripes(
-    crossings: Iterable[tuple[int, reading.Tags]],
-    ways: Iterable[OsmWay],
-    local: Local,
-    faults: ImportFaults,
+    features: reading.OsmFeatures, local: Local
 ) -> Iterator[Imported]:
     """Yields the stripes of zebra crossings, a little above their street."""
-    marked = {number for number, tags in crossings if is_marked(tags)}
-    for _, tags, line, nodes in ways:
+    marked = {number for number, tags in features.crossings if is_marked(tags)}
+    for _, tags, line, nodes in features.ways:
         width = street_width(tags)
         if width is None or has_tag(tags, "tunnel"):
             continue
@@ -293,7 +289,8 @@ def crossing_stripes(
             stripes = _stripes(places[k], along / np.hypot(*along), width)
             name = f"n{number}"
             surface = [
-                flat_surface(s, _STRIPE_HEIGHT, name, faults) for s in stripes
+                flat_surface(s, _STRIPE_HEIGHT, name, features.faults)
+                for s in stripes
             ]
             yield make_imported(
                 f"crossing_{name}",
@@ -328,23 +325,14 @@ _TARTAN: Rgb = (0.60, 0.34, 0.28)
 _LEVEL = -0.05  # [m]
 
 
-class _Look(NamedTuple):
-    """Kind, class, colour and height [m] of a ground."""
-
-    kind: str
-    semantic_class: str
-    rgb: Rgb | None
-    z: float
-
-
-def _look_of(entry: list) -> _Look:
+def _look_of(entry: list) -> Look:
     kind, semantic_class, (red, green, blue), z = entry
-    return _Look(kind, semantic_class, (red, green, blue), z)
+    return Look(kind, semantic_class, (red, green, blue), z)
 
 
 _LOOKS = [(_look_of(entry["look"]), entry) for entry in TABLES["grounds"]]
 _WATER = _LOOKS[0][0]
-_PITCH = _Look("Pitch", "other-ground", _TARTAN, -0.035)
+_PITCH = Look("Pitch", "other-ground", _TARTAN, -0.035)
 _OF_GRASS = ("grass", "artificial_turf", "natural_grass")
 _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
 _SURFACES = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
@@ -356,38 +344,27 @@ _BEYOND, _BESIDE = 3000.0, 0.1
 
 
 def ground_areas(
-    areas: Iterable[reading.OsmArea],
-    local: Local,
-    faults: ImportFaults,
-    dressed: bool,
+    features: reading.OsmFeatures, local: Local, dressed: bool
 ) -> Iterator[Imported]:
     """Yields the areas that are ground; dressed, by their material."""
-    for name, tags, polygons in areas:
+    for name, tags, polygons in features.areas:
         look = _look(tags) if dressed else _plain_look(tags)
         if look is None or has_tag(tags, "building"):
             continue
-        areas = map(local.polygon, polygons)
-        yield from laid(
-            f"land_{name}",
-            look.semantic_class,
-            look.kind,
-            areas,
-            look.z,
-            faults,
-            look.rgb,
-        )
+        outlines = map(local.polygon, polygons)
+        yield from laid(f"land_{name}", look, outlines, features.faults)
 
 
-def _plain_look(tags: reading.Tags) -> _Look | None:
+def _plain_look(tags: reading.Tags) -> Look | None:
     found = area_kind(tags)
     if found is None:
         return None
     kind, semantic_class = found
     colours = {"WaterBody": WATER, "LandUse": LAWN}
-    return _Look(kind, semantic_class, colours.get(kind), _LEVEL)
+    return Look(kind, semantic_class, colours.get(kind), _LEVEL)
 
 
-def _look(tags: reading.Tags) -> _Look | None:
+def _look(tags: reading.Tags) -> Look | None:
     if tags.get("tunnel", "no") != "no" or tags.get("layer", "").startswith(
         "-"
     ):
@@ -397,7 +374,7 @@ def _look(tags: reading.Tags) -> _Look | None:
     if tags.get("amenity") == "parking":
         if tags.get("parking") in _NO_GROUND:
             return None
-        return _Look("Parking", "parking", None, -0.03)
+        return Look("Parking", "parking", None, -0.03)
     for look, entry in _LOOKS:
         if any(
             tags.get(key) in values.split()
@@ -408,7 +385,7 @@ def _look(tags: reading.Tags) -> _Look | None:
     return _plain_look(tags)
 
 
-def _pitch(tags: reading.Tags) -> _Look:
+def _pitch(tags: reading.Tags) -> Look:
     surface = tags.get("surface")
     sports = tags.get("sport", "").split(";")
     is_grass = surface in _OF_GRASS or (
@@ -445,9 +422,7 @@ def sea(
     edges = shapely.union_all([whole.boundary, *cuts])
     areas = shapely.get_parts(shapely.polygonize([edges]))
     water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
-    kind, semantic_class, rgb, z = _WATER
-    name = f"sea_{coasts[0].name}"
-    yield from laid(name, semantic_class, kind, parts_of(water), z, faults, rgb)
+    yield from laid(f"sea_{coasts[0].name}", _WATER, parts_of(water), faults)
 
 
 def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:

@@ -6,7 +6,7 @@ https://wiki.openstreetmap.org/wiki/Key:building:levels,
 https://wiki.openstreetmap.org/wiki/Key:lanes,
 https://wiki.openstreetmap.org/wiki/Key:maxspeed"""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 import re
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from cns_drake.imports.options import ImportFaults
 TABLES = parse_yaml(Path(__file__).with_name("tags.yaml").read_bytes())
 _NUMBER = r"(\d+(?:[.,]\d+)?|[.,]\d+)"
 _LENGTH = re.compile(rf"{_NUMBER}\s*([a-z]*|'|\")")
+_COUNT = re.compile(_NUMBER)
 _FEET_AND_INCHES = re.compile(
     rf"{_NUMBER}\s*(?:'|ft|feet|foot)\s*{_NUMBER}\s*(?:\"|in|'')?"
 )
@@ -54,8 +55,7 @@ def length(text: str | None) -> float | None:
 
     The greatest, where there is a list or a range.
     """
-    found = [_length(part) for part in _parts(text)]
-    return _greatest(found)
+    return _greatest(text, _length)
 
 
 def count(text: str | None) -> float | None:
@@ -63,38 +63,37 @@ def count(text: str | None) -> float | None:
 
     The greatest, where there is a list or a range.
     """
-    found = [
-        float(part.replace(",", ".")) if re.fullmatch(_NUMBER, part) else None
-        for part in _parts(text)
-    ]
-    return _greatest(found)
+    return _greatest(
+        text, lambda part: _decimal(part) if _COUNT.fullmatch(part) else None
+    )
 
 
-def _parts(text: str | None) -> Iterator[str]:
+def _greatest(
+    text: str | None, read: Callable[[str], float | None]
+) -> float | None:
+    """Returns the greatest value; None without any, or if one is None."""
     if text is None or len(text) > 255:  # OpenStreetMap allows no more.
-        return
+        return None
     plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
-    for part in _BETWEEN.split(plain):
-        if part.strip():
-            yield _ABOUT.sub("", part).strip()
+    parts = [part for part in _BETWEEN.split(plain) if part.strip()]
+    values = [read(_ABOUT.sub("", part).strip()) for part in parts]
+    known = [value for value in values if value is not None]
+    return max(known) if known and len(known) == len(values) else None
 
 
 def _length(text: str) -> float | None:
     both = _FEET_AND_INCHES.fullmatch(text)
     if both:
-        feet, inches = (float(one.replace(",", ".")) for one in both.groups())
+        feet, inches = map(_decimal, both.groups())
         return 0.3048 * (feet + inches / 12.0)
     match = _LENGTH.fullmatch(text)
     if match is None or match[2] not in TABLES["units"]:
         return None
-    return float(match[1].replace(",", ".")) * float(TABLES["units"][match[2]])
+    return _decimal(match[1]) * float(TABLES["units"][match[2]])
 
 
-def _greatest(values: list[float | None]) -> float | None:
-    """Returns the greatest value; None without any, or if one is None."""
-    if not values or None in values:
-        return None
-    return max(value for value in values if value is not None)
+def _decimal(text: str) -> float:
+    return float(text.replace(",", "."))
 
 
 def tag_value(
@@ -105,16 +104,10 @@ def tag_value(
     where: tuple[str, ImportFaults] | None,
     least: float = 0.0,
 ) -> float | None:
-    """Returns the value of a tag; None if it has no valid one.
+    """Returns the value of a tag, as read; None if it has no valid one.
 
-    Args:
-        tags: a thing's tags.
-        key: the tag's key.
-        read: parser of its value.
-        most: greatest plausible value.
-        where: name of the thing, and the counts for values that cannot be
-            parsed or are implausible; None if they are counted elsewhere.
-        least: least plausible value.
+    A valid one is plausible, from least to most. Others are counted for a
+    thing, whose name and counts are `where`, unless that is None.
     """
     text = tags.get(key)
     if text is None:
@@ -297,12 +290,7 @@ def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
 
 
 class LaneLayout(NamedTuple):
-    """Lanes of a street.
-
-    Attributes:
-        forward, backward: number of lanes along its line, and against it.
-        width: each lane's width [m].
-    """
+    """Lanes along the line of a street, and against it, of a width [m]."""
 
     forward: int
     backward: int
@@ -311,11 +299,8 @@ class LaneLayout(NamedTuple):
     def offset(self, is_forward: bool, number: int) -> float:
         """Returns the place of a lane, from the middle of the street [m].
 
-        To the side on which traffic keeps, in the lane's own direction.
-
-        Args:
-            is_forward: whether it leads along the street's line.
-            number: the lane's in its direction, 0 for the innermost one.
+        To the side on which traffic keeps, in the direction of the lane. Number
+        0 is the innermost one.
         """
         same, other = self.forward, self.backward
         if not is_forward:

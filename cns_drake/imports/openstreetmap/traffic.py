@@ -1,6 +1,6 @@
 """Lanes and walkways of OpenStreetMap's streets, for traffic."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -20,6 +20,8 @@ from cns_drake.imports.foreign_city import (
     Imported,
     Street,
     StreetPlaces,
+    cut_at_nodes,
+    ends_at_nodes,
 )
 from cns_drake.imports.openstreetmap.tags import (
     LaneLayout,
@@ -42,12 +44,14 @@ _NEAR, _NEAR_END = 1.5, 4.0
 _CROSSING_WIDTH, _CROSSING_HALF_WIDTH = 2.4, 0.8
 
 
+# A place on a strip: the number of the strip, and how far along it [m].
+_Place = tuple[int, float]
+
+
 class StreetWalkways:
     """Strips of sidewalks and paths, and the crossings that join them.
 
-    Attributes:
-        walkways: all of them.
-        crossings: number of a street's node -> the crossing there.
+    A crossing has the number of the node of a street.
     """
 
     def __init__(
@@ -56,20 +60,15 @@ class StreetWalkways:
         paths: Iterable[np.ndarray],
         crossed: Iterable[int],
         sidewalks: BaseGeometry,
-        height: float,
     ):
         """Finds the walkways.
 
-        Args:
-            streets: for cars.
-            paths: (N, 2) middles of ways for people [m].
-            crossed: nodes of streets at which people cross.
-            sidewalks: area of sidewalks and paths.
-            height: how high sidewalks stand above the streets [m].
+        Paths (N, 2) are middles of ways for people [m], who cross at some nodes
+        of streets. Sidewalks and paths have an area.
         """
         walked = sidewalks.buffer(-_FROM_EDGE, quad_segs=2)
         shapely.prepare(walked)
-        self._walked, self._height = walked, height
+        self._walked = walked
         lines = [*_sidewalk_lines(streets), *map(shapely.LineString, paths)]
         self._strips = [
             strip
@@ -78,14 +77,10 @@ class StreetWalkways:
             if strip.geom_type == "LineString" and strip.length >= _LEAST_STRIP
         ]
         self._tree = shapely.STRtree(self._strips)
-        self._nodes: dict[tuple[int, float], int] = {}
+        self._nodes: dict[_Place, int] = {}
         self.crossings: dict[int, lane_graph.Crossing] = {}
         over = []
-        arms: Counter[int] = Counter()
-        for street in streets:
-            last = len(street.nodes) - 1
-            for k, node in enumerate(street.nodes):
-                arms[node] += 1 if k in (0, last) else 2
+        arms = ends_at_nodes(streets)
         wanted = {node for node in crossed if arms[node] <= 2}
         for street in streets:
             for k, node in enumerate(street.nodes):
@@ -104,10 +99,7 @@ class StreetWalkways:
 
     def _crossing(
         self, street: Street, k: int
-    ) -> (
-        tuple[lane_graph.Crossing, tuple[tuple[int, float], tuple[int, float]]]
-        | None
-    ):
+    ) -> tuple[lane_graph.Crossing, tuple[_Place, _Place]] | None:
         """Returns a crossing and its places on strips; None without strips."""
         line = street.line
         along = line[min(k + 1, len(line) - 1)] - line[max(k - 1, 0)]
@@ -127,7 +119,7 @@ class StreetWalkways:
         course = np.column_stack([kerbs, np.zeros(2)])
         return lane_graph.make_crossing(course, _CROSSING_WIDTH), (first, last)
 
-    def _on_strip(self, place: np.ndarray) -> tuple[int, float] | None:
+    def _on_strip(self, place: np.ndarray) -> _Place | None:
         point = shapely.Point(place)
         near = self._tree.query_nearest(point, max_distance=_NEAR)
         if not len(near):
@@ -135,12 +127,10 @@ class StreetWalkways:
         number = int(near[0])
         return number, float(self._strips[number].project(point))
 
-    def _node(self, place: tuple[int, float]) -> int:
+    def _node(self, place: _Place) -> int:
         return self._nodes.setdefault(place, len(self._nodes))
 
-    def _links(
-        self,
-    ) -> Iterator[tuple[tuple[int, float], tuple[int, float]]]:
+    def _links(self) -> Iterator[tuple[_Place, _Place]]:
         """Yields pairs of ends of strips between which people can walk."""
         ends = [
             (k, s)
@@ -181,19 +171,15 @@ class StreetWalkways:
                 )
 
     def _way(
-        self, a: tuple[int, float], b: tuple[int, float], crossing: int = -1
+        self, a: _Place, b: _Place, crossing: int = -1
     ) -> lane_graph.Walkway:
         places = [self._strips[k].interpolate(s) for k, s in (a, b)]
         return self._walkway(shapely.get_coordinates(places), a, b, crossing)
 
     def _walkway(
-        self,
-        line: np.ndarray,
-        a: tuple[int, float],
-        b: tuple[int, float],
-        crossing: int = -1,
+        self, line: np.ndarray, a: _Place, b: _Place, crossing: int = -1
     ) -> lane_graph.Walkway:
-        height = np.full(len(line), self._height)
+        height = np.full(len(line), _KERB)
         return lane_graph.Walkway(
             lane_graph.resampled(np.column_stack([line, height])),
             _HALF_STRIP if crossing < 0 else _CROSSING_HALF_WIDTH,
@@ -234,8 +220,6 @@ _BEFORE_CORNER, _JOINT, _FARTHEST_STOP = 1.0, 3.0, 25.0
 _SHORTEST = 1.0
 # A street's direction at its end is that of its last piece of this length [m].
 _ARM = 6.0
-# Streets for other traffic.
-_NO_TRAFFIC = frozenset({"track"})
 # An end of a stretch: its number, and 0 for the first end or -1 for the last.
 _Arm = tuple[int, int]
 # Traffic keeps to the streets near drives [m].
@@ -252,13 +236,10 @@ _ABOVE, _BELOW = 0.3, 3.5
 
 @dataclass(frozen=True)
 class Stretch:
-    """A street between two junctions.
+    """A street between two junctions, with its middle (N, 2) and lanes.
 
-    Attributes:
-        street: the whole one.
-        line: (N, 2) its middle, with rounded corners, evenly spaced [m].
-        nodes: numbers of its first and last place.
-        layout: its lanes.
+    That line has rounded corners and is evenly spaced [m]; the nodes are those
+    of its first and last place.
     """
 
     street: Street
@@ -279,13 +260,9 @@ class Stretch:
 
 @dataclass(frozen=True)
 class _Lane:
-    """A lane of a stretch.
+    """A lane of a stretch, with points (N, 2) in driving direction [m].
 
-    Attributes:
-        stretch: number of the stretch.
-        is_forward: whether it leads along the stretch's line.
-        number: 0 for the innermost lane of its direction.
-        points: (N, 2) in driving direction [m].
+    Its number is 0 for the innermost one of its direction.
     """
 
     stretch: int
@@ -305,12 +282,9 @@ class _Lane:
 class StreetTraffic:
     """The lanes of streets, and what follows what.
 
-    Attributes:
-        stretches: the streets with traffic, cut at their junctions.
-        lanes: those of the stretches, then the ways between them.
-        links: pairs of lane numbers; the second lane follows the first.
-        beside: number of a lane -> that of the lane on its outer side, in the
-            same direction.
+    Lanes of stretches, streets cut at their junctions, come before the ways
+    between them. The second lane of a link follows the first. A lane may have
+    another one beside it, on its outer side and in the same direction.
     """
 
     def __init__(
@@ -348,10 +322,7 @@ class StreetTraffic:
         for first, last, is_junction, line in self._ways(lanes):
             if not surface.covers(shapely.LineString(line)):
                 continue
-            self.links += [
-                (first, len(self.lanes)),
-                (len(self.lanes), last),
-            ]
+            self.links += [(first, len(self.lanes)), (len(self.lanes), last)]
             limit = min(self.lanes[k].limit for k in (first, last))
             self.lanes.append(DirectedLane(_level(line), limit, is_junction))
 
@@ -472,27 +443,16 @@ class StreetTraffic:
 def _stretches(
     streets: Sequence[Street], crossed: AbstractSet[int]
 ) -> Iterator[Stretch]:
-    layouts: list[tuple[Street, LaneLayout]] = []
-    uses: defaultdict[int, int] = defaultdict(int)
-    for street in streets:
-        layout = lane_layout(street.tags, street.width)
-        if street.tags.get("highway") in _NO_TRAFFIC or not layout.width:
-            continue
-        layouts.append((street, layout))
-        for node in street.nodes:
-            uses[node] += 1
-    for street, layout in layouts:
-        last = len(street.nodes) - 1
-        cuts = [
-            k
-            for k, node in enumerate(street.nodes)
-            if k in (0, last) or uses[node] > 1 or node in crossed
-        ]
-        for first, after in pairwise(cuts):
-            line = street.line[first : after + 1]
-            if shapely.LineString(line).length > SPACING:
-                ends = street.nodes[first], street.nodes[after]
-                yield Stretch(street, _rounded(line), ends, layout)
+    used = [
+        street
+        for street in streets
+        if street.tags.get("highway") != "track"
+        and lane_layout(street.tags, street.width).width
+    ]
+    for street, line, ends in cut_at_nodes(used, crossed):
+        if shapely.LineString(line).length > SPACING:
+            layout = lane_layout(street.tags, street.width)
+            yield Stretch(street, _rounded(line), ends, layout)
 
 
 def _rounded(line: np.ndarray) -> np.ndarray:
@@ -518,24 +478,17 @@ def _rounded(line: np.ndarray) -> np.ndarray:
 
 
 def _beside(lanes: Sequence[_Lane]) -> Mapping[int, int]:
-    number = {
-        (lane.stretch, lane.is_forward, lane.number): k
-        for k, lane in enumerate(lanes)
-    }
+    # The lanes of a direction follow each other, from the inside out.
     return {
-        k: number[outer]
-        for (stretch, is_forward, of), k in number.items()
-        if (outer := (stretch, is_forward, of + 1)) in number
+        k: k + 1
+        for k, (one, other) in enumerate(pairwise(lanes))
+        if (one.stretch, one.is_forward) == (other.stretch, other.is_forward)
     }
 
 
 def _direction(lane: _Lane, end: int) -> float:
-    step = (
-        lane.points[1] - lane.points[0]
-        if end == 0
-        else (lane.points[-1] - lane.points[-2])
-    )
-    return float(np.arctan2(step[1], step[0]))
+    a, b = lane.points[:2] if end == 0 else lane.points[-2:]
+    return float(np.arctan2(*(b - a)[::-1]))
 
 
 def _level(line: np.ndarray) -> np.ndarray:
@@ -567,11 +520,7 @@ def lanes_of_streets(
     if not near:
         return None
     walks = StreetWalkways(
-        near,
-        places.paths,
-        places.crossed,
-        _sidewalks(structures, paths),
-        _KERB,
+        near, places.paths, places.crossed, _sidewalks(structures, paths)
     )
     surface = shapely.union_all(
         [

@@ -217,13 +217,13 @@ def test_a_house_is_the_same_whatever_else_the_file_holds(row, tmp_path):
 
 def test_a_lower_house_has_the_colours_of_the_whole_one(row):
     city = type(row)(row.structures, row.origin, "", ImportFaults())
-    staged, growth = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
-    assert growth.lower
+    staged, changes = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
+    assert changes["part_of_height"]
     drives = [WaypointDrive(STREET, STREET)]
     ground = ground_of(staged.kept)
     found = dress_buildings(staged.kept, drives, (), ground, 0)
     new = {o.structure.name: o for o in found.buildings.values()}
-    for name in growth.lower:
+    for name in changes["part_of_height"]:
         whole, low = new[name], new[f"{name}_lower"]
         rgb = [
             {p.name: p.rgb for p in one.structure.model.parts}
@@ -353,12 +353,12 @@ def test_a_gable_keeps_its_slopes():
         style, storey=3.2, sill=1.0, height=1.2, width=1.2, pitch=2.0,
         balconies=False, shops=False, cornice=0.0, plinth=0.0,
     )  # fmt: skip
-    plan = plan_facade(gable, style, 0.0, 0.0)
+    plan = plan_facade(gable, style, 0.0, 0.0, 22.0)
     assert {o.row for o in plan.openings} == {0, 1, 2}
     out = Assembly(Site(Polygon(), "a"), np.random.default_rng(1))
     names = ("body", "doors", "frames", "glass", "sign", "trim")
     out.paint(**dict.fromkeys(names, (0.5, 0.5, 0.5)))
-    counts = add_facade(out, plan, 22.0, out.rng)
+    counts = add_facade(out, plan, out.rng)
     # The upper row leaves the gable.
     assert counts == {"windows": 6}
     model = out.finish(Polygon())
@@ -461,7 +461,7 @@ def test_a_house_with_one_bay_has_a_window_beside_its_door(length, number):
     (a, b), (d, c) = corners
     (panel,) = find_panels([np.array([[a, b, c], [a, c, d]])])
     openings = with_doors(
-        plan_facade(panel, style, 0.0, 0.0), NO_PAVING
+        plan_facade(panel, style, 0.0, 0.0, 9.0), NO_PAVING
     ).openings
     assert [o.kind for o in openings] == ["door", "window"][:number]
     ends = [x for o in openings for x in (o.x0, o.x1)]

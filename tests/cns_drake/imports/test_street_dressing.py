@@ -340,8 +340,7 @@ def test_trees_on_carriageways_and_kerbs_are_moved_beside_them(tmp_path):
     }
     city = read(osm, tmp_path)
     found = dressed(city)
-    trees = {one.structure.name: one for one in city.structures}
-    moved = {name: (trees[name], new) for name, new in found.moved.items()}
+    moved = {one.structure.name: (one, new) for one, new in found.moved.items()}
     for name, y in (("lane", WIDTH / 2 + 0.6), ("kerb", -WIDTH / 2 - 0.6)):
         old, new = moved.pop(f"tree_n{numbers[name]}")
         expected = origin(city) + np.array([places[name][0], y])
