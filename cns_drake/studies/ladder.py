@@ -201,7 +201,6 @@ class RungPlan:
     """The jobs of one map.
 
     Attributes:
-        jobs: by name.
         distractors: drives with places of other cities.
     """
 

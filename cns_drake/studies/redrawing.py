@@ -268,11 +268,7 @@ def draw_fresh_cities(
 
 @dataclass(frozen=True)
 class DrawFreshCity(RedrawCity):
-    """Draws a version of a map, with its stages and drives.
-
-    Attributes:
-        turn_deg: turn of the whole city about the world's origin [deg].
-    """
+    """Draws a version of a map, with its stages and drives."""
 
     turn_deg: float = 0.0
 

@@ -145,8 +145,6 @@ def measure_years(
 
     Args:
         years: positive, ascending.
-        seeds: of the histories, from 1 on.
-        rates: event -> rate a year.
         directions: whether the database is of today, the query, or both in
             turn.
 

@@ -65,14 +65,11 @@ class Report:
     """What a report is made of.
 
     Attributes:
-        changes: TCR of all pairs.
         survivals: place recognition of all pairs, with their controls.
         recognitions: the same results without controls, and those of drives
             compared with themselves.
         evidence: (database, query) -> evidence why best places are wrong.
         tracks: drive -> its track, also for the controls.
-        drives: name -> drive, for all drives of a pair.
-        illustrations: figures, already written.
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
         repeated: results by the protocol of the published numbers, if that is

@@ -475,11 +475,7 @@ class _Faults(NamedTuple):
 def fault_table(
     results: Sequence[RecognitionResult], evidence: Evidence
 ) -> Table:
-    """Returns the reasons for wrong best places for print.
-
-    Args:
-        evidence: a pair without it has no row.
-    """
+    """Returns the reasons for wrong best places for print."""
 
     def share(one: _Faults, kind: str) -> str | None:
         part = one.kinds[kind] / max(one.kinds.total(), 1)

@@ -88,7 +88,6 @@ class Table:
     A missing value is empty in CSV, elsewhere a dash; truth values are 0 or 1.
 
     Attributes:
-        header: name of each column.
         rows: one value for each column: text, a number, a `Cell`, or None for
             an empty one.
         groups: names over columns, each with the number of columns that it

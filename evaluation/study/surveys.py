@@ -267,7 +267,6 @@ def survey_recording(
 
     Args:
         roles: the roles of the drive in place recognition; may be empty.
-        methods: that describe it; may be none.
         with_scans: whether to keep the scans of places and queries, too.
         further: descriptions by another protocol; none without a role.
 
