@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, write_text
+from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
@@ -107,8 +107,7 @@ def measure_sizes(
             parts.append(part)
     run_jobs(jobs, cluster)
     path = output / "size.csv"
-    table = size_table(folder.name, [part.read() for part in parts])
-    write_text(path, table.to_csv())
+    size_table(folder.name, [part.read() for part in parts]).write_csv(path)
     return path
 
 

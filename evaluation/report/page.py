@@ -25,7 +25,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 import numpy as np
 
-from cns_drake.base.files import completing
+from cns_drake.base.files import write_text
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
@@ -141,9 +141,9 @@ def write_report(report: Report, folder: Path) -> Path:
                 "tex": (shown.to_latex() for shown in tables[name]),
             }
             for ending, texts in forms.items():
-                _write(folder / f"{name}.{ending}", "\n".join(texts))
+                write_text(folder / f"{name}.{ending}", "\n".join(texts))
     text = _render("report.md", **_content(report, tables))
-    _write(folder / "report.md", text.rstrip() + "\n")
+    write_text(folder / "report.md", text.rstrip() + "\n")
     path = folder / "report.html"
     write_page(path, report)
     return path
@@ -200,7 +200,7 @@ def write_page(path: Path, report: Report) -> None:
         script=Markup("\n").join(map(_read_asset, _SCRIPTS)),
         data=_to_script(data),
     )
-    _write(path, text)
+    write_text(path, text)
 
 
 def _shown_tables(report: Report) -> dict[str, list[Table]]:
@@ -375,8 +375,3 @@ def _environment() -> Environment:
         "route_colours": _route_colours(),
     }
     return found
-
-
-def _write(path: Path, text: str) -> None:
-    with completing(path) as part:
-        part.write_text(text, encoding="utf-8")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cns_drake.base.csv_files import csv_text
-from cns_drake.base.files import completing
+from cns_drake.base.files import write_text
 from cns_drake.base.yaml_files import read_yaml
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 
@@ -173,8 +173,7 @@ class Table:
         Raises:
             InputError: the file cannot be written.
         """
-        with completing(path) as part:
-            part.write_text(self.to_csv(), encoding="utf-8")
+        write_text(path, self.to_csv())
 
     def to_markdown(self) -> str:
         """Returns the table with four decimals, as the paper prints them.
