@@ -29,7 +29,7 @@ from cns_drake.base.files import write_text
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
-from evaluation.recognition.metrics import MODES
+from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.survival import Survival
 from evaluation.report import result_tables, survival
@@ -206,19 +206,24 @@ def write_page(path: Path, report: Report) -> None:
 def _shown_tables(report: Report) -> dict[str, list[Table]]:
     """Returns name of a file -> its tables for print."""
     results = report.recognitions
+    # The last one is counted as the reference did.
+    counted: list[
+        tuple[Sequence[RecognitionResult], Mode | None, Reference]
+    ] = [(results, mode, NO_REFERENCE) for mode in MODES]
+    if report.compared:
+        counted.append((report.compared, None, report.reference))
     changes = result_tables.change_table(
         report.changes, report.reference, report.evidence
     )
     return {
         "survival": [survival.survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
-        "place_recognition": result_tables.recognition_tables(
-            results,
-            report.changes,
-            report.reference,
-            report.compared,
-            report.evidence,
-        ),
+        "place_recognition": [
+            result_tables.recognition_table(
+                some, report.changes, mode, reference, report.evidence
+            )
+            for some, mode, reference in counted
+        ],
         "differences": [result_tables.difference_table(report.differences)],
         "why": [result_tables.fault_table(results, report.evidence)],
         "poses": [result_tables.pose_table(results)],
