@@ -212,26 +212,21 @@ def import_city(
         grow,
         dressed=not plain,
     )
-    with uncollected():
-        report = _imported(path, output, options)
-    for line in _shortcomings(report, output, options):
-        note(f"{output}: {line}")
-    print_rows(_report_rows(report, output, options.years))
-
-
-def _imported(path: Path, output: Path, options: ImportOptions) -> ImportReport:
-    """Writes the map folder of a file."""
     with uninterrupted():
         from cns_drake.imports import import_map
         from cns_drake.scenarios.drive_table import write_table
 
-    return import_map.import_city(
-        path,
-        output,
-        options,
-        note,
-        finish=lambda folder, sizes: write_table(folder, note, sizes),
-    )
+    with uncollected():
+        report = import_map.import_city(
+            path,
+            output,
+            options,
+            note,
+            finish=lambda folder, sizes: write_table(folder, note, sizes),
+        )
+    for line in _shortcomings(report, output, options):
+        note(f"{output}: {line}")
+    print_rows(_report_rows(report, output, options.years))
 
 
 def _shortcomings(

@@ -127,7 +127,7 @@ def fresh(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.fresh_cities import draw_fresh_cities
+        from cns_drake.studies.redrawing import draw_fresh_cities
         from cns_drake.studies.reproduction import reproduce_maps
 
     cluster = choose_cluster(jobs, scheduler)

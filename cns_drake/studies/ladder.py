@@ -120,7 +120,18 @@ def climb_ladder(
         ]
         measured += _measure(planned, plans, cluster, protocol)
         pairs = ladder.ladder_rows(measured)[len(rows) :]
-    return _write(measured, rows, pairs, output, protocol, extent)
+    queries = ladder.ladder_query_table(measured, protocol)
+    queries.write_csv(output / "queries.csv")
+    ladder.draw_ladder(rows, output / "ladder")
+    text = ladder.ladder_text(rows)
+    if pairs:
+        ladder.pair_table(rows, pairs).write_csv(output / "pairs.csv")
+        text += f"\n\n{ladder.pair_text(rows, pairs)}"
+    write_text(output / "findings.txt", text + "\n")
+    table = output / "ladder.csv"
+    found = ladder.ladder_table([*rows, *pairs], protocol, extent.viewpoint)
+    found.write_csv(table)
+    return table, text
 
 
 def rung_pairs(
@@ -201,7 +212,6 @@ class RungPlan:
     """The jobs of one map.
 
     Attributes:
-        jobs: by name.
         distractors: drives with places of other cities.
     """
 
@@ -300,30 +310,6 @@ def _labelled(
         rung.strength,
         rung.drives.radius(radius),
     )
-
-
-def _write(
-    measured: Sequence[ladder.MeasuredRung],
-    rows: Sequence[ladder.LadderRow],
-    pairs: Sequence[ladder.LadderRow],
-    output: Path,
-    protocol: RetrievalProtocol,
-    extent: ladder_rungs.Extent,
-) -> tuple[Path, str]:
-    text = ladder.ladder_text(rows)
-    queries = ladder.ladder_query_table(measured, protocol).to_csv()
-    write_text(output / "queries.csv", queries)
-    ladder.draw_ladder(rows, output / "ladder")
-    if pairs:
-        write_text(
-            output / "pairs.csv", ladder.pair_table(rows, pairs).to_csv()
-        )
-        text += f"\n\n{ladder.pair_text(rows, pairs)}"
-    write_text(output / "findings.txt", text + "\n")
-    table = output / "ladder.csv"
-    found = ladder.ladder_table([*rows, *pairs], protocol, extent.viewpoint)
-    write_text(table, found.to_csv())
-    return table, text
 
 
 def distracting_drives(

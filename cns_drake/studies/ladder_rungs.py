@@ -120,7 +120,6 @@ class RungDrives:
     """The drives of a rung of a ladder.
 
     Attributes:
-        num_distractors: places of other cities in the database.
         lateral: distance between the two ways that a match has to bridge [m].
         query_changes: option of the protocol -> what it does to the sensor of
             each query.

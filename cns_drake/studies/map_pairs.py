@@ -189,7 +189,6 @@ def score_methods(
     """Returns method -> name -> value of the scores of baselines.
 
     Args:
-        maps: a folder with two labelled maps.
         methods: baselines, or `TRUTH`.
 
     Raises:

@@ -47,9 +47,6 @@ def record_all(
     A finished recording of the same scenario and world is kept; an interrupted
     one goes on.
 
-    Args:
-        overwrite: replace other recordings of these names.
-
     Raises:
         InputError: some could not be recorded, all of which are named, or the
             folder cannot be made.

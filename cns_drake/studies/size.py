@@ -10,14 +10,16 @@ import math
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, write_text
+from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.studies.ladder import describe_job, distracting_drives
 from cns_drake.studies.ladder_rungs import plain_drives
 from cns_drake.studies.reproduction import recordable_map
+from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.report.tables import Table, in_table_order
 from evaluation.study.chosen_methods import MethodChoice
@@ -72,13 +74,13 @@ def measure_sizes(
         cluster,
         on_note,
     )
+    drives: list[tuple[Scenario, Role]] = [
+        *((one, "places") for one in (plain.database, *others)),
+        (plain.query, "queries"),
+    ]
     described = [
         describe_job(one, role, methods, protocol, files)
-        for one, role in (
-            (plain.database, "places"),
-            *((other, "places") for other in others),
-            (plain.query, "queries"),
-        )
+        for one, role in drives
     ]
     jobs = [job for job, _ in described]
     *places, asking = (written for _, written in described)
@@ -105,8 +107,7 @@ def measure_sizes(
             parts.append(part)
     run_jobs(jobs, cluster)
     path = output / "size.csv"
-    table = size_table(folder.name, [part.read() for part in parts])
-    write_text(path, table.to_csv())
+    size_table(folder.name, [part.read() for part in parts]).write_csv(path)
     return path
 
 

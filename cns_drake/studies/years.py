@@ -145,8 +145,6 @@ def measure_years(
 
     Args:
         years: positive, ascending.
-        seeds: of the histories, from 1 on.
-        rates: event -> rate a year.
         directions: whether the database is of today, the query, or both in
             turn.
 
@@ -258,7 +256,13 @@ def measure_years(
             found
         )
     ]
-    return _write(pairs_found, output)
+    rows = year_rows(pairs_found)
+    text = year_text(rows)
+    lifetime_table(rows).write_csv(output / "lifetimes.csv")
+    write_text(output / "findings.txt", text + "\n")
+    year_table(rows).write_csv(output / "years.csv")
+    draw_years(rows, output / "years")
+    return output / "years.csv", text
 
 
 def _values(task: str, found: Any) -> dict[tuple[str, str], tuple[float, int]]:
@@ -302,16 +306,3 @@ def map_city(
     for frame in reporter.track(frames, "mapping", len(frames)):
         voxels.add(drive.scan(frame), drive.X_WS[frame])
     return voxels.to_map().centroids_W
-
-
-def _write(pairs: Sequence[AgedPair], output: Path) -> tuple[Path, str]:
-    rows = year_rows(pairs)
-    text = year_text(rows)
-    for name, content in (
-        ("lifetimes.csv", lifetime_table(rows).to_csv()),
-        ("findings.txt", text + "\n"),
-        ("years.csv", year_table(rows).to_csv()),
-    ):
-        write_text(output / name, content)
-    draw_years(rows, output / "years")
-    return output / "years.csv", text

@@ -81,7 +81,7 @@ def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:
 
     met = f"{found.num_met} of {found.num_stops}"
     yield "", shown("these", "Boreas", "KAIST")
-    for name, value, *published in (
+    rows: list[tuple[str, float | str, str, str]] = [
         (
             "stops that meet the other drive",
             met,
@@ -108,19 +108,21 @@ def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:
         ("  50 %", found.reverse_50, "", "2.7 to 5.9"),
         ("  75 %", found.reverse_75, "", "3.3 to 6.6"),
         ("  95 %", found.reverse_95, "", "3.7 to 9.3"),
-        (f"{found.first.name}: standing", found.first.standing, ".22"),
-        *_motion(found.first, "13"),
-        (f"{found.second.name}: standing", found.second.standing, ".13"),
-        *_motion(found.second, "14"),
-    ):
-        yield name, shown(value, *published)
+        *_motion(found.first, ".22", "13"),
+        *_motion(found.second, ".13", "14"),
+    ]
+    for name, value, boreas, kaist in rows:
+        yield name, shown(value, boreas, kaist)
 
 
-def _motion(drive: Driving, fast: str) -> list[tuple[str, float, str]]:
+def _motion(
+    drive: Driving, standing: str, fast: str
+) -> list[tuple[str, float, str, str]]:
     return [
-        ("  moving, 10 % [m/s]", drive.speed_10, "2.9"),
-        ("  50 %", drive.speed_50, "9.1"),
-        ("  90 %", drive.speed_90, fast),
-        ("  roll, spread [deg]", drive.roll_spread_deg, ".9"),
-        ("  pitch, spread [deg]", drive.pitch_spread_deg, ".9"),
+        (f"{drive.name}: standing", drive.standing, standing, ""),
+        ("  moving, 10 % [m/s]", drive.speed_10, "2.9", ""),
+        ("  50 %", drive.speed_50, "9.1", ""),
+        ("  90 %", drive.speed_90, fast, ""),
+        ("  roll, spread [deg]", drive.roll_spread_deg, ".9", ""),
+        ("  pitch, spread [deg]", drive.pitch_spread_deg, ".9", ""),
     ]

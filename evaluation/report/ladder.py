@@ -55,10 +55,8 @@ class LadderRung:
     """The change between two drives.
 
     Attributes:
-        database: name of the drive along the database's route.
         cause: what changes; `none` without a change.
         level: its strength, from 1 to 4; 0 without a change.
-        strength: in words.
         radius: greatest distance of a match [m]; NaN where places do not match.
     """
 
@@ -76,7 +74,6 @@ class MeasuredRung:
     """The outcomes of all methods on a rung, with one random draw.
 
     Attributes:
-        drives: fingerprint of the drives.
         outcomes: one for each method, without and with the gate.
     """
 
@@ -92,7 +89,6 @@ class LadderRow:
 
     Attributes:
         drives: fingerprint of the drives of all draws.
-        draws: outcome of each draw.
         unchanged: those on the rung `none` of the same map.
         auc_interval: 95 % interval of AUC by bootstrap over blocks of the
             route; a sample has the same ones in each draw.
@@ -333,8 +329,6 @@ class CrossedRow:
     """A method under two causes at once, and under each alone.
 
     Attributes:
-        pair: with both.
-        alone: with each of them.
         excess: what the two cost together beyond the product of what each
             leaves, as a share of the AUC on the rung `none`.
         interval: its 95 % interval, of the same samples of queries.

@@ -25,11 +25,11 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 import numpy as np
 
-from cns_drake.base.files import completing
+from cns_drake.base.files import write_text
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
-from evaluation.recognition.metrics import MODES
+from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.survival import Survival
 from evaluation.report import result_tables, survival
@@ -65,14 +65,11 @@ class Report:
     """What a report is made of.
 
     Attributes:
-        changes: TCR of all pairs.
         survivals: place recognition of all pairs, with their controls.
         recognitions: the same results without controls, and those of drives
             compared with themselves.
         evidence: (database, query) -> evidence why best places are wrong.
         tracks: drive -> its track, also for the controls.
-        drives: name -> drive, for all drives of a pair.
-        illustrations: figures, already written.
         pages: drive -> address, relative to the page, of the page of its
             recording; drives without a page may be left out.
         repeated: results by the protocol of the published numbers, if that is
@@ -144,9 +141,9 @@ def write_report(report: Report, folder: Path) -> Path:
                 "tex": (shown.to_latex() for shown in tables[name]),
             }
             for ending, texts in forms.items():
-                _write(folder / f"{name}.{ending}", "\n".join(texts))
+                write_text(folder / f"{name}.{ending}", "\n".join(texts))
     text = _render("report.md", **_content(report, tables))
-    _write(folder / "report.md", text.rstrip() + "\n")
+    write_text(folder / "report.md", text.rstrip() + "\n")
     path = folder / "report.html"
     write_page(path, report)
     return path
@@ -203,25 +200,30 @@ def write_page(path: Path, report: Report) -> None:
         script=Markup("\n").join(map(_read_asset, _SCRIPTS)),
         data=_to_script(data),
     )
-    _write(path, text)
+    write_text(path, text)
 
 
 def _shown_tables(report: Report) -> dict[str, list[Table]]:
     """Returns name of a file -> its tables for print."""
     results = report.recognitions
+    # The last one is counted as the reference did.
+    counted: list[
+        tuple[Sequence[RecognitionResult], Mode | None, Reference]
+    ] = [(results, mode, NO_REFERENCE) for mode in MODES]
+    if report.compared:
+        counted.append((report.compared, None, report.reference))
     changes = result_tables.change_table(
         report.changes, report.reference, report.evidence
     )
     return {
         "survival": [survival.survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
-        "place_recognition": result_tables.recognition_tables(
-            results,
-            report.changes,
-            report.reference,
-            report.compared,
-            report.evidence,
-        ),
+        "place_recognition": [
+            result_tables.recognition_table(
+                some, report.changes, mode, reference, report.evidence
+            )
+            for some, mode, reference in counted
+        ],
         "differences": [result_tables.difference_table(report.differences)],
         "why": [result_tables.fault_table(results, report.evidence)],
         "poses": [result_tables.pose_table(results)],
@@ -378,8 +380,3 @@ def _environment() -> Environment:
         "route_colours": _route_colours(),
     }
     return found
-
-
-def _write(path: Path, text: str) -> None:
-    with completing(path) as part:
-        part.write_text(text, encoding="utf-8")

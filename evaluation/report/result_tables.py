@@ -160,29 +160,6 @@ class _Counted(NamedTuple):
         return None if index is None else int(counts[index])
 
 
-def recognition_tables(
-    results: Sequence[RecognitionResult],
-    changes: Sequence[ChangeResult],
-    reference: Reference = NO_REFERENCE,
-    compared: Sequence[RecognitionResult] = (),
-    evidence: Evidence = MappingProxyType({}),
-) -> list[Table]:
-    """Returns Table II in its forms.
-
-    One form for each mode; then, if there are any, that of the results to
-    compare with the reference, counted as it does.
-    """
-    tables = [
-        recognition_table(results, changes, mode, evidence=evidence)
-        for mode in MODES
-    ]
-    if compared:
-        tables.append(
-            recognition_table(compared, changes, None, reference, evidence)
-        )
-    return tables
-
-
 def recognition_table(
     results: Sequence[RecognitionResult],
     changes: Sequence[ChangeResult],
@@ -475,11 +452,7 @@ class _Faults(NamedTuple):
 def fault_table(
     results: Sequence[RecognitionResult], evidence: Evidence
 ) -> Table:
-    """Returns the reasons for wrong best places for print.
-
-    Args:
-        evidence: a pair without it has no row.
-    """
+    """Returns the reasons for wrong best places for print."""
 
     def share(one: _Faults, kind: str) -> str | None:
         part = one.kinds[kind] / max(one.kinds.total(), 1)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cns_drake.base.csv_files import csv_text
-from cns_drake.base.files import completing
+from cns_drake.base.files import write_text
 from cns_drake.base.yaml_files import read_yaml
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 
@@ -88,7 +88,6 @@ class Table:
     A missing value is empty in CSV, elsewhere a dash; truth values are 0 or 1.
 
     Attributes:
-        header: name of each column.
         rows: one value for each column: text, a number, a `Cell`, or None for
             an empty one.
         groups: names over columns, each with the number of columns that it
@@ -174,8 +173,7 @@ class Table:
         Raises:
             InputError: the file cannot be written.
         """
-        with completing(path) as part:
-            part.write_text(self.to_csv(), encoding="utf-8")
+        write_text(path, self.to_csv())
 
     def to_markdown(self) -> str:
         """Returns the table with four decimals, as the paper prints them.

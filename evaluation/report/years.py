@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 import math
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from evaluation.recognition.pose_errors import pose_success
 from evaluation.recognition.rung_outcome import RungOutcome
 from evaluation.recognition.survival import kept_share, paired_intervals
 from evaluation.report.drawing import method_style, save
-from evaluation.report.tables import Columns, Table, in_table_order, title
+from evaluation.report.tables import Table, in_table_order, title
 
 # Shares of a value that are left where a lifetime ends.
 _TENTH, _HALF = 0.9, 0.5
@@ -55,40 +55,68 @@ class AgedPair:
 
 @dataclass(frozen=True)
 class YearRow:
-    """A task of a method after some years.
+    """A task of a method after some years, as `years.csv` has it.
 
     Attributes:
         task: `place`, `pose`, `localise`, `map` or `unchanged`.
         value: AUC, the share of right poses or ends, mean IoU, or the share of
             points.
-        interval: 95 % interval of `kept` by bootstrap over blocks of
-            the route.
+        kept: share of today's value that is left; NaN for none. Its 95 %
+            interval is by bootstrap over blocks of the route.
         visible_change: part of the queries' scans that the best place does not
             show, today's taken off.
         queries: number of queries, or of points that are gone or new.
     """
 
-    pair: AgedPair
+    map: str
+    year: int
+    seed: int
     task: str
     method: str
     gate: bool
     value: float
-    today: float
-    interval: Interval
+    kept: float
+    kept_low: float
+    kept_high: float
     r1: float
+    direction: str
+    tcr_sym: float
     visible_change: float
     queries: int
 
-    @property
-    def kept(self) -> float:
-        """The share of today's value that is left; NaN for none."""
-        return float(kept_share(self.value, self.today))
-
-    @property
-    def key(self) -> tuple[str, str, str, bool, str]:
-        """What a lifetime is of."""
-        pair = self.pair
-        return pair.map_name, self.task, self.method, self.gate, pair.direction
+    @classmethod
+    def of(
+        cls,
+        pair: AgedPair,
+        task: str,
+        method: str,
+        value: float,
+        today: float,
+        queries: int,
+        *,
+        gate: bool = False,
+        interval: Interval = UNKNOWN,
+        r1: float = math.nan,
+        visible_change: float = math.nan,
+    ) -> YearRow:
+        """Returns the row of a value, today's of which is known."""
+        return cls(
+            pair.map_name,
+            pair.year,
+            pair.seed,
+            task,
+            method,
+            gate,
+            value,
+            float(kept_share(value, today)),
+            interval.low,
+            interval.high,
+            r1,
+            pair.direction,
+            pair.tcr_sym,
+            visible_change,
+            queries,
+        )
 
 
 def year_rows(pairs: Sequence[AgedPair]) -> list[YearRow]:
@@ -99,60 +127,39 @@ def year_rows(pairs: Sequence[AgedPair]) -> list[YearRow]:
         if pair.year == 0
         for one in pair.outcomes
     }
-    found = [
-        row
-        for pair in pairs
-        for one in pair.outcomes
-        for row in _rows(
-            pair, one, none[pair.map_name, one.method, one.is_gated]
-        )
-    ]
-    today = {pair.map_name: pair.further for pair in pairs if pair.year == 0}
-    return found + [
-        YearRow(
-            pair,
-            task,
-            method,
-            False,
-            value,
-            math.nan
-            if task == MAP_TASK
-            else today[pair.map_name][task, method][0],
-            UNKNOWN,
-            math.nan,
-            math.nan,
-            number,
-        )
-        for pair in pairs
-        for (task, method), (value, number) in pair.further.items()
-    ]
-
-
-def _rows(
-    pair: AgedPair, now: RungOutcome, then: RungOutcome
-) -> Iterable[YearRow]:
-    interval, _ = paired_intervals(then.outcomes, now.outcomes)
-    r1 = now.outcomes.recall_at(1)
-    hidden = _hidden(now) - _hidden(then)
-    number = len(now.outcomes)
-    auc, auc_then = (pr_curve(one.outcomes).auc for one in (now, then))
-    poses = [pose_success(o.pose_errors, o.outcomes) for o in (now, then)]
-    values = {"place": (auc, auc_then, interval)}
-    if not math.isnan(poses[1]):
-        values["pose"] = (poses[0], poses[1], UNKNOWN)
-    for task, (value, today, kept) in values.items():
-        yield YearRow(
-            pair,
-            task,
-            now.method,
-            now.is_gated,
-            value,
-            today,
-            kept,
-            r1,
-            hidden,
-            number,
-        )
+    rows = []
+    outcomes = [(pair, one) for pair in pairs for one in pair.outcomes]
+    for pair, now in outcomes:
+        then = none[pair.map_name, now.method, now.is_gated]
+        interval, _ = paired_intervals(then.outcomes, now.outcomes)
+        auc, auc_then = (pr_curve(one.outcomes).auc for one in (now, then))
+        poses = [pose_success(o.pose_errors, o.outcomes) for o in (now, then)]
+        values = {"place": (auc, auc_then, interval)}
+        if not math.isnan(poses[1]):
+            values["pose"] = (poses[0], poses[1], UNKNOWN)
+        rows += [
+            YearRow.of(
+                pair,
+                task,
+                now.method,
+                value,
+                today,
+                len(now.outcomes),
+                gate=now.is_gated,
+                interval=kept,
+                r1=now.outcomes.recall_at(1),
+                visible_change=_hidden(now) - _hidden(then),
+            )
+            for task, (value, today, kept) in values.items()
+        ]
+    before = {pair.map_name: pair.further for pair in pairs if pair.year == 0}
+    for pair in pairs:
+        for (task, method), (value, number) in pair.further.items():
+            today = math.nan
+            if task != MAP_TASK:
+                today = before[pair.map_name][task, method][0]
+            rows.append(YearRow.of(pair, task, method, value, today, number))
+    return rows
 
 
 def _hidden(outcome: RungOutcome) -> float:
@@ -160,28 +167,9 @@ def _hidden(outcome: RungOutcome) -> float:
     return 1.0 - float(known.mean()) if len(known) else math.nan
 
 
-_COLUMNS: Columns[YearRow] = {
-    "map": lambda row: row.pair.map_name,
-    "year": lambda row: row.pair.year,
-    "seed": lambda row: row.pair.seed,
-    "task": lambda row: row.task,
-    "method": lambda row: row.method,
-    "gate": lambda row: row.gate,
-    "value": lambda row: row.value,
-    "kept": lambda row: row.kept,
-    "kept_low": lambda row: row.interval.low,
-    "kept_high": lambda row: row.interval.high,
-    "r1": lambda row: row.r1,
-    "direction": lambda row: row.pair.direction,
-    "tcr_sym": lambda row: row.pair.tcr_sym,
-    "visible_change": lambda row: row.visible_change,
-    "queries": lambda row: row.queries,
-}
-
-
-def year_table(rows: Iterable[YearRow]) -> Table:
+def year_table(rows: Sequence[YearRow]) -> Table:
     """Returns the table of all rows."""
-    return Table.of(rows, _COLUMNS)
+    return Table.of_rows([asdict(row) for row in rows])
 
 
 def lifetime(
@@ -212,14 +200,12 @@ def lifetime_table(rows: Sequence[YearRow]) -> Table:
     """
     found = []
     for key, some in _grouped(rows).items():
-        last = max(row.pair.year for row in some)
+        last = max(row.year for row in some)
         values: list[object] = [*key]
         for left in (_TENTH, _HALF):
             single = [
-                lifetime(
-                    *_curve([r for r in some if r.pair.seed in (0, s)]), left
-                )
-                for s in sorted({r.pair.seed for r in some} - {0})
+                lifetime(*_curve([r for r in some if r.seed in (0, s)]), left)
+                for s in sorted({r.seed for r in some} - {0})
             ] or [math.inf]
             mean = lifetime(*_curve(some), left)
             values += [
@@ -232,49 +218,59 @@ def lifetime_table(rows: Sequence[YearRow]) -> Table:
     return Table((*header, *ends), tuple(found))
 
 
+def _key(row: YearRow) -> tuple[object, ...]:
+    """Returns what a lifetime is of."""
+    return row.map, row.task, row.method, row.gate, row.direction
+
+
 def _grouped(rows: Sequence[YearRow]) -> dict[tuple, list[YearRow]]:
     """Returns the rows of each lifetime; those of today belong to all."""
     groups: dict[tuple, list[YearRow]] = {}
     for row in rows:
-        if row.pair.year > 0 and row.task != MAP_TASK:
-            groups.setdefault(row.key, []).append(row)
+        if row.year > 0 and row.task != MAP_TASK:
+            groups.setdefault(_key(row), []).append(row)
     for key, some in groups.items():
         some += [
-            row for row in rows if row.pair.year == 0 and row.key[:4] == key[:4]
+            row for row in rows if row.year == 0 and _key(row)[:4] == key[:4]
         ]
     return groups
 
 
 def _curve(rows: Sequence[YearRow]) -> tuple[list[float], list[float]]:
     """Returns years, and the mean share that is left."""
-    years = sorted({row.pair.year for row in rows})
+    years = sorted({row.year for row in rows})
     means = [
-        float(np.mean([row.kept for row in rows if row.pair.year == year]))
+        float(np.mean([row.kept for row in rows if row.year == year]))
         for year in years
     ]
     return [float(year) for year in years], means
 
 
+def _shown(rows: Iterable[YearRow]) -> list[YearRow]:
+    """Returns what findings and chart show: places on older maps, ungated."""
+    return [
+        row
+        for row in rows
+        if row.task == "place"
+        and not row.gate
+        and row.direction == FORWARD
+        and row.year > 0
+    ]
+
+
 def year_text(rows: Sequence[YearRow]) -> str:
     """Returns the findings: what the city of each year costs the methods."""
     lines = []
-    for name in dict.fromkeys(row.pair.map_name for row in rows):
-        mine = [
-            row
-            for row in rows
-            if row.pair.map_name == name
-            and row.task == "place"
-            and not row.gate
-            and row.pair.direction == FORWARD
-        ]
-        for year in sorted({r.pair.year for r in mine} - {0}):
-            then = [row for row in mine if row.pair.year == year]
+    for name in dict.fromkeys(row.map for row in rows):
+        mine = _shown(row for row in rows if row.map == name)
+        for year in sorted({r.year for r in mine}):
+            then = [row for row in mine if row.year == year]
             words = [
                 f"{title(method)} "
                 f"{np.mean([r.kept for r in then if r.method == method]):.0%}"
                 for method in in_table_order(r.method for r in then)
             ]
-            tcr = np.mean([row.pair.tcr_sym for row in then])
+            tcr = np.mean([row.tcr_sym for row in then])
             seen = np.mean([row.visible_change for row in then])
             lines.append(
                 f"{name}, {year} years: TCR_sym {tcr:.3f}, visible change "
@@ -285,13 +281,13 @@ def year_text(rows: Sequence[YearRow]) -> str:
 
 def draw_years(rows: Sequence[YearRow], stem: Path) -> None:
     """Draws the share of today's AUC that is left over the years."""
-    maps = list(dict.fromkeys(row.pair.map_name for row in rows))
+    maps = list(dict.fromkeys(row.map for row in rows))
     columns = min(len(maps), 2)
     lines = math.ceil(len(maps) / columns)
     figure = Figure((4.2 * columns, 0.6 + 3.0 * lines), layout="constrained")
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes, name in zip(panels, maps, strict=False):
-        _draw_map(axes, [r for r in rows if r.pair.map_name == name])
+        _draw_map(axes, _shown(r for r in rows if r.map == name))
         axes.set_title(name.capitalize())
     panels[0].legend(fontsize=7, loc="lower left")
     for axes in panels[len(maps) :]:
@@ -300,19 +296,11 @@ def draw_years(rows: Sequence[YearRow], stem: Path) -> None:
     save(figure, stem)
 
 
-def _draw_map(axes: Axes, rows: Sequence[YearRow]) -> None:
-    mine = [
-        row
-        for row in rows
-        if row.task == "place"
-        and not row.gate
-        and row.pair.direction == FORWARD
-        and row.pair.year > 0
-    ]
-    years = sorted({row.pair.year for row in mine})
+def _draw_map(axes: Axes, mine: Sequence[YearRow]) -> None:
+    years = sorted({row.year for row in mine})
     for method in in_table_order(row.method for row in mine):
         shares = [
-            [r.kept for r in mine if r.method == method and r.pair.year == y]
+            [r.kept for r in mine if r.method == method and r.year == y]
             for y in years
         ]
         colour, _, marker = method_style(method)
@@ -329,8 +317,7 @@ def _draw_map(axes: Axes, rows: Sequence[YearRow]) -> None:
             linewidth=0,
         )
     seen = [
-        1.0
-        - float(np.mean([r.visible_change for r in mine if r.pair.year == y]))
+        1.0 - float(np.mean([r.visible_change for r in mine if r.year == y]))
         for y in years
     ]
     axes.plot(years, seen, "--", color="0.3", label="visible as before")

@@ -27,7 +27,6 @@ class RecordingInfo:
         path: its file or folder, which may not exist yet.
         stage: the stage of the city's life; stages sort by name.
         way: where the drive leads (see `driven_way`); None if it is unknown.
-        needs: names of the jobs that make the recording.
         made_by: opens the drive if it is not read from `path`.
     """
 

@@ -72,9 +72,6 @@ def find_evidence(
 ) -> PairEvidence:
     """Compares the scans of queries, of their matches and of wrong answers.
 
-    Args:
-        results: what one method or several found on the two.
-
     Raises:
         InputError: a scan cannot be read.
     """

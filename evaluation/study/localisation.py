@@ -45,7 +45,9 @@ class ComparedPair:
     @property
     def keys(self) -> dict[str, object]:
         """The first columns of a row."""
-        return {name: get(self) for name, get in ladder.RUNG_COLUMNS.items()}
+        return {
+            str(name): get(self) for name, get in ladder.RUNG_COLUMNS.items()
+        }
 
     @property
     def name(self) -> str:

@@ -8,7 +8,8 @@ takes a tenth of a second.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+import contextlib
 from dataclasses import asdict, dataclass, fields, is_dataclass
 import importlib
 import io
@@ -240,13 +241,8 @@ class Part:
         Raises:
             InputError: if there is no such part, or it is cut off.
         """
-        try:
-            with open(self.path, "rb") as stream:
-                return self._read_header(stream)["digest"]
-        except OSError as error:
-            raise InputError(
-                f"{self.path}: {error.strerror or error}"
-            ) from error
+        with self._opened() as (header, _):
+            return header["digest"]
 
     def read(self) -> Any:
         """Returns the value of the part.
@@ -254,34 +250,31 @@ class Part:
         Raises:
             InputError: if there is no such part, or it is damaged.
         """
+        with self._opened() as (_, stream):
+            data = stream.read()
+            return decode(zstandard.ZstdDecompressor().decompress(data))
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[tuple[dict, BinaryIO]]:
+        """Yields header and value, which must have its full length."""
         try:
             with open(self.path, "rb") as stream:
-                self._read_header(stream)
-                data = stream.read()
-            return decode(zstandard.ZstdDecompressor().decompress(data))
+                if stream.readline(len(_MAGIC)) != _MAGIC:
+                    raise ValueError("no part of a study")
+                header = json.loads(stream.readline())
+                start = stream.tell()
+                if stream.seek(0, 2) - start != header["bytes"]:
+                    raise ValueError("cut off")
+                stream.seek(start)
+                yield header, stream
         except OSError as error:
             raise InputError(
                 f"{self.path}: {error.strerror or error}"
             ) from error
-        except (zstandard.ZstdError, ValueError) as error:
-            raise self._damage(error) from error
-
-    def _read_header(self, stream: BinaryIO) -> dict:
-        """Reads up to the value, which must have its full length."""
-        try:
-            if stream.readline(len(_MAGIC)) != _MAGIC:
-                raise ValueError("no part of a study")
-            header = json.loads(stream.readline())
-            start = stream.tell()
-            if stream.seek(0, 2) - start != header["bytes"]:
-                raise ValueError("cut off")
-            stream.seek(start)
-        except (ValueError, KeyError, TypeError) as error:
-            raise self._damage(error) from error
-        return header
-
-    def _damage(self, error: Exception) -> InputError:
-        return InputError(f"{self.path}: damaged ({error}); delete it")
+        except (zstandard.ZstdError, ValueError, KeyError, TypeError) as error:
+            raise InputError(
+                f"{self.path}: damaged ({error}); delete it"
+            ) from error
 
 
 @dataclass(frozen=True)

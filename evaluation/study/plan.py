@@ -161,9 +161,9 @@ class Study:
         }
         # Two pairs may share a control.
         controls = {
-            f"control {control[0].name} > {control[1].name}": control
+            f"control {both[0].name} > {both[1].name}": both
             for pair in pairs.values()
-            if (control := city.unchanged_pair(*pair)) is not None
+            if (both := city.unchanged_pair(*pair)) is not None
         }
         drives = {one.name: one for one in city.stages.values()}
         roles: dict[str, set[Role]] = defaultdict(set)

@@ -150,9 +150,7 @@ class SizePoint:
     Times are of the processor.
 
     Attributes:
-        others: number of places of other cities.
         auc: without the gate; NaN if all queries would take over an hour.
-        r1: R@1, likewise.
         query_ms: of one query, the median of some [ms].
         build_ms: to build the database from descriptions [ms].
     """

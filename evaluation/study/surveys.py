@@ -33,7 +33,9 @@ from evaluation.study.parts import Part, SurveyFiles
 # Divisions of a voxel's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 10
 # A method, and what it describes of a drive by a second protocol.
-Further: TypeAlias = "tuple[MethodChoice, frozenset[str], RetrievalProtocol]"
+Further: TypeAlias = (
+    "tuple[MethodChoice, frozenset[description.Role], RetrievalProtocol]"
+)
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
 
@@ -265,7 +267,6 @@ def survey_recording(
 
     Args:
         roles: the roles of the drive in place recognition; may be empty.
-        methods: that describe it; may be none.
         with_scans: whether to keep the scans of places and queries, too.
         further: descriptions by another protocol; none without a role.
 

@@ -19,6 +19,7 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.change.tcr import temporal_change
 from evaluation.drives import Drive, check_same_world, open_drive
 from evaluation.drives.sampling import gather
+from evaluation.recognition.description import Role
 from evaluation.recognition.fault_kinds import mean_visible_change
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_recognition import judge_retrieval
@@ -167,8 +168,8 @@ def measure_drives(
     files = StudyFiles(output.absolute())
     make_folder(output)
     survey = files.survey(query_name)
-    roles = frozenset({"queries"})
-    step = Survey(query, roles, methods, protocol, survey, with_scans=True)
+    asked = frozenset[Role]({"queries"})
+    step = Survey(query, asked, methods, protocol, survey, with_scans=True)
     jobs = [Job(f"survey {query_name}", step)]
     parts = {name: files.part("trend", name, query_name) for name in sources}
     shared = (

@@ -14,8 +14,8 @@ from cns_drake.base.map_folder import MapFolder
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.studies import fresh_cities
-from cns_drake.studies.fresh_cities import (
+from cns_drake.studies import redrawing
+from cns_drake.studies.redrawing import (
     DrawFreshCity,
     draw_fresh_cities,
     fresh_versions,
@@ -141,7 +141,7 @@ def test_versions_that_are_none(tmp_path):
 def test_only_what_is_asked_for_is_drawn(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(
-        fresh_cities, "run_jobs", lambda jobs, cluster: drawn.extend(jobs)
+        redrawing, "run_jobs", lambda jobs, cluster: drawn.extend(jobs)
     )
     folders = draw_fresh_cities(["suburbia"], [2, 4], tmp_path, Cluster())
     assert [folder.name for folder in folders] == [

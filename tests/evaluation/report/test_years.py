@@ -69,9 +69,9 @@ def test_lifetimes_of_straight_lines():
 def test_shares_that_are_left(rows):
     """The right ones have the best scores: AUC is the share that is right."""
     found = {
-        (row.pair.year, row.pair.seed, row.task): row
+        (row.year, row.seed, row.task): row
         for row in rows
-        if row.pair.direction == FORWARD
+        if row.direction == FORWARD
     }
     assert found[0, 0, "place"].kept == 1.0
     assert found[5, 1, "pose"].kept == pytest.approx(0.9)
@@ -79,7 +79,7 @@ def test_shares_that_are_left(rows):
     assert found[5, 1, "place"].r1 == pytest.approx(0.9)
     assert found[20, 1, "place"].visible_change == pytest.approx(0.3)
     before = found[5, 2, "place"]
-    assert before.interval.low <= before.kept <= before.interval.high
+    assert before.kept_low <= before.kept <= before.kept_high
 
 
 def test_tables(rows):
