@@ -19,6 +19,7 @@ from cns_drake.base.progress import Track
 from evaluation.alignment.loop_search import Loop, implied_poses, loop_errors
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.sampling import gather
+from evaluation.methods.method import yaw_pose
 from evaluation.methods.scan_context import ScanContext
 
 # Factors on the width of the kernel, and steps at each.
@@ -254,7 +255,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
         for _ in range(3):
             turn, move = _fit(candidates, pairs)
             pairs = _agrees(candidates, turn, move)
-        guesses.append(Guess(upright(turn, move), np.flatnonzero(pairs)))
+        guesses.append(Guess(yaw_pose(turn, *move), np.flatnonzero(pairs)))
         is_left &= ~pairs & ~agreement[best]
         trials = [
             trial
@@ -262,14 +263,6 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
             if (row & is_left).sum() >= 2
         ]
     return guesses
-
-
-def upright(turn: float, move: np.ndarray) -> np.ndarray:
-    """Returns a pose (4, 4) turned about the vertical [rad] and moved [m]."""
-    X = np.eye(4)
-    X[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
-    X[:3, 3] = move
-    return X
 
 
 def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
@@ -330,7 +323,7 @@ def _move(candidates: Candidates, pairs: np.ndarray, turn: float) -> np.ndarray:
 
 
 def _turned(p: np.ndarray, turn: float) -> np.ndarray:
-    return p @ upright(turn, np.zeros(3))[:3, :3].T
+    return p @ yaw_pose(turn)[:3, :3].T
 
 
 def _heading(X: np.ndarray) -> float:
