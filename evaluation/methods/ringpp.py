@@ -21,9 +21,9 @@ from pydantic import Field, PositiveFloat, model_validator
 import scipy.fft
 import scipy.sparse
 import scipy.special
+import small_gicp
 
 from cns_drake.base.compiled import compiled
-from evaluation.geometry.neighbours import nearest_neighbours
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 # See `local_features`.
@@ -370,6 +370,21 @@ def _best_offset(product: np.ndarray, n: int) -> tuple[float, tuple[int, int]]:
 def _signed(shift: int, n: int) -> int:
     """Returns a shift by 0, ..., n - 1 as one of -n // 2, ..., n // 2 - 1."""
     return (shift + n // 2) % n - n // 2
+
+
+def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
+    """Returns for every point its k nearest, itself among them.
+
+    Args:
+        points: (N, 3) finite float64.
+        k: how many, from 1 to N.
+
+    Returns:
+        (N, k) indices in no particular order. The choice among equally far
+        points is not defined, but constant for a cloud.
+    """
+    found, _ = small_gicp.KdTree(points).batch_knn_search(points, k)
+    return found.astype(np.int64)
 
 
 def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
