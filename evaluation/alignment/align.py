@@ -29,7 +29,6 @@ from evaluation.alignment.anchor_search import (
     fit_anchor,
     fit_bent,
     straighten,
-    upright,
 )
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
@@ -40,6 +39,7 @@ from evaluation.alignment.loop_search import (
 )
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.drive_views import MovedDrive
+from evaluation.methods.method import yaw_pose
 
 When = Literal["auto", "always", "never"]
 
@@ -300,7 +300,7 @@ def _same_coordinates(source: Submaps, target: Submaps) -> np.ndarray:
     if near.any():
         # The LiDARs have about the same height above the ground.
         height = float(np.median(offsets[place, np.arange(len(near)), 2][near]))
-    return upright(0.0, np.array([0.0, 0.0, height]))
+    return yaw_pose(0.0, z=height)
 
 
 def _probe(

@@ -6,7 +6,7 @@ two pairs (RANSAC) fixes the four numbers that two upright worlds can differ
 by: a turn about the vertical and a move.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -19,10 +19,9 @@ from cns_drake.base.progress import Track
 from evaluation.alignment.loop_search import Loop, implied_poses, loop_errors
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.sampling import gather
+from evaluation.methods.method import yaw_pose
 from evaluation.methods.scan_context import ScanContext
 
-# Index of a held pose.
-FIXED = -1
 # Factors on the width of the kernel, and steps at each.
 _WIDTHS = (100.0, 30.0, 10.0, 3.0, 1.0)
 _STEPS = 8
@@ -52,25 +51,19 @@ AGREEMENT = (1.0, np.radians(2.0))
 _BEND = np.diag([np.radians(0.15) ** 2] * 3 + [0.05**2] * 3)
 # Deviation of keyframes at one place; it keeps the ties regular [m].
 _LEAST_STEP = 0.1
-_TIGHT = 1e-8 * np.eye(6)
 
 
 @dataclass(frozen=True)
 class Ties:
-    """M measured relative poses between poses of N variables V.
-
-    A measurement is Z = inverse(V_i A) V_j B; for i == FIXED the first pose is
-    A itself. A and B are identities unless they are given.
+    """M measured relative poses Z = inverse(V_i) V_j between poses V.
 
     Attributes:
-        i: (M,) first variable, or FIXED.
-        j: (M,) second variable.
+        i: (M,) index of the first pose.
+        j: (M,) index of the second pose.
         Z: (M, 4, 4).
         covariance: (M, 6, 6) of a small motion of Z from the left: turn
             [rad], then move [m].
         is_doubtful: whether they may be wrong.
-        A: (M, 4, 4).
-        B: (M, 4, 4).
     """
 
     i: np.ndarray
@@ -78,21 +71,18 @@ class Ties:
     Z: np.ndarray
     covariance: np.ndarray
     is_doubtful: bool
-    A: np.ndarray = field(default_factory=lambda: np.eye(4)[None])
-    B: np.ndarray = field(default_factory=lambda: np.eye(4)[None])
 
     def errors(self, V: np.ndarray) -> np.ndarray:
         """Returns the errors (M, 6) of the ties: turn and move."""
-        first = np.where(
-            (self.i == FIXED)[:, None, None], self.A, V[self.i] @ self.A
-        )
-        E = poses.inverse(first) @ V[self.j] @ self.B @ poses.inverse(self.Z)
+        E = poses.inverse(V[self.i]) @ V[self.j] @ poses.inverse(self.Z)
         turn = Rotation.from_matrix(E[:, :3, :3]).as_rotvec()
         return np.concatenate([turn, E[:, :3, 3]], axis=1)
 
 
-def optimise(V: np.ndarray, all_ties: list[Ties]) -> np.ndarray:
-    """Returns the variables that fit the ties best, by least squares.
+def optimise(
+    V: np.ndarray, all_ties: list[Ties], num_held: int = 0
+) -> np.ndarray:
+    """Returns poses that fit the ties best, by least squares.
 
     Gauss-Newton on SE(3) with sparse normal equations, as in Grisetti et al.,
     "A tutorial on graph-based SLAM" (2010). Ties that may be wrong are weighted
@@ -102,13 +92,15 @@ def optimise(V: np.ndarray, all_ties: list[Ties]) -> np.ndarray:
 
     Args:
         V: (N, 4, 4) start.
-        all_ties: the ties; together they must hold every variable.
+        all_ties: the ties; together they must hold every pose.
+        num_held: how many of the poses stay, the last ones.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
+    V, free = V.copy(), slice(0, len(V) - num_held)
     for width in _WIDTHS:
         for _ in range(_STEPS):
-            step = _solve(V, all_ties, information, width)
-            V = V @ poses.make_pose(
+            step = _solve(V, free, all_ties, information, width)
+            V[free] = V[free] @ poses.make_pose(
                 Rotation.from_rotvec(step[:, :3]).as_matrix(), step[:, 3:]
             )
             if np.abs(step).max() < _STILL:
@@ -118,65 +110,47 @@ def optimise(V: np.ndarray, all_ties: list[Ties]) -> np.ndarray:
 
 def _solve(
     V: np.ndarray,
+    free: slice,
     all_ties: list[Ties],
     information: list[np.ndarray],
     width: float,
 ) -> np.ndarray:
-    """Returns the steps (N, 6) of one iteration."""
-    size = 6 * len(V)
-    H = sparse.csc_matrix((size, size))
-    b = np.zeros(size)
+    """Returns the steps (F, 6) of the free poses in one iteration."""
+    H, b = 0.0, 0.0
     for ties, omega in zip(all_ties, information, strict=True):
         errors = ties.errors(V)
         if ties.is_doubtful:
             squared = np.einsum("mi,mij,mj->m", errors, omega, errors)
             weights = 1.0 / (1.0 + squared / (_KERNEL * width**2))
             omega = omega * weights[:, None, None]
-        J = _jacobian(ties, len(V))
-        omega = sparse.block_diag(list(omega), format="csr")
-        weighted = J.T @ omega
-        H = H + weighted @ J
-        b += weighted @ errors.ravel()
+        # To first order in the errors, a step of V_j, as V_j exp(step), acts
+        # through Z, and one of V_i directly, with the opposite sign.
+        opposite = np.broadcast_to(-np.eye(6), omega.shape)
+        J = _blocks(_adjoint(ties.Z), ties.j, len(V)) + _blocks(
+            opposite, ties.i, len(V)
+        )
+        J = J.tocsc()[:, : 6 * free.stop]
+        weighted = J.T @ _blocks(omega, np.arange(len(omega)), len(omega))
+        H = weighted @ J + H
+        b = weighted @ errors.ravel() + b
     return -spsolve(H.tocsc(), b).reshape(-1, 6)
 
 
-def _jacobian(ties: Ties, num_variables: int) -> sparse.csr_matrix:
-    """Returns d errors / d steps, (6 M, 6 N), for V stepped as V exp(step).
-
-    To first order in the errors: a step of V_j acts through Z inverse(B), one
-    of V_i through inverse(A), with the opposite sign.
-    """
-    number = len(ties.j)
-    free = np.flatnonzero(ties.i != FIXED)
-    A = np.broadcast_to(ties.A, (number, 4, 4))
-    blocks = np.concatenate(
-        [
-            _adjoint(ties.Z @ poses.inverse(ties.B)),
-            -_adjoint(poses.inverse(A[free])),
-        ]
-    )
-    rows = np.concatenate([np.arange(number), free])
-    columns = np.concatenate([ties.j, ties.i[free]])
-    within = np.arange(6)
-    shape = (len(blocks), 6, 6)
-    row = np.broadcast_to(6 * rows[:, None, None] + within[:, None], shape)
-    column = np.broadcast_to(6 * columns[:, None, None] + within, shape)
-    return sparse.csr_matrix(
-        (blocks.ravel(), (row.ravel(), column.ravel())),
-        shape=(6 * number, 6 * num_variables),
-    )
+def _blocks(
+    blocks: np.ndarray, columns: np.ndarray, number: int
+) -> sparse.bsr_matrix:
+    """Returns a matrix with a block (6, 6) a row, in some of its columns."""
+    starts = np.arange(len(blocks) + 1)
+    shape = 6 * len(blocks), 6 * number
+    return sparse.bsr_matrix((blocks, columns, starts), shape)
 
 
 def _adjoint(X: np.ndarray) -> np.ndarray:
     """Returns the (M, 6, 6) that moves twists (turn, move) through X."""
     R, p = X[:, :3, :3], X[:, :3, 3]
-    cross = np.zeros((len(X), 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2] = -p[:, 2], p[:, 1]
-    cross[:, 1, 0], cross[:, 1, 2] = p[:, 2], -p[:, 0]
-    cross[:, 2, 0], cross[:, 2, 1] = -p[:, 1], p[:, 0]
     result = np.zeros((len(X), 6, 6))
     result[:, :3, :3] = result[:, 3:, 3:] = R
-    result[:, 3:, :3] = cross @ R
+    result[:, 3:, :3] = np.cross(p[:, None], R, axisb=1, axisc=1)
     return result
 
 
@@ -281,7 +255,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
         for _ in range(3):
             turn, move = _fit(candidates, pairs)
             pairs = _agrees(candidates, turn, move)
-        guesses.append(Guess(upright(turn, move), np.flatnonzero(pairs)))
+        guesses.append(Guess(yaw_pose(turn, *move), np.flatnonzero(pairs)))
         is_left &= ~pairs & ~agreement[best]
         trials = [
             trial
@@ -289,14 +263,6 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
             if (row & is_left).sum() >= 2
         ]
     return guesses
-
-
-def upright(turn: float, move: np.ndarray) -> np.ndarray:
-    """Returns a pose (4, 4) turned about the vertical [rad] and moved [m]."""
-    X = np.eye(4)
-    X[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
-    X[:3, 3] = move
-    return X
 
 
 def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
@@ -357,7 +323,7 @@ def _move(candidates: Candidates, pairs: np.ndarray, turn: float) -> np.ndarray:
 
 
 def _turned(p: np.ndarray, turn: float) -> np.ndarray:
-    return p @ upright(turn, np.zeros(3))[:3, :3].T
+    return p @ yaw_pose(turn)[:3, :3].T
 
 
 def _heading(X: np.ndarray) -> float:
@@ -384,17 +350,16 @@ def fit_anchor(
     best = int(np.argmax(agreement))
     # The variable is the pose of one keyframe amid the loops: the worlds'
     # origins may be kilometres away.
-    V = optimise(
-        implied[best][None],
-        [
-            _loop_ties(
-                loops,
-                X_TL,
-                np.zeros(len(loops), dtype=np.int64),
-                poses.inverse(X_SK[k[best]]) @ X_SK[k],
-            )
-        ],
+    ties = _loop_ties(loops)
+    X_MK = poses.inverse(X_SK[k[best]]) @ X_SK[k]
+    ties = replace(
+        ties,
+        i=1 + ties.i,
+        j=np.zeros_like(ties.j),
+        Z=ties.Z @ poses.inverse(X_MK),
     )
+    V = np.concatenate([implied[best][None], X_TL])
+    V = optimise(V, [ties], num_held=len(X_TL))
     return V[0] @ poses.inverse(X_SK[k[best]])
 
 
@@ -409,32 +374,21 @@ def fit_bent(
         source: the drive.
         X_TS: (4, 4) anchor to start from.
     """
-    k = np.array([loop.source for loop in loops])
-    ties = _loop_ties(loops, X_TL, k, np.eye(4)[None])
-    return optimise(X_TS @ source.X_WK, [ties, _drive_ties(source)])
+    ties = _loop_ties(loops)
+    ties = replace(ties, i=len(source) + ties.i)
+    V = np.concatenate([X_TS @ source.X_WK, X_TL])
+    V = optimise(V, [ties, _drive_ties(source)], num_held=len(X_TL))
+    return V[: len(source)]
 
 
 def straighten(loops: list[Loop], drive: Submaps) -> np.ndarray:
     """Returns poses X_WK (K, 4, 4) of a drive under loops to itself.
 
-    Its first keyframe stays.
+    Its last keyframe stays, and then all are moved so that the first does.
     """
-    ties = Ties(
-        i=np.array([loop.target for loop in loops]),
-        j=np.array([loop.source for loop in loops]),
-        Z=np.array([loop.X_LK for loop in loops]),
-        covariance=np.array([loop.covariance for loop in loops]),
-        is_doubtful=True,
-    )
-    hold = Ties(
-        i=np.array([FIXED]),
-        j=np.array([0]),
-        Z=np.eye(4)[None],
-        covariance=_TIGHT[None],
-        is_doubtful=False,
-        A=drive.X_WK[:1],
-    )
-    return optimise(drive.X_WK, [ties, hold, _drive_ties(drive)])
+    X_WK = drive.X_WK
+    V = optimise(X_WK, [_loop_ties(loops), _drive_ties(drive)], num_held=1)
+    return X_WK[0] @ poses.inverse(V[0]) @ V
 
 
 def agreeing(
@@ -445,17 +399,13 @@ def agreeing(
     return (distances < AGREEMENT[0]) & (angles < AGREEMENT[1])
 
 
-def _loop_ties(
-    loops: list[Loop], X_TL: np.ndarray, j: np.ndarray, B: np.ndarray
-) -> Ties:
+def _loop_ties(loops: list[Loop]) -> Ties:
     return Ties(
-        i=np.full(len(loops), FIXED),
-        j=j,
+        i=np.array([loop.target for loop in loops]),
+        j=np.array([loop.source for loop in loops]),
         Z=np.array([loop.X_LK for loop in loops]),
         covariance=np.array([loop.covariance for loop in loops]),
         is_doubtful=True,
-        A=X_TL[[loop.target for loop in loops]],
-        B=B,
     )
 
 

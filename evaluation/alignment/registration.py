@@ -85,15 +85,19 @@ class Registration:
     covariance: np.ndarray
 
 
-def make_surface(points: np.ndarray) -> Surface:
-    """Returns a cloud with normals, fitted to the nearest neighbours.
+def make_surface(
+    points: np.ndarray, num_neighbours: int = NUM_NEIGHBOURS
+) -> Surface:
+    """Returns a cloud with normals and covariances, of nearest neighbours.
 
     Args:
-        points: (N, 3) [m], N >= NUM_NEIGHBOURS.
+        points: (N, 3) [m], N >= num_neighbours.
+        num_neighbours: that they are fitted to, the point among them.
     """
     cloud = small_gicp.PointCloud(points)
     tree = small_gicp.KdTree(cloud)
-    small_gicp.estimate_normals(cloud, tree, NUM_NEIGHBOURS)
+    small_gicp.estimate_normals_covariances(cloud, tree, num_neighbours)
+    # A view of the cloud's normals, whose rows have four numbers.
     return Surface(points, cloud.normals()[:, :3], cloud, tree)
 
 

@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import points as clouds
 from cns_drake.base import poses
-from cns_drake.base.compiled import compiled
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 
@@ -165,33 +164,6 @@ def gather(
     return np.concatenate([seen(index) for index in range(first, end)])
 
 
-@compiled
-def _crop(
-    p_S: np.ndarray, X_FS: np.ndarray, max_range: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns points (N, 3) that are within range, in F, and which they are.
-
-    X_FS has no rows where F is S: products with an identity would be rounded.
-    """
-    p_F = np.empty_like(p_S)
-    kept = np.zeros(len(p_S), dtype=np.bool_)
-    count = 0
-    for i in range(len(p_S)):
-        x, y, z = p_S[i]
-        if len(X_FS):
-            x, y, z = (
-                X_FS[0, 0] * x + X_FS[0, 1] * y + X_FS[0, 2] * z + X_FS[0, 3],
-                X_FS[1, 0] * x + X_FS[1, 1] * y + X_FS[1, 2] * z + X_FS[1, 3],
-                X_FS[2, 0] * x + X_FS[2, 1] * y + X_FS[2, 2] * z + X_FS[2, 3],
-            )
-        # A comparison with NaN is false, so NaN is out of range.
-        if abs(x) <= max_range and abs(y) <= max_range and abs(z) <= max_range:
-            p_F[count, 0], p_F[count, 1], p_F[count, 2] = x, y, z
-            kept[i] = True
-            count += 1
-    return p_F[:count], kept
-
-
 def cropped(
     scan: np.ndarray,
     max_range: float,
@@ -225,8 +197,14 @@ def cropped(
                 f"{source}: its points have no field {name!r} (they have"
                 f" {', '.join(known)})"
             )
-    X = np.empty((0, 4)) if X_FS is None else np.ascontiguousarray(X_FS)
-    p_F, kept = _crop(clouds.xyz(scan), X, max_range)
+    p_F = clouds.xyz(scan)
+    if X_FS is not None:
+        x, y, z = p_F.T
+        with np.errstate(invalid="ignore"):
+            rows = [r[0] * x + r[1] * y + r[2] * z + r[3] for r in X_FS[:3]]
+        p_F = np.stack(rows, axis=1)
+    kept = within_range(p_F, max_range)
+    p_F = p_F.compress(kept, axis=0)
     if not fields:
         return p_F
     cloud = np.empty(

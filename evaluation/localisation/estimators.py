@@ -26,7 +26,7 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from evaluation.alignment.registration import Surface
+from evaluation.alignment.registration import Surface, make_surface
 from evaluation.clouds.cloud_files import read_blocks
 from evaluation.drives.sampling import sample_frames, within_range
 from evaluation.maps.voxel_maps import VoxelAccumulator, thin
@@ -188,11 +188,7 @@ def map_of(
     points: np.ndarray, name: str, settings: Settings
 ) -> LocalisationMap:
     """Returns the map of points (M, 3) in W, M >= FEWEST_POINTS [m]."""
-    cloud = small_gicp.PointCloud(points)
-    tree = small_gicp.KdTree(cloud)
-    small_gicp.estimate_normals_covariances(cloud, tree, settings.neighbours)
-    # A view of the cloud's normals, whose rows have four numbers.
-    surface = Surface(points, cloud.normals()[:, :3], cloud, tree)
+    surface = make_surface(points, settings.neighbours)
     return LocalisationMap(name, surface)
 
 

@@ -16,7 +16,7 @@ within 0.2 m of B's map, its Chamfer distance the mean of both mean distances.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 import itertools
 import math
 from typing import NamedTuple
@@ -53,11 +53,7 @@ def score(
 ) -> dict:
     """Returns all scores, ready for JSON; None where one is undefined.
 
-    Args:
-        pair: both maps.
-        truth: their true labels.
-        predicted: the labels to score.
-        names: class -> its name.
+    Names are those of classes by their numbers.
 
     Raises:
         InputError: the truth leaves out every point.
@@ -65,43 +61,48 @@ def score(
     counted = [labels != Label.IGNORED for labels in truth]
     if not any(rows.any() for rows in counted):
         raise InputError(f"{pair.A.folder.parent}: no point has a true label")
-    still = [
-        rows & ~session.moves
-        for rows, session in zip(counted, pair, strict=True)
-    ]
-    result: dict = _of_points(truth, predicted, counted)
+    both = _Labelled(pair, truth, predicted, counted)
+    still = both.only([~session.moves for session in pair])
+    result: dict = _of_points(both)
     result["points"] = int(sum(rows.sum() for rows in counted))
-    result["without_vehicles_and_people"] = _of_points(truth, predicted, still)
+    result["without_vehicles_and_people"] = _of_points(still)
     for name, distance in _TOLERANCES.items():
-        result[name] = _within(pair, truth, predicted, counted, distance)
-    result["by_structure"] = _by_structure(pair, truth, predicted, counted)
-    result.update(_called(pair, truth, predicted, still))
-    result["updated_map"] = _updated_map(pair, truth, predicted, counted)
+        result[name] = _within(both, distance)
+    result["by_structure"] = _by_structure(both)
+    result.update(_called(still))
+    result["updated_map"] = _updated_map(both)
+    classes = np.unique(np.concatenate([one.classes for one in pair]))
     result["by_class"] = {
-        name: _of_points(
-            truth,
-            predicted,
-            [
-                rows & (session.classes == number)
-                for rows, session in zip(counted, pair, strict=True)
-            ],
+        names.get(number, str(number)): _of_points(
+            both.only([session.classes == number for session in pair])
         )
-        for number, name in _classes(pair, names)
+        for number in classes.tolist()
     }
-    result["by_distance"] = _by_distance(pair, truth, predicted, counted)
+    result["by_distance"] = _by_distance(both)
     return _as_json(result)
 
 
-def _of_points(
-    truth: Labels, predicted: Labels, counted: list[np.ndarray]
-) -> dict[str, float]:
+class _Labelled(NamedTuple):
+    """Both maps with their labels, and (N,) and (M,) bool, what counts."""
+
+    pair: Pair
+    truth: Labels
+    predicted: Labels
+    counted: list[np.ndarray]
+
+    def only(self, kept: list[np.ndarray]) -> _Labelled:
+        rows = zip(self.counted, kept, strict=True)
+        return self._replace(counted=[one & other for one, other in rows])
+
+
+def _of_points(both: _Labelled) -> dict[str, float]:
     """Returns IoUs, NaN of a class that is nowhere; precisions and recalls."""
     code = np.zeros(256, np.int64)
     for k, labels in enumerate(_CLASSES.values()):
         code[list(labels)] = k
     size = len(_CLASSES)
     cells = np.zeros(size * size, np.int64)
-    for true, found, rows in zip(truth, predicted, counted, strict=True):
+    for true, found, rows in zip(*both[1:], strict=True):
         cells += np.bincount(
             size * code[true[rows]] + code[found[rows]], minlength=size * size
         )
@@ -123,14 +124,9 @@ def _of_points(
     return result
 
 
-def _within(
-    pair: Pair,
-    truth: Labels,
-    predicted: Labels,
-    counted: list[np.ndarray],
-    distance: float,
-) -> dict[str, float]:
+def _within(both: _Labelled, distance: float) -> dict[str, float]:
     """Returns precision and recall of changed points up to a distance [m]."""
+    pair, truth, predicted, counted = both
     found = {}
     for k, (name, (_, label)) in enumerate(_CHANGES.items()):
         points = pair[k].points
@@ -170,12 +166,8 @@ def nearest(
     )[0]
 
 
-def _by_structure(
-    pair: Pair,
-    truth: Labels,
-    predicted: Labels,
-    counted: list[np.ndarray],
-) -> dict[str, float]:
+def _by_structure(both: _Labelled) -> dict[str, float]:
+    pair, truth, predicted, counted = both
     found = {}
     for k, (name, (side, label)) in enumerate(_CHANGES.items()):
         true, guessed = (
@@ -190,17 +182,13 @@ def _by_structure(
     return found
 
 
-def _called(
-    pair: Pair, truth: Labels, predicted: Labels, counted: list[np.ndarray]
-) -> dict[str, float]:
+def _called(both: _Labelled) -> dict[str, float]:
     """Returns what is called gone or new: shares of points and structures.
 
     And how many structures have the true verdict, of the observed ones.
     """
     points, structures, right = [], [], []
-    for session, true, found, rows in zip(
-        pair, truth, predicted, counted, strict=True
-    ):
+    for session, true, found, rows in zip(*both, strict=True):
         unobserved, _, changed = SIDES[session.side]
         points.append(found[rows] == changed)
         is_true, is_found = (
@@ -219,12 +207,8 @@ def _called(
     }
 
 
-def _updated_map(
-    pair: Pair,
-    truth: Labels,
-    predicted: Labels,
-    counted: list[np.ndarray],
-) -> dict[str, float]:
+def _updated_map(both: _Labelled) -> dict[str, float]:
+    pair, truth, predicted, counted = both
     stays = counted[0] & (predicted.A != Label.GONE)
     comes = counted[1] & (predicted.B != Label.KEPT)
     observed = stays & (truth.A != Label.UNOBSERVED)
@@ -246,10 +230,9 @@ def _updated_map(
     }
 
 
-def _by_distance(
-    pair: Pair, truth: Labels, predicted: Labels, counted: list[np.ndarray]
-) -> dict:
+def _by_distance(both: _Labelled) -> dict:
     """Returns scores by the distance from the other drive."""
+    pair = both.pair
     if not (len(pair.A.X_WS) and len(pair.B.X_WS)):
         return {}
     away = [
@@ -258,32 +241,21 @@ def _by_distance(
     ]
     found = {}
     for low, high in itertools.pairwise(_DISTANCES):
-        rows = [
-            one & (far >= low) & (far < high)
-            for one, far in zip(counted, away, strict=True)
-        ]
-        if any(one.any() for one in rows):
+        ring = both.only([(far >= low) & (far < high) for far in away])
+        if any(rows.any() for rows in ring.counted):
             end = "" if math.isinf(high) else f"{high:g}"
-            found[f"{low:g}-{end}"] = _of_points(truth, predicted, rows)
+            found[f"{low:g}-{end}"] = _of_points(ring)
     return found
-
-
-def _classes(pair: Pair, names: Mapping[int, str]) -> Iterator[tuple[int, str]]:
-    found = np.unique(np.concatenate([one.classes for one in pair]))
-    for number in found.tolist():
-        yield number, names.get(number, str(number))
 
 
 def _ratio(numerator: float, denominator: float) -> float:
     return float(numerator / denominator) if denominator else math.nan
 
 
-def _as_json(value: object) -> dict:
-    def convert(one: object) -> object:
-        if isinstance(one, dict):
-            return {key: convert(part) for key, part in one.items()}
-        return json_number(one) if isinstance(one, float) else one
-
-    converted = convert(value)
-    assert isinstance(converted, dict)
-    return converted
+def _as_json(scores: dict) -> dict:
+    found = {}
+    for name, value in scores.items():
+        if isinstance(value, dict):
+            value = _as_json(value)
+        found[name] = json_number(value) if isinstance(value, float) else value
+    return found

@@ -196,11 +196,13 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         return [self.relative_pose(query, database, one) for one in places]
 
 
-def yaw_pose(yaw: float, x: float = 0.0, y: float = 0.0) -> np.ndarray:
+def yaw_pose(
+    yaw: float, x: float = 0.0, y: float = 0.0, z: float = 0.0
+) -> np.ndarray:
     """Returns a pose (4, 4) turned about the vertical [rad] and moved [m]."""
     c, s = math.cos(yaw), math.sin(yaw)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return make_pose(R, np.array([x, y, 0.0]))
+    return make_pose(R, np.array([x, y, z]))
 
 
 _METHODS: dict[str, type[Method]] = {}

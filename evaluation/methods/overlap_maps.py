@@ -125,7 +125,6 @@ def _ground_below(
     return ground[ring, sector]
 
 
-@compiled
 def _extremes(
     values: np.ndarray, cells: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -134,9 +133,8 @@ def _extremes(
     They are infinite, and minus infinite, for a cell without values.
     """
     least, greatest = np.full(size, np.inf), np.full(size, -np.inf)
-    for i in range(len(values)):
-        least[cells[i]] = min(least[cells[i]], values[i])
-        greatest[cells[i]] = max(greatest[cells[i]], values[i])
+    np.minimum.at(least, cells, values)
+    np.maximum.at(greatest, cells, values)
     return least, greatest
 
 

@@ -13,9 +13,9 @@ _SCRIPT = """
 import numba
 import numpy as np
 before = numba.config.CACHE_DIR
-from evaluation.geometry.neighbours import nearest_neighbours
+from evaluation.methods.btc_planes import group_alike
 assert numba.config.CACHE_DIR == before
-print(len(nearest_neighbours(np.zeros((1, 3)), 1)))
+print(len(group_alike(np.zeros((1, 3)), np.zeros((1, 3)), 0.1, 0.3)))
 """
 
 

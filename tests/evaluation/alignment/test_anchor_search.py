@@ -2,7 +2,8 @@ from helpers.towns import rigid
 import numpy as np
 import pytest
 
-from evaluation.alignment.anchor_search import Candidates, find_guesses, upright
+from evaluation.alignment.anchor_search import Candidates, find_guesses
+from evaluation.methods.method import yaw_pose
 
 
 def make_candidates(X_TS, right, wrong, seed=1, drift=0.0):
@@ -85,5 +86,5 @@ def test_too_few_to_agree(number):
 
 
 def test_upright():
-    X = upright(np.pi / 2, np.array([1.0, 2.0, 3.0]))
+    X = yaw_pose(np.pi / 2, 1.0, 2.0, 3.0)
     np.testing.assert_allclose(X, rigid([1.0, 2.0, 3.0], 90.0), atol=1e-15)

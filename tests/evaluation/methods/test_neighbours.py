@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.geometry.neighbours import _select, nearest_neighbours
+from evaluation.methods.ringpp import nearest_neighbours
 
 
 def rings(seed):
@@ -78,35 +78,6 @@ def test_points_in_one_place():
     assert (np.diff(np.sort(neighbours, axis=1), axis=1) > 0).all()
 
 
-def test_too_few_points():
-    with pytest.raises(
-        ValueError, match=r"30 neighbours are wanted, .* 29 points"
-    ):
-        nearest_neighbours(np.zeros((29, 3)), 30)
-
-
 def test_same_cloud_same_neighbours():
     one, two = (nearest_neighbours(lattice(5), 30) for _ in range(2))
     np.testing.assert_array_equal(one, two)
-
-
-@pytest.mark.parametrize("num_values", [1, 2, 5, 1000])
-def test_select(num_values):
-    rng = np.random.default_rng([num_values, 9])
-    for _ in range(200):
-        length = int(rng.integers(1, 60))
-        original = rng.integers(0, num_values, length).astype(np.float64)
-        start, stop = np.sort(rng.integers(0, length + 1, 2))
-        if start == stop:
-            continue
-        k = int(rng.integers(1, stop - start + 1))
-        keys, items = original.copy(), np.arange(length, dtype=np.int32)
-        _select(keys, items, start, stop, k)
-        np.testing.assert_array_equal(keys, original[items])
-        np.testing.assert_array_equal(np.sort(items), np.arange(length))
-        inside = np.sort(original[start:stop])
-        np.testing.assert_array_equal(
-            np.sort(keys[start : start + k]), inside[:k]
-        )
-        np.testing.assert_array_equal(keys[:start], original[:start])
-        np.testing.assert_array_equal(keys[stop:], original[stop:])
