@@ -99,6 +99,7 @@ def _link_all(source: Path, target: Path, but) -> None:
 def _serve(listener: socket.socket) -> None:
     """Forks for each client until stdin ends, without waiting for the forks."""
     look_seldom()
+    os.fsync = os.fstat  # As in the process of the tests.
     for package in map(importlib.import_module, ("cns_drake", "evaluation")):
         prefix = f"{package.__name__}."
         for found in pkgutil.walk_packages(package.__path__, prefix):

@@ -43,7 +43,7 @@ def test_simulated_and_recorded_families_agree(tmp_path):
                 "lateral_acceleration": 6.0,
             },
             "lidars": {"lidar": {"columns": 64, "range_noise": 0.02}},
-            "frames": 60,
+            "frames": 40,
         }
         (town / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
         if stage == "01":
