@@ -164,9 +164,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
-    monkeypatch.setattr(
-        reproduction, "run_jobs", lambda jobs, cluster: studies.do(jobs)
-    )
+    studies.run_here(monkeypatch, reproduction)
     cluster = Cluster()
     own = tmp_path / "counting.py"
     own.write_text(COUNTING)
