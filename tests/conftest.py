@@ -5,13 +5,14 @@ distributes the tests needs none of them.
 """
 
 import gc
+import os
 import signal
 import sys
 from types import ModuleType
 
 import pytest
 
-from cns_drake.base.process import look_seldom
+from cns_drake.base.process import look_seldom, num_cores
 
 # What is imported is there to stay: nobody looks for garbage in it.
 gc.disable()
@@ -24,6 +25,25 @@ sys.modules["open3d.ml"] = ModuleType("open3d.ml")
 # A process started in the background ignores Ctrl-C, and so do its children.
 # Tests of interrupts need the signal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Nothing here cuts the power. What a process has written is there for others
+# without a wait for the disk, which takes longer than many tests.
+os.fsync = os.fstat
+
+# Files that take more than half a minute of processor time.
+_LONGEST = (
+    "test_recipes.py",
+    "test_city_generation.py",
+    "test_types.py",
+    "test_processors.py",
+)
+
+
+def pytest_xdist_auto_num_workers(config):
+    """One more than cores: tests wait for disks, servers and browsers."""
+    if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ:
+        return None  # It says how many.
+    return num_cores() + 1
 
 
 def pytest_addoption(parser):
@@ -39,9 +59,14 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(items):
-    """Puts files with slow tests first, so that none is left at the end."""
+    """Puts the longest files first, then those with slow tests.
+
+    None of them is then left for one process at the end.
+    """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    items.sort(
+        key=lambda item: (item.path.name not in _LONGEST, item.path not in slow)
+    )
 
 
 def pytest_collection_finish():

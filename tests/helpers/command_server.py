@@ -27,7 +27,9 @@ from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import look_seldom
+from cns_drake.simulation.simulation import simulate
 from evaluation.study import chosen_methods
+from helpers.tiny_drive import tiny_scenario
 
 # Environment variable with the methods that a study compares.
 METHODS_VARIABLE = "CNS_DRAKE_TEST_METHODS"
@@ -99,12 +101,16 @@ def _link_all(source: Path, target: Path, but) -> None:
 def _serve(listener: socket.socket) -> None:
     """Forks for each client until stdin ends, without waiting for the forks."""
     look_seldom()
+    os.fsync = os.fstat  # As in the process of the tests.
     for package in map(importlib.import_module, ("cns_drake", "evaluation")):
         prefix = f"{package.__name__}."
         for found in pkgutil.walk_packages(package.__path__, prefix):
             if "map_closures" not in found.name:  # It needs an extra.
                 importlib.import_module(found.name)
     start_compiler()
+    # Forks need not load the compiled loops of each recording.
+    with tempfile.TemporaryDirectory() as folder:
+        simulate(tiny_scenario(Path(folder), frames=2), folder)
     code_digest("cns_drake.*", "evaluation.*")
     # Jobs are forks, too: else each command would import all modules again.
     processes._context = multiprocessing.get_context("fork")

@@ -65,7 +65,7 @@ def shorten_drives(folder: Path) -> None:
             "route": first["route"][:2],
             "speeds": {"cruise": 14.0, "longitudinal_acceleration": 8.0},
             "lidars": {"lidar": {"columns": 128}},
-            "frames": 60,
+            "frames": 40,
         }
         path = folder / f"town/sequence_{stage}.yaml"
         path.write_text(yaml.safe_dump(short))
@@ -101,7 +101,7 @@ RECIPES = {
         ".venv/bin/cns-drake list town\n",
         changes=(("town_output", "output"),),
         after=("repair stages",),
-        prints=("town_01", "town_02", "output/town_01: 60 frames"),
+        prints=("town_01", "town_02", "output/town_01: 40 frames"),
         makes=(
             "output/town_0[12]/metadata.yaml",
             "output/town_01_stage_02/metadata.yaml",
@@ -182,10 +182,13 @@ RECIPES = {
     ),
     "diagram script": Recipe(
         ".venv/bin/python diagrams/metropolis_01.py",
-        changes=(("--frames 200", "--frames 2"),),
+        changes=(
+            ("--frames 200", "--frames 2"),
+            ("metropolis_01", "suburbia_01"),
+        ),
         makes=(
-            "recordings/metropolis_01/metadata.yaml",
-            "recordings/metropolis_01/metropolis_01_0.mcap",
+            "recordings/suburbia_01/metadata.yaml",
+            "recordings/suburbia_01/suburbia_01_0.mcap",
             "drive.html",
         ),
     ),
@@ -491,7 +494,7 @@ RECIPES = {
         ".venv/bin/cns-drake generate riverside_02 --vary",
         changes=(
             ("generate riverside_02", "generate town/sequence_02.yaml"),
-            ("--vary", "--frames 60 --vary"),
+            ("--vary", "--frames 40 --vary"),
             ("riverside_01", "town_01"),
             ("riverside_02", "town_02"),
         ),
@@ -574,10 +577,10 @@ RECIPES = {
     "scattered losses": Recipe(
         ".venv/bin/cns-drake generate --vary worlds/downtown/hard_database",
         changes=(
-            ("worlds/downtown/hard_database.yaml", "family.yaml --frames 60"),
+            ("worlds/downtown/hard_database.yaml", "family.yaml --frames 40"),
             (
                 "--vary worlds/downtown/hard_query.yaml",
-                "town/sequence_02.yaml --frames 60",
+                "town/sequence_02.yaml --frames 40",
             ),
             ("downtown_01_m000_s1", "town_01_m000_s0"),
             ("downtown_04_m000_s2", "town_02"),
@@ -590,7 +593,7 @@ RECIPES = {
         changes=(
             (
                 "worlds/metropolis/cleared_01.yaml metropolis_04",
-                "town/sequence_01.yaml town/sequence_02.yaml --frames 60",
+                "town/sequence_01.yaml town/sequence_02.yaml --frames 40",
             ),
             ("cleared_01", "town_01"),
             ("metropolis_04", "town_02"),

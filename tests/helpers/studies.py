@@ -33,6 +33,12 @@ def do(jobs):
     return done
 
 
+def run_here(patch, *modules):
+    """Has modules run their jobs in this process."""
+    for module in modules:
+        patch.setattr(module, "run_jobs", lambda jobs, cluster: do(jobs))
+
+
 def report(recordings, output, methods=None, protocol=FAIR_PROTOCOL):
     """Returns the path of the report on a folder of recordings."""
     found = find_recordings(recordings)

@@ -35,9 +35,9 @@ def make_place(folder, seed, *, rough=0.005, bias=0.0, texture=3.0):
     """
     rng = np.random.default_rng(seed)
     elevation = np.deg2rad(np.linspace(5.0, -25.0, 32))[:, None]
-    azimuth = np.linspace(1e-3, 6.283, 900)
+    azimuth = np.linspace(1e-3, 6.283, 600)
     ground = np.where(elevation < 0.0, 1.7 / -np.sin(elevation), np.inf)
-    ranges = np.broadcast_to(ground, (32, 900))
+    ranges = np.broadcast_to(ground, (32, 600))
     for side in (1.0, -1.0):
         across = rng.uniform(6.0, 9.0) / (side * np.sin(azimuth))
         wall = np.where(across > 0.0, across / np.cos(elevation), np.inf)

@@ -6,12 +6,14 @@ import sys
 import numpy as np
 import pytest
 from shapely import Point
+from typer.testing import CliRunner
 import yaml
 
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.starter import start_city
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
+from cns_drake.command_line.cli import app
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -37,14 +39,8 @@ roads:
 INPUTS = ["city.yaml", "sequence_01.yaml", "sequence_02.yaml", "stages.yaml"]
 
 
-def run(*words, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", *map(str, words)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def run(*words):
+    return CliRunner().invoke(app, [*map(str, words)])
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +49,8 @@ def town(tmp_path_factory):
     folder = tmp_path_factory.mktemp("own") / "town"
     folder.mkdir()
     (folder / "roads.yaml").write_text(ROADS)
-    done = run("cns_drake", "city", "town", "--start", cwd=folder.parent)
-    assert done.returncode == 0, done.stderr
+    done = run("city", folder, "--start")
+    assert done.exit_code == 0, done.stderr
     assert done.stdout == ""
     return folder
 
@@ -105,19 +101,18 @@ def test_other_seeds_draw_other_towns(tmp_path, town):
 
 
 def test_it_is_listed_and_driven(town, tmp_path):
-    listed = run("cns_drake", "list", "town", cwd=town.parent)
-    assert listed.returncode == 0
+    listed = run("list", town)
+    assert listed.exit_code == 0
     assert [line.split()[0] for line in listed.stdout.splitlines()[1:]] == [
         "town_01",
         "town_02",
     ]
     assert listed.stderr == ""
     done = run(
-        *("cns_drake", "simulate", town / "sequence_02.yaml"),
+        *("simulate", town / "sequence_02.yaml"),
         *("--frames", 2, "--output", tmp_path),
-        cwd=tmp_path,
     )
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     drive = open_drive(tmp_path / "town_02")
     # The vehicle's LiDAR is vertically above the first point of its path.
     start = plan_drive(load_scenario(town / "sequence_02.yaml")).pose(0.0)
@@ -133,7 +128,13 @@ def test_roads_that_cannot_be_used_are_named(tmp_path):
     roads = yaml.safe_load(ROADS)
     roads["roads"]["east"]["end"] = "nowhere"
     (tmp_path / "roads.yaml").write_text(yaml.safe_dump(roads))
-    done = run("cns_drake.city", ".", "--start", cwd=tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "cns_drake.city", ".", "--start"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "roads.yaml: roads.east.end: no junction 'nowhere'" in done.stderr

@@ -2,6 +2,7 @@
 
 import csv
 
+from helpers import studies
 from helpers.small_city import write_small_city
 import pytest
 from typer.testing import CliRunner
@@ -9,7 +10,9 @@ import yaml
 
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
+from cns_drake.studies import recording
 from evaluation.command_line.cli import app as evaluation_app
+from evaluation.study import trend_databases
 
 pytestmark = [
     pytest.mark.slow,
@@ -25,7 +28,8 @@ def run(program, *arguments):
     assert result.exit_code == 0, (result.output, result.exception)
 
 
-def test_simulated_and_recorded_families_agree(tmp_path):
+def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
+    studies.run_here(monkeypatch, recording, trend_databases)
     town = write_small_city(tmp_path / "town")
     generate_city(town)
     for stage, heading in (("01", 0.4), ("02", 0.0)):
@@ -43,7 +47,7 @@ def test_simulated_and_recorded_families_agree(tmp_path):
                 "lateral_acceleration": 6.0,
             },
             "lidars": {"lidar": {"columns": 64, "range_noise": 0.02}},
-            "frames": 60,
+            "frames": 40,
         }
         (town / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
         if stage == "01":

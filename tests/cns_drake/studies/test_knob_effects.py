@@ -62,8 +62,8 @@ def in_this_process(monkeypatch):
 
 def test_each_knob_is_taken_back(town):
     effects = knob_effects(
-        drive(town, "01", aside=0.6, frames=60),
-        drive(town, "02", frames=60),
+        drive(town, "01", aside=0.6, frames=40),
+        drive(town, "02", frames=40),
         Cluster(),
     )
     change = {title: points[0].tcr_sym for title, points in effects.items()}

@@ -433,7 +433,8 @@ def test_the_page_has_every_cause():
 EXTENT = Extent(causes=("construction", "hidden", "size"), levels=(4,))
 
 
-def test_rungs_are_localised(town, tmp_path):
+def test_rungs_are_localised(town, tmp_path, monkeypatch):
+    studies.run_here(monkeypatch, localisation)
     pairs = rung_pairs([str(town)], EXTENT)
     path = localise_pairs(pairs, tmp_path, Cluster(1), spacing=20.0)
     with open(path, newline="") as stream:
@@ -451,6 +452,7 @@ def test_maps_of_rungs_are_scored(town, tmp_path, monkeypatch):
     notes = []
     monkeypatch.setattr(map_pairs, "STUDY_SPACING", 20.0)
     monkeypatch.setattr(map_pairs, "find_spec", lambda name: None)
+    studies.run_here(monkeypatch, localisation)
     path = update_pairs(pairs, tmp_path, Cluster(1), notes.append)
     assert notes == ["m3c2 is left out: it needs the extra map-update"]
     with open(path, newline="") as stream:

@@ -244,7 +244,7 @@ def test_two_worlds_and_changed_worlds_are_refused(
 ):
     other = open_survey("riverside_01")
     with pytest.raises(InputError, match="riverside"):
-        write_truth(open_survey("metropolis_04"), other, tmp_path / "out")
+        write_truth(open_survey(short_recording), other, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     table = small_map / "structures.csv"
     text = table.read_text()

@@ -2,6 +2,7 @@
 
 import csv
 
+from helpers import studies
 from helpers.small_map import write_small_map, write_town
 import numpy as np
 import pytest
@@ -155,14 +156,15 @@ class Counting(Method):
 """
 
 
-@pytest.mark.usefixtures("few_methods")
+@pytest.mark.usefixtures("few_methods", "unrendered_figures")
 def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     """The tables include controls, and come from simulation alone."""
     # Other tests do not find the method registered.
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
-    cluster = Cluster(2)
+    studies.run_here(monkeypatch, reproduction)
+    cluster = Cluster()
     own = tmp_path / "counting.py"
     own.write_text(COUNTING)
     quick = reproduction.reproduce_maps(

@@ -127,10 +127,10 @@ def test_alone_it_drives_as_it_may():
 
 
 @cache
-def followed(follows=True):
+def followed(follows=True, vehicles=40, walkers=10):
     scenario = load_scenario("riverside_01").model_copy(
         update={
-            "traffic": TrafficConfig(vehicles=40, walkers=10),
+            "traffic": TrafficConfig(vehicles=vehicles, walkers=walkers),
             "driver": DriverConfig(follows=follows),
         }
     )
@@ -162,7 +162,7 @@ def test_a_drive_among_others():
 
 
 def test_without_it_the_drive_stays_as_it_is():
-    *_, plan = followed(False)
+    *_, plan = followed(False, vehicles=1, walkers=0)
     assert plan.positions is None
 
 

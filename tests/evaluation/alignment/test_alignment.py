@@ -41,10 +41,11 @@ ELSEWHERE = rigid([40.0, -25.0, 13.0], 115.0)
 class Drives:
     """Two drives through a street; the second one lacks seven houses."""
 
-    X_first = route(lane=-1.75)
-    X_second = route(lane=1.75, reverse=True)
-    scans_first = make_scans(make_town(), X_first)
-    scans_second = make_scans(make_town(gone=GONE), X_second)
+    def __init__(self):
+        self.X_first = route(lane=-1.75)
+        self.X_second = route(lane=1.75, reverse=True)
+        self.scans_first = make_scans(make_town(), self.X_first)
+        self.scans_second = make_scans(make_town(gone=GONE), self.X_second)
 
     def first(self, X_WS=None, **options):
         X = self.X_first if X_WS is None else X_WS

@@ -4,9 +4,12 @@ import csv
 import json
 import shutil
 
+from helpers import studies
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import assert_refused, make_block_scene, run
 import pytest
+
+from evaluation.study import plan, trend_databases
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +41,8 @@ def test_pairs(capsys, roofs, command):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("unrendered_figures")
-def test_folders(capsys, roofs, tmp_path, few_methods):
+def test_folders(capsys, roofs, tmp_path, few_methods, monkeypatch):
+    studies.run_here(monkeypatch, plan, trend_databases)
     output = tmp_path / "out"
     report = ["report", roofs, "--output", output, "--no-costs", "--jobs", "1"]
     assert_refused(
