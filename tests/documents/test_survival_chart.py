@@ -42,6 +42,9 @@ def test_the_page_has_all_pairs_and_methods():
     assert (len(methods), len(pairs)) == (6, 18)
     assert np.isfinite(values[:, :, 0]).all()
     assert values[:, :, 0].max() == pytest.approx(1.0, abs=0.2)
+    # The best method of a pair is beaten by none.
+    best = values[:, :, 0].argmax(axis=1)
+    assert values[range(18), best, 2].all()
 
 
 def test_fresh_rows_are_those_of_the_five_versions():
