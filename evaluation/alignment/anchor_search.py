@@ -116,8 +116,8 @@ def _solve(
     width: float,
 ) -> np.ndarray:
     """Returns the steps (F, 6) of the free poses in one iteration."""
-    number = 6 * free.stop
-    H, b = sparse.csc_matrix((number, number)), np.zeros(number)
+    size = 6 * free.stop
+    H, b = sparse.csc_matrix((size, size)), np.zeros(size)
     for ties, omega in zip(all_ties, information, strict=True):
         errors = ties.errors(V)
         if ties.is_doubtful:
@@ -130,10 +130,10 @@ def _solve(
         J = _blocks(_adjoint(ties.Z), ties.j, len(V)) + _blocks(
             opposite, ties.i, len(V)
         )
-        J = J.tocsc()[:, :number]
+        J = J.tocsc()[:, :size]
         weighted = J.T @ _blocks(omega, np.arange(len(omega)), len(omega))
-        H = weighted @ J + H
-        b = weighted @ errors.ravel() + b
+        H = H + weighted @ J
+        b += weighted @ errors.ravel()
     return -spsolve(H.tocsc(), b).reshape(-1, 6)
 
 
