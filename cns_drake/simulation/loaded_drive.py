@@ -56,16 +56,11 @@ _HALF_WIDTH = 1.3
 
 @dataclass(frozen=True)
 class LoadedDrive:
-    """A scenario with all inputs of its simulation.
+    """A scenario with all inputs of its simulation; its `frames` is given.
 
-    Attributes:
-        scenario: with `frames` given.
-        inputs: digests of its files.
-        fingerprint: that of the recording, for `fingerprint.txt`.
-        trajectory: motion of the vehicle.
-        world: the stage.
-        num_frames: number of frames.
-        traffic: other moving objects, if any.
+    `inputs` has the digests of its files, and `fingerprint` is that of the
+    recording, for `fingerprint.txt`. Other moving objects are the traffic, if
+    any.
     """
 
     scenario: Scenario

@@ -45,10 +45,7 @@ from cns_drake.simulation.station import make_station
 class PlannedDrive(Drive):
     """The contents of a scenario's recording, except its scans.
 
-    Attributes:
-        trajectory: motion of the vehicle.
-        period: time between frames [s].
-        X_BS: pose of the first LiDAR in base_link.
+    Frames are a period [s] apart; X_BS is the first LiDAR's pose in base_link.
     """
 
     # Each kind of drive sets it when its world is loaded.
@@ -158,11 +155,7 @@ class DriveInProgress(PlannedDrive):
 
 @dataclass(frozen=True)
 class DriveSimulation:
-    """Opens a scenario's drive, as seen by its first LiDAR.
-
-    Attributes:
-        scenario: the scenario to simulate.
-    """
+    """Opens a scenario's drive, as seen by its first LiDAR."""
 
     scenario: Scenario
 
@@ -181,10 +174,8 @@ class DriveSimulation:
 class SimulatedDrive(PlannedDrive):
     """The scans of a scenario, as in its recording.
 
-    A scan is simulated on each access.
-
-    Attributes:
-        structures: names of all structures in the world.
+    A scan is simulated on each access. `structures` has the names of all
+    structures in the world.
     """
 
     def __init__(self, scenario: Scenario):

@@ -98,11 +98,7 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns N(D) [1/(m3 mm)] and the reflectivity of each kind of drops.
-
-        Args:
-            diameters_mm: D.
-        """
+        """Returns N(D) [1/(m3 mm)] and reflectivity of each kind of drops."""
         kinds = []
         if self.rain > 0.0:
             slope = 4.1 * self.rain**-0.21
@@ -157,14 +153,9 @@ def tabulate_scattering(
     """Returns the detected echoes of the weather.
 
     Drops are a Poisson process in distance and diameter. Each is detected by
-    the probability of its own SNR, which thins it to another such process.
-
-    Args:
-        weather: the weather.
-        budget: link budget of the unit.
-        divergence: half angle of a beam [rad].
-        resolution: length of a pulse, there and back [m].
-        min_range: nearest measured range [m].
+    the probability of its own SNR, which thins it to another such process. The
+    divergence is half the angle of a beam [rad], the resolution the length of a
+    pulse, there and back [m].
     """
     distances = _DISTANCES[min_range < _DISTANCES]
     distances = np.concatenate([[min_range], distances])
