@@ -260,14 +260,10 @@ def ride_on_springs(
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))
     x, z = masses.center
     a_WG = frame.acceleration_at(np.array([x, 0.0, z]))
-    force_F = rotated(
-        frame.R.transpose(0, 2, 1), a_WG - np.array([0.0, 0.0, -_GRAVITY])
-    )
+    gravity = np.array([0.0, 0.0, -_GRAVITY])
+    force_F = rotated(frame.R.transpose(0, 2, 1), a_WG - gravity)
     inputs = np.column_stack(
-        [
-            heights.reshape(len(a_WG), -1),
-            force_F + np.array([0.0, 0.0, -_GRAVITY]),
-        ]
+        [heights.reshape(len(a_WG), -1), force_F + gravity]
     )
     return trajectory.with_ride(
         BodyRide(*suspension.respond(inputs, step), step, x)

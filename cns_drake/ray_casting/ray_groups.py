@@ -142,7 +142,7 @@ def group_geometries(
     *,
     may_share: bool = True,
 ) -> tuple[np.ndarray, list[RayGroup]]:
-    """Returns p_WO, and the groups of geometry with the indices of its members.
+    """Returns p_WO, and the groups of geometries, given with their indices.
 
     The world's is the first if there is one; half spaces are the last. If they
     may share, large surfaces with many copies get a group for each copy, all

@@ -24,11 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.elementary import exp
-from cns_drake.sensors.returns.link_budget import (
-    LinkBudget,
-    detection_probability,
-    target_snr,
-)
+from cns_drake.sensors.returns import link_budget
 
 
 def _geometric(first: float, last: float, count: int) -> np.ndarray:
@@ -145,7 +141,7 @@ _QUANTILES = (np.arange(16) + 0.5) / 16
 @functools.lru_cache(maxsize=8)
 def tabulate_scattering(
     weather: Weather,
-    budget: LinkBudget,
+    budget: link_budget.LinkBudget,
     divergence: float,
     resolution: float,
     min_range: float,
@@ -171,8 +167,8 @@ def tabulate_scattering(
             (_DIAMETERS_MM * 1e-3 / (2.0 * radius[:, None])) ** 2, 1.0
         )
         energy = reflectivity * part * overlap[:, None]
-        snr = target_snr(budget, alpha, energy, distances[:, None])
-        detected = detection_probability(snr)
+        snr = link_budget.target_snr(budget, alpha, energy, distances[:, None])
+        detected = link_budget.detection_probability(snr)
         density = number * steps * detected * np.pi * radius[:, None] ** 2
         rate += density.sum(axis=1)
         weights = np.hstack([weights, density])
