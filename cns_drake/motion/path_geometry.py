@@ -26,14 +26,10 @@ def make_uniform_spline(
 
     Such a spline never leaves the convex hull of ORDER neighbouring control
     points, its derivatives never that of their difference quotients, and it
-    reproduces a straight line: bounds on the control points are bounds on
-    the curve. It starts at 0 and has its i-th knot at i * spacing. Beyond
-    both ends the control points are mirrored in the last one, so that the
-    curve ends in it.
-
-    Args:
-        control_points: (N, D) values at the knots, N > REACH.
-        spacing: distance of the knots in the parameter.
+    reproduces a straight line: bounds on the control points are bounds on the
+    curve. It starts at 0 and has its i-th knot at i * spacing. Beyond both ends
+    the (N, D) control points, N > REACH, are mirrored in the last one, so that
+    the curve ends in it.
     """
     points = np.asarray(control_points, dtype=float)
     points = np.concatenate(
@@ -110,11 +106,9 @@ class PathJet:
 class PathSection:
     """The path from the last knot before each of N parameters up to it.
 
-    Attributes:
-        knot: (N,) number of the knot.
-        length: (N,) parameter since the knot.
-        jet: the path at the nodes of Gauss and Legendre's quadrature, those
-            of the first section first.
+    `knot` has the (N,) numbers of the knots, `length` the (N,) parameters since
+    them, and `jet` the path at the nodes of Gauss and Legendre's quadrature,
+    those of the first section first.
     """
 
     knot: np.ndarray

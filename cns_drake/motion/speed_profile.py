@@ -23,10 +23,8 @@ _SMOOTHING_SLACK = 0.2
 class SpeedProfile(NamedTuple):
     """The fastest drive along a path, from rest to rest.
 
-    Attributes:
-        u: (N,) even places on the path [m].
-        speed: (N,) the speed there [m/s].
-        acceleration: the bound of the acceleration [m/s^2].
+    It has the (N,) speeds [m/s] at even places u [m], and the bound of the
+    acceleration [m/s^2].
     """
 
     u: np.ndarray
@@ -37,9 +35,8 @@ class SpeedProfile(NamedTuple):
 def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
     """Returns the path parameter u(t) through places of a drive, smoothed.
 
-    Args:
-        positions: (N,) places at each `KNOT_PERIOD`, at rest for REACH of them
-            at both ends [m].
+    The (N,) places [m] are those at each `KNOT_PERIOD`, at rest for REACH of
+    them at both ends.
     """
     return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
@@ -47,21 +44,17 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
 def find_speed_profile(
     path: path_geometry.SmoothPath, speed_limits: np.ndarray, speeds: Speeds
 ) -> SpeedProfile:
-    """Returns the fastest drive under bounds.
+    """Returns the fastest drive under (N,) limits at control points [m/s].
 
     It is found with stepwise constant acceleration (a forward and a backward
     pass over v^2). Its positions at even times are then the control points of a
-    quintic B-spline: its u' is a
-    weighted mean of the drive's speed, and its u'' of the acceleration, over
-    at most REACH + 1 knot periods before and after. Bounds of acceleration
-    therefore carry over as they are, and bounds of speed if the drive
-    observes each of them that much earlier and later; `_early_and_late` sees
-    to that. Path parameter and arc length differ by less than a percent;
-    |p'| <= 1 makes speed bounds of u' bounds of the speed, and the rest is
-    taken off the acceleration bound.
-
-    Args:
-        speed_limits: (N,) limits at the path's control points [m/s].
+    quintic B-spline: its u' is a weighted mean of the drive's speed, and its
+    u'' of the acceleration, over at most REACH + 1 knot periods before and
+    after. Bounds of acceleration therefore carry over as they are, and bounds
+    of speed if the drive observes each of them that much earlier and later;
+    `_early_and_late` sees to that. Path parameter and arc length differ by less
+    than a percent; |p'| <= 1 makes speed bounds of u' bounds of the speed, and
+    the rest is taken off the acceleration bound.
     """
     u = np.linspace(0.0, path.end, max(2, int(np.ceil(path.end / _STEP)) + 1))
     jet = path.evaluate(u)

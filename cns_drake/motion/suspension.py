@@ -64,15 +64,11 @@ def load_suspension_rates(path: Path) -> SuspensionRates:
 
 @dataclass(frozen=True)
 class CarMasses:
-    """The masses of a car and their places.
+    """The masses [kg] of a car's body and wheels, and their places.
 
-    Attributes:
-        body: mass on the springs [kg].
-        roll_inertia: the body's, about its centre of mass [kg m^2].
-        pitch_inertia: the body's, about its centre of mass [kg m^2].
-        center: x and z of that centre in the vehicle frame B [m].
-        wheels: (W,) mass of each wheel with its moving parts [kg].
-        p_BWset: (W, 2) x and y of the wheels in B [m].
+    Moments of inertia [kg m^2] are the body's, about its centre of mass, whose
+    x and z in the vehicle frame B are `center` [m]. A wheel's mass includes its
+    moving parts; (W, 2) x and y of the wheels are in B [m].
     """
 
     body: float
@@ -190,13 +186,9 @@ class Suspension:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns the motion of the body, from rest under the first inputs.
 
-        The solution is exact for inputs that change linearly within a step.
-
-        Args:
-            inputs: (N, W + 3) heights of the road below the wheels [m] and
-                specific force along x, y, z of B less its value at rest
-                [m/s^2], at even times.
-            step: between these times [s].
+        The solution is exact for inputs that change linearly within a step [s].
+        The (N, W + 3) inputs are heights of the road below the wheels [m] and
+        specific force along x, y, z of B less its value at rest [m/s^2].
 
         Returns:
             Heave [m], roll and pitch [rad], (N, 3), and their first and
@@ -268,14 +260,10 @@ def ride_on_springs(
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))
     x, z = masses.center
     a_WG = frame.acceleration_at(np.array([x, 0.0, z]))
-    force_F = rotated(
-        frame.R.transpose(0, 2, 1), a_WG - np.array([0.0, 0.0, -_GRAVITY])
-    )
+    gravity = np.array([0.0, 0.0, -_GRAVITY])
+    force_F = rotated(frame.R.transpose(0, 2, 1), a_WG - gravity)
     inputs = np.column_stack(
-        [
-            heights.reshape(len(a_WG), -1),
-            force_F + np.array([0.0, 0.0, -_GRAVITY]),
-        ]
+        [heights.reshape(len(a_WG), -1), force_F + gravity]
     )
     return trajectory.with_ride(
         BodyRide(*suspension.respond(inputs, step), step, x)

@@ -18,12 +18,9 @@ from cns_drake.roads.lane_path import LanePath, Speeds
 class FrameMotion(NamedTuple):
     """Pose, velocity and acceleration of a frame F in a frame E at N times.
 
-    Attributes:
-        R: (N, 3, 3) rotation R_EF.
-        p: (N, 3) place of F's origin [m].
-        w, v: (N, 3) angular [rad/s] and linear velocity [m/s], in E.
-        alpha, a: (N, 3) angular [rad/s^2] and linear acceleration [m/s^2], in
-            E.
+    It has the (N, 3, 3) rotation R_EF, the (N, 3) place p of F's origin [m],
+    and (N, 3) velocities w [rad/s], v [m/s] and accelerations alpha [rad/s^2],
+    a [m/s^2], angular and linear, in E.
     """
 
     R: np.ndarray
@@ -65,13 +62,11 @@ NUM_COORDINATES = 3
 
 
 class RideMoments(NamedTuple):
-    """Heave, roll and pitch at N times.
+    """Heave, roll and pitch at N times, (N, 3), and their derivatives by time.
 
-    Attributes:
-        q: (N, 3) heave of the body, upwards [m], roll and pitch about x and y
-            of the vehicle [rad].
-        dq, ddq: (N, 3) derivatives by time.
-        pivot: x of the point on the ground about which it turns [m].
+    Heave is that of the body, upwards [m]; roll and pitch are about x and y of
+    the vehicle [rad]. `pivot` is x of the point on the ground about which it
+    turns [m].
     """
 
     q: np.ndarray
@@ -99,12 +94,9 @@ class BodyRide:
     ):
         """Makes the motion.
 
-        Args:
-            q: (N, 3) heave [m], roll and pitch [rad].
-            dq: (N, 3) their rates.
-            ddq: (N, 3) their accelerations.
-            step: between the N times [s], the first of which is zero.
-            pivot: x in F of the point about which the body turns [m].
+        The (N, 3) heave [m], roll and pitch [rad], their rates and their
+        accelerations are given at N times a step [s] apart, from zero on. The
+        body turns about x = pivot in F [m].
         """
         self._pivot = pivot
         from scipy.interpolate import PPoly
@@ -176,13 +168,9 @@ _UP = np.array([[0.0, 0.0, 1.0]])
 class Moments(NamedTuple):
     """The path at N times; all motion is computed from it.
 
-    Attributes:
-        u: (N,) path parameters.
-        rate: (N,) their rates [1/s].
-        acceleration: (N,) their accelerations [1/s^2].
-        jet: the path there.
-        section: the sections of path before them, for integrals.
-        ride: the motion of the body against the path; None if it is rigid.
+    It has (N,) path parameters u, their rates [1/s] and accelerations [1/s^2],
+    the path there, and the sections of path before them, for integrals. `ride`
+    is the motion of the body against the path; None if it is rigid.
     """
 
     u: np.ndarray
@@ -201,10 +189,6 @@ class Trajectory:
     the road; there is no roll. The vehicle frame B is F, unless a ride on
     springs moves it against F. The motion is exact: derivatives are taken of
     the splines, not of samples. It starts and ends at rest.
-
-    Attributes:
-        path: the path.
-        speed_profile: the fastest drive along it.
     """
 
     def __init__(self, lane_path: LanePath, speeds: Speeds):

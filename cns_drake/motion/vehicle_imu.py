@@ -53,12 +53,10 @@ class VehicleImu(LeafSystem):
     ):
         """Declares the ports.
 
-        Args:
-            gravity_W: the acceleration of free fall [m/s^2].
-            rate: samples per second [1/s].
-            measure: adds errors. It takes the number of the first sample and
-                (N, 6) exact specific forces and angular velocities, and
-                returns the measured ones. By default there are no errors.
+        Gravity is the acceleration of free fall [m/s^2], the rate the samples
+        per second. `measure` adds errors: it takes the number of the first
+        sample and (N, 6) exact specific forces and angular velocities, and
+        returns the measured ones. By default there are no errors.
         """
         super().__init__()
         self._trajectory = trajectory

@@ -21,10 +21,7 @@ _HEIGHT_TOLERANCE = 0.5
 class Part:
     """A part of a structure, of one colour.
 
-    Attributes:
-        semantic_class: class of the structure.
-        rgb: sRGB, each from 0 to 1.
-        surface: in the world.
+    The colour is sRGB, each from 0 to 1; the surface is in the world.
     """
 
     semantic_class: str

@@ -67,17 +67,15 @@ _THINNING_SIZE = 0.5
 
 @dataclass(frozen=True)
 class DriveRecord:
-    """The record of a drive.
+    """The record of a drive; most lists have an entry for each frame.
 
     Attributes:
         period: time between frames [s].
-        X_WBs: pose of the vehicle at each frame.
-        X_WFs: for each moving geometry frame F, its pose at each frame.
+        X_WFs: for each moving geometry frame F, its poses.
         scans: frame index and (N, 3) positions in the world [m] of the
             scans to show.
-        speeds: forward speed of the vehicle at each frame [m/s].
-        specific_forces_I: specific force at each frame in the IMU's frame I
-            [m/s^2].
+        speeds: forward speed of the vehicle [m/s].
+        specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: likewise w_WI_I [rad/s].
         limbs: leading frame F -> the poses in F of all frames that move with it
             as one, with F itself.
@@ -101,11 +99,9 @@ class DriveRecord:
 class ShownStages:
     """The stage of a drive among others, as its page shows it.
 
-    Attributes:
-        other: the stage to show the difference to, if any.
-        other_name: its name in the page.
-        stage: name of the drive's stage, if it is one of a map.
-        stages: names of all stages of that map, the earliest first.
+    The page shows the difference to the other stage, if any. `stage` and
+    `stages` name the drive's stage and all of its map, if it is one of a map,
+    the earliest first.
     """
 
     other: World | None = None
@@ -200,12 +196,9 @@ def make_panel(
 class Plot:
     """A curve over the time of the drive, as the page's template draws it.
 
-    Attributes:
-        name: its name in the page.
-        unit: a key of `_LEAST_RANGE`.
-        values: what is said at some times, evenly spread over the drive.
-        points: the curve, as SVG has it.
-        zero: height of zero, as SVG has it.
+    The unit is a key of `_LEAST_RANGE`. `values` is what is said at some times,
+    evenly spread over the drive; `points` and `zero`, the curve and the height
+    of zero, are as SVG has them.
     """
 
     name: str
@@ -405,13 +398,11 @@ class MeshcatRecorder(LeafSystem):
         shown: ShownStages | None = None,
         scan_spacing: float = 15.0,
     ):
-        """Declares the ports and the schedule.
+        """Declares the ports and the schedule, for frames a period [s] apart.
 
-        Args:
-            X_BSs: LiDAR name -> pose of its frame S in B.
-            period: time between frames [s].
-            num_frames: number of frames to record, if not all.
-            scan_spacing: distance between two shown scans [m].
+        `X_BSs` has the pose in B of each LiDAR's frame S by its name. All
+        frames are recorded, or `num_frames`. `scan_spacing` is the distance
+        between two shown scans [m].
         """
         super().__init__()
         self._world = world

@@ -143,9 +143,7 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     """Lights a scene by day and looks at it from the air, from the south.
 
-    Args:
-        lower: (3,) least coordinates of the view [m].
-        upper: (3,) greatest coordinates of the view [m].
+    The view reaches from (3,) lower to upper coordinates [m].
     """
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)

@@ -67,9 +67,8 @@ class View(BaseModel):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns (M, 2) pixels and the indices (M,) of their points.
 
-        Args:
-            p_WQset: (N, 3) points in the world [m].
-            width, height: size of the picture [pixel].
+        The (N, 3) points are in the world [m], the size of the picture is in
+        pixels.
         """
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
@@ -81,11 +80,7 @@ class View(BaseModel):
 
 
 class StageScene:
-    """The geometry of a stage, ready for pictures and scans.
-
-    Attributes:
-        scene: casts rays.
-    """
+    """The geometry of a stage, ready for pictures, and for scans in `scene`."""
 
     def __init__(self, path: Path, without: Collection[str] = ()):
         """Loads an SDF world.
@@ -151,15 +146,10 @@ def render(
 ) -> np.ndarray:
     """Renders a view with sun, shadows, sky light and haze.
 
-    Args:
-        scene: the ray-casting scene of `geometries`.
-        X_WC: camera pose; x forward, y left, z up.
-        width: columns [pixel].
-        height: rows [pixel].
-        fov_y_deg: vertical field of view [deg].
-        samples: rays per pixel and axis.
-        haze_length: distance at which haze has taken two thirds of the
-            contrast; infinite: clear air [m].
+    The scene is that of the geometries. The camera looks along x, y is left, z
+    up. Width and height are in pixels, `samples` is the number of rays per
+    pixel and axis. Haze has taken two thirds of the contrast at `haze_length`
+    [m]; infinite is clear air.
 
     Returns:
         (height, width, 3) uint8 sRGB image.

@@ -62,12 +62,9 @@ def make_static_page(
     """Returns the scene as a self-contained page, without a server.
 
     It is Drake's page with compressed commands: a city takes a third of the
-    space. Browsers of 2023 or later decompress them.
-
-    Args:
-        body: HTML before the scene, visible while it loads.
-        script: JavaScript module, run when the page is ready; its `commands` is
-            a promise of the scene.
+    space. Browsers of 2023 or later decompress them. The body is HTML before
+    the scene, visible while it loads. The script is a JavaScript module, run
+    when the page is ready; its `commands` is a promise of the scene.
     """
     html = meshcat.StaticHtml()
     first = _COMMAND.search(html)

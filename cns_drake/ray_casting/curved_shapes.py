@@ -108,10 +108,7 @@ class NearCurvedShapes:
         )
 
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
-        """Returns which of (K, 3) places are near a shape, (K,) bool.
-
-        A place is near if it is in the shape's polyhedron.
-        """
+        """Returns which of (K, 3) places are in a polyhedron, (K,) bool."""
         result = np.zeros(len(p_OSset), bool)
         _find_near(self._near, p_OSset, result)
         return result
@@ -125,8 +122,7 @@ class _Sorted(NamedTuple):
         reaches: (M,) radii of balls about them [m].
         X_GOs: (M, 4, 4) from O to their own frames; not rigid for an ellipsoid,
             which is a ball there.
-        halves: (M,) half of the length along z.
-        radii: (M,) around that line.
+        halves, radii: (M,) half the length along z, and the radius around it.
         begins: (M,) starts of their balls along x [m].
         ends: (M,) the farthest end along x of this ball and those before [m].
     """
@@ -263,14 +259,10 @@ def _meet_capsule(
     half: float,
     radius: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns where rays meet a capsule, in closed form.
+    """Returns where N rays meet a capsule, in closed form.
 
-    Args:
-        away: (N, 3) origins, from the capsule's middle [m].
-        d: (N, 3) directions.
-        axis: (3,) the capsule's.
-        half: half of the length of its straight part [m].
-        radius: [m].
+    Origins are relative to its middle [m]. `half` is half the length of its
+    straight part [m].
 
     Returns:
         (N,) ranges, inf for a miss [m]; and (N, 3) normals of any length.

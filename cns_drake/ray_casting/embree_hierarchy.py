@@ -39,12 +39,7 @@ _BLOCK = 1024
 
 
 class _Built(NamedTuple):
-    """The Embree scene of a group.
-
-    Attributes:
-        scene: the RTCScene, 0 if empty.
-        owners: `Primitives.owners` of each of its geometries.
-    """
+    """The RTCScene of a group, 0 if empty, and the owners of its geometries."""
 
     scene: int
     owners: tuple[np.ndarray, ...]
@@ -84,10 +79,8 @@ class EmbreeHierarchy:
 
     Rays are cast in packets marked as coherent, which makes a LiDAR's
     neighbouring beams cheap. Scenes are built robust, so that no ray passes
-    through an edge that two triangles share.
-
-    Attributes:
-        rows: rows of the groups with primitives in this hierarchy.
+    through an edge that two triangles share. `rows` has the rows of the groups
+    with primitives in it.
     """
 
     def __init__(
@@ -99,10 +92,8 @@ class EmbreeHierarchy:
     ):
         """Builds the hierarchy.
 
-        Args:
-            merge: makes primitives of a group; it may make none.
-            previous: a hierarchy of the same primitives, whose scenes of
-                unchanged groups are reused.
+        `merge` makes primitives of a group; it may make none. Scenes of groups
+        that are unchanged since a previous hierarchy are reused.
 
         Raises:
             MemoryError: Embree cannot build it.

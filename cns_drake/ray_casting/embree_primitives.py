@@ -33,13 +33,10 @@ _MOST_PIECES = 1000
 
 
 class Primitives(NamedTuple):
-    """One Embree geometry.
+    """One Embree geometry, of a kind that Embree numbers.
 
-    Attributes:
-        kind: Embree's number for the kind of its primitives.
-        buffers: (slot, format, array) each.
-        owners: (P,) int32, the number of each primitive's member in its group.
-        mask: `SOLID` or `PROXY`.
+    Buffers are (slot, format, array) each. `owners` has the (P,) int32 number
+    of each primitive's member in its group, and `mask` is `SOLID` or `PROXY`.
     """
 
     kind: int

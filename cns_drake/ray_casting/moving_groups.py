@@ -14,11 +14,9 @@ from cns_drake.scene import surfaces
 
 
 class KnownPoses(NamedTuple):
-    """Poses of frames as one array.
+    """Poses of M frames: the row of each, and (M, 4, 4) X_WF.
 
-    Attributes:
-        rows: frame -> its row in the array; always the same object.
-        X_WFs: (M, 4, 4) poses in the world.
+    The mapping `rows` is always the same object.
     """
 
     rows: Mapping[FrameId, int]
@@ -40,12 +38,7 @@ class KnownPoses(NamedTuple):
 
 
 class Ball(NamedTuple):
-    """A ball in the world.
-
-    Attributes:
-        p_W: its centre [m].
-        radius: [m].
-    """
+    """A ball in the world: its centre [m] and its radius [m]."""
 
     p_W: np.ndarray
     radius: float
@@ -54,11 +47,8 @@ class Ball(NamedTuple):
 class Placed(NamedTuple):
     """P groups of a scene that were placed anew.
 
-    Attributes:
-        rows: (P,) rows of the groups.
-        X_OLs: (P, 3, 4) their `X_OL`.
-        in_sight: (P,) whether each is in sight.
-        moves: (P,) whether each has a `motion`.
+    Their (P,) rows and (P, 3, 4) `X_OL`; whether each is in sight, and whether
+    it has a `motion`, (P,) bool.
     """
 
     rows: np.ndarray

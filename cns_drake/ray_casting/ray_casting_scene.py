@@ -69,18 +69,11 @@ class RayCastingScene:
         num_threads: int = 1,
         previous: RayCastingScene | None = None,
     ):
-        """Builds the scene.
+        """Builds the scene; hits give indices into the geometries.
 
-        Args:
-            geometries: the geometry that rays can hit; hits give indices into
-                it.
-            anchored_frames: the frames that never move.
-            calc_X_WF: gives the pose of a frame in the world.
-            num_threads: number of threads that share the rays of a cast; hits
-                do not depend on it.
-            previous: a scene of similar geometry, which this one replaces:
-                frames whose surfaces are still the same objects are not built
-                anew.
+        `num_threads` threads share the rays of a cast; hits do not depend on
+        it. A `previous` scene of similar geometry is replaced: frames whose
+        surfaces are still the same objects are not built anew.
         """
         self._p_WO, self._groups = group_geometries(
             enumerate(geometries),
@@ -129,14 +122,12 @@ class RayCastingScene:
             The (G,) row of each geometry's frame, the (R, 3, 3) inverse
             transpose of the linear part of each X_WL, and the (R, 3) p_WL.
         """
-        if self._normal_matrices is None:
-            self._normal_matrices = _calc_normal_matrices(self._groups)
         p_WLset = [
             np.zeros(3) if g.is_merged_world else g.X_OL[:, 3] + self._p_WO
             for g in self._groups
         ]
-        frames = self._normal_matrices, np.reshape(p_WLset, (-1, 3))
-        return self._group_of, *frames
+        matrices = self._calc_normal_matrices()
+        return self._group_of, matrices, np.reshape(p_WLset, (-1, 3))
 
     def cast_rays(
         self,
@@ -150,16 +141,14 @@ class RayCastingScene:
     ) -> RayHits:
         """Casts N rays, from one pose of a sensor S or from several.
 
+        Ray i takes entry i mod length of all arrays but the directions.
+
         Args:
-            p_WSset: (3,) or (K, 3) origins in the world [m]; ray i starts at
-                origin i mod K.
+            p_WSset: (3,) or (K, 3) origins in the world [m].
             d_Sset: (N, 3) unit directions, expressed in S.
-            max_range: how far to look [m], one for all or (M,) taken in turn
-                likewise.
-            R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world, taken
-                in turn likewise.
-            times: (T,) when rays are cast, as parts of the turn from 0 to 1,
-                taken in turn likewise.
+            max_range: how far to look [m], one for all or (M,).
+            R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world.
+            times: (T,) when rays are cast, as parts of the turn from 0 to 1.
             with_normals: also return the normals of the surfaces, as they
                 are at the start of the turn.
 
@@ -189,33 +178,36 @@ class RayCastingScene:
             _cast_on_planes(self._planes, rays, hits)
         is_outside = np.zeros(0, bool)
         if with_normals:
-            is_outside = self._face_rays(hits, rays)
+            matrices = self._calc_normal_matrices()
+            is_outside = _face_origins(hits, matrices, rays.d_Oset())
         return RayHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
-    def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
-        """Makes normals unit vectors in O that face the origins of rays.
-
-        Returns:
-            (N,) whether each ray has met the outside of a surface, by its
-            winding.
-        """
+    def _calc_normal_matrices(self) -> np.ndarray:
+        """Returns (G, 3, 3) maps of normals from groups' frames to O."""
         if self._normal_matrices is None:
-            self._normal_matrices = _calc_normal_matrices(self._groups)
-        d_Oset = rays.d_Oset()
-        return _face_origins(hits, self._normal_matrices, d_Oset)
+            turns = [
+                np.eye(3) if group.is_merged_world else group.X_OL[:, :3]
+                for group in self._groups
+            ]
+            # Normals transform by the inverse transpose.
+            maps = np.linalg.inv(np.reshape(turns, (-1, 3, 3)))
+            self._normal_matrices = np.ascontiguousarray(
+                maps.transpose(0, 2, 1)
+            )
+        return self._normal_matrices
 
 
 @compiled
 def _face_origins(
     hits: Hits, normal_matrices: np.ndarray, d_Oset: np.ndarray
 ) -> np.ndarray:
-    """See `_face_rays`; normals in L are changed to those in O.
+    """Makes normals unit vectors in O that face the origins of rays.
 
-    NumPy takes a quarter of a frame.
+    NumPy takes a quarter of a frame. The (G, 3, 3) matrices take normals from a
+    group's frame to O.
 
-    Args:
-        normal_matrices: (G, 3, 3) from a group's frame to O.
-        d_Oset: (N, 3) directions.
+    Returns:
+        (N,) whether each ray has met the outside of a surface, by its winding.
     """
     is_outside, n = np.zeros(len(hits.group), np.bool_), np.empty(3)
     normals, group = hits.normals, hits.group
@@ -263,17 +255,6 @@ def _cast_on_planes(
         hits.group[nearer] = row
         if hits.normals.shape[1]:
             hits.normals[nearer] = (0.0, 0.0, 1.0)
-
-
-def _calc_normal_matrices(groups: Sequence[RayGroup]) -> np.ndarray:
-    """Returns what takes normals from each group's frame to O, (G, 3, 3)."""
-    turns = [
-        np.eye(3) if group.is_merged_world else group.X_OL[:, :3]
-        for group in groups
-    ]
-    # Normals transform by the inverse transpose.
-    maps = np.linalg.inv(np.reshape(turns, (-1, 3, 3)))
-    return np.ascontiguousarray(maps.transpose(0, 2, 1))
 
 
 def _has_embree() -> bool:

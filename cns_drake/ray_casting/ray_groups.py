@@ -32,10 +32,8 @@ Member = tuple[int, RigidTransform, surfaces.Surface]
 class Motion(NamedTuple):
     """A frame F that keeps its velocities for a turn, in the frame O.
 
-    Attributes:
-        w: angular velocity [rad/s].
-        v: velocity of F's origin [m/s].
-        duration: length of the turn [s].
+    w [rad/s] is its angular velocity, v [m/s] that of its origin. The turn
+    takes `duration` [s].
     """
 
     w: np.ndarray
@@ -144,17 +142,11 @@ def group_geometries(
     *,
     may_share: bool = True,
 ) -> tuple[np.ndarray, list[RayGroup]]:
-    """Returns p_WO and the groups.
+    """Returns p_WO, and the groups of geometries, given with their indices.
 
-    The world's is the first if there is one; half spaces are the last.
-
-    Args:
-        geometries: the geometry that rays can hit, with the indices of its
-            members.
-        anchored_frames: the frames that never move.
-        calc_X_WF: gives the pose of a frame in the world.
-        may_share: whether large surfaces with many copies get a group for each
-            copy, all with the same surface.
+    The world's is the first if there is one; half spaces are the last. If they
+    may share, large surfaces with many copies get a group for each copy, all
+    with the same surface.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries) if may_share else frozenset()

@@ -58,14 +58,10 @@ class Rays(NamedTuple):
 
 @compiled
 def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
-    """Returns the (N, 3) directions of rays in a frame F.
+    """Returns the (N, 3) directions in F, by (L, 3, 3) orientations in turn.
 
     Products are added in a fixed order: the result of a matrix library depends
     on the processor.
-
-    Args:
-        R_FSset: (L, 3, 3) orientations of S, taken in turn.
-        d_Sset: (N, 3) directions.
     """
     d_Fset, turn = np.empty((len(d_Sset), 3)), -1
     for ray in range(len(d_Sset)):

@@ -34,10 +34,8 @@ class ModelFinder:
     def __init__(self, world: Path, model_paths: Iterable[Path] = ()):
         """Takes the folders to search; the first one wins.
 
-        Args:
-            world: its folder, the one above, and `models` in both are searched
-                last.
-            model_paths: searched first; then come those of the environment.
+        They are the given ones, those of the environment, and last the world's
+        folder, the one above, and `models` in both.
         """
         folder = world.absolute().parent
         named = [

@@ -114,12 +114,9 @@ def merge_surfaces(
     geometries: Iterable[PerceptionGeometry],
     calc_X_TF: Callable[[FrameId], RigidTransform],
 ) -> TriangleSurface:
-    """Returns one surface with the triangles of many geometries.
+    """Returns one surface in a frame T with the triangles of many geometries.
 
-    Args:
-        geometries: what to merge; curved shapes are tessellated.
-        calc_X_TF: gives the pose of a geometry's frame F in the frame T of the
-            merged surface.
+    Curved shapes are tessellated.
     """
     members = [
         (

@@ -18,14 +18,10 @@ MAX_INSTANCE = 2**16 - 1
 class StructureEntry:
     """A structure as a LiDAR return refers to it.
 
-    Attributes:
-        instance: id from 1 to 65535; 0 stands for no structure.
-        name: the structure's name.
-        semantic_class: a key of `CLASS_IDS`.
-        reflectivity: that of its surfaces near 900 nm, 0 to 1; None if it
-            follows from class and colours.
-        causes: reasons for its differences to the stage's file: switches of a
-            scenario's `transient`.
+    Its instance id is from 1 to 65535; 0 stands for no structure. Its class is
+    a key of `CLASS_IDS`. `reflectivity` is that of its surfaces near 900 nm, 0
+    to 1; None if it follows from class and colours. `causes` are reasons for
+    its differences to the stage's file: switches of a scenario's `transient`.
     """
 
     instance: int

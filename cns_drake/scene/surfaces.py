@@ -15,12 +15,9 @@ LARGEST_SIZE = 1e7
 
 @dataclass(frozen=True)
 class TriangleSurface:
-    """Triangles in the geometry frame G.
+    """Triangles by (N, 3) float64 vertex positions in the geometry frame G [m].
 
-    Attributes:
-        p_GVset: (N, 3) float64 vertex positions [m].
-        triangles: (M, 3) int32 vertex indices, counter-clockwise seen from
-            outside.
+    The (M, 3) int32 vertex indices are counter-clockwise seen from outside.
     """
 
     p_GVset: np.ndarray
@@ -83,8 +80,7 @@ def merge_triangles(
 ) -> tuple[TriangleSurface, np.ndarray]:
     """Returns triangles in one frame T, and their owners.
 
-    Args:
-        members: index, pose X_TG and surface of each.
+    Members have an index, a pose X_TG and a surface each.
 
     Returns:
         The surface in T, and the (M,) int32 index of each of its triangles.
@@ -109,10 +105,8 @@ def merge_triangles(
 def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
     """Returns triangles for any surface, inscribed where it is curved.
 
-    Args:
-        surface: the shape; of a plane, a square of 200 m about G.
-        sides: number of sides of a circle about the z axis of G; a half sphere
-            has half as many parallels.
+    A plane becomes a square of 200 m about G. A circle about the z axis of G
+    has `sides` sides; a half sphere has half as many parallels.
     """
     if isinstance(surface, TriangleSurface):
         return surface

@@ -20,8 +20,7 @@ def body_and_pose(
 ) -> tuple[RigidBody, RigidTransform]:
     """Returns the body B of a place P, and X_BS.
 
-    Args:
-        place: P, a body or a frame fixed on one, of a finalized plant.
+    P is a body or a frame fixed on one, of a finalized plant.
 
     Raises:
         RuntimeError: the plant is not finalized.
@@ -49,12 +48,10 @@ def connect_motion(
     body: RigidBody,
     inputs: dict[str, InputPort],
 ) -> None:
-    """Connects inputs to the source of the bodies' motion.
+    """Connects inputs, by output ports' names, to the source of bodies' motion.
 
-    Args:
-        motion: a system with the kinematic output ports of a MultibodyPlant;
-            None for the body's plant itself.
-        inputs: name of an output port -> the input to connect.
+    It has the kinematic output ports of a MultibodyPlant; by default it is the
+    body's plant itself.
     """
     source = body.GetParentPlant() if motion is None else motion
     for name, port in inputs.items():

@@ -8,11 +8,8 @@ def noise_generator(
 ) -> np.random.Generator:
     """Returns the generator for one frame, block or other piece of noise.
 
-    The same arguments always give the same numbers.
-
-    Args:
-        sensor_name: distinguishes the noise of several sensors.
-        purpose: number of the purpose, at least 0.
+    The same arguments always give the same numbers. Several sensors differ by
+    their names; the number of a purpose is at least 0.
     """
     # Keys are never negative: pieces before time zero have other streams.
     stream = purpose if index >= 0 else 2**32 - 1 - purpose

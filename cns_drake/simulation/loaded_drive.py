@@ -17,29 +17,20 @@ from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
+from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs, recording_fingerprint
 from cns_drake.scenarios.scenario import Scenario, TrafficConfig
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-    map_folder,
-    world_file,
-)
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.referenced_files import FileWatch
 from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.traffic import lane_graph
+from cns_drake.traffic import lane_graph, traffic_plan
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_adding import traffic_structures
-from cns_drake.traffic.traffic_plan import (
-    TrafficPlan,
-    plan_queues,
-    plan_traffic,
-)
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.transient.changing import change_world
@@ -56,16 +47,11 @@ _HALF_WIDTH = 1.3
 
 @dataclass(frozen=True)
 class LoadedDrive:
-    """A scenario with all inputs of its simulation.
+    """A scenario with all inputs of its simulation; its `frames` is given.
 
-    Attributes:
-        scenario: with `frames` given.
-        inputs: digests of its files.
-        fingerprint: that of the recording, for `fingerprint.txt`.
-        trajectory: motion of the vehicle.
-        world: the stage.
-        num_frames: number of frames.
-        traffic: other moving objects, if any.
+    `inputs` has the digests of its files, and `fingerprint` is that of the
+    recording, for `fingerprint.txt`. Other moving objects are the traffic, if
+    any.
     """
 
     scenario: Scenario
@@ -74,7 +60,7 @@ class LoadedDrive:
     trajectory: Trajectory
     world: World
     num_frames: int
-    traffic: TrafficPlan | None = None
+    traffic: traffic_plan.TrafficPlan | None = None
 
     @property
     def X_BSs(self) -> dict[str, RigidTransform]:
@@ -90,7 +76,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
         InputError: the scenario cannot be run, or its files changed while
             they were being read.
     """
-    check_files(scenario)
+    scenario_files.check_files(scenario)
     watch = FileWatch()
     inputs = digest_inputs(scenario, watch)
     trajectory = plan_drive(scenario)
@@ -123,7 +109,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
 
 def load_stage_and_traffic(
     scenario: Scenario, trajectory: Trajectory
-) -> tuple[World, TrafficPlan | None, Trajectory]:
+) -> tuple[World, traffic_plan.TrafficPlan | None, Trajectory]:
     """Loads the stage of a scenario, and plans the traffic in it, if any.
 
     The trajectory is another one if the vehicle follows others.
@@ -158,7 +144,7 @@ def load_stage(
     """
     in_the_way = _in_the_way(scenario)
     world = load_world(
-        world_file(scenario),
+        scenario_files.world_file(scenario),
         vehicle=vehicle_file() if with_vehicle else None,
         without=(*scenario.without, *in_the_way),
     )
@@ -179,7 +165,7 @@ def _in_the_way(scenario: Scenario) -> Sequence[str]:
     """Returns the names of what stands where the traffic drives."""
     if scenario.traffic.is_off or scenario.map is None:
         return ()
-    folder = map_folder(scenario)
+    folder = scenario_files.map_folder(scenario)
     if folder.roads.is_file() or not folder.lanes.is_file():
         return ()
     return read_lanes(folder.lanes).in_the_way
@@ -188,7 +174,7 @@ def _in_the_way(scenario: Scenario) -> Sequence[str]:
 def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
     """Returns the area where vehicles drive, seen from above [m]."""
     driven = drive.buffer(_HALF_WIDTH)
-    roads = map_folder(scenario).roads
+    roads = scenario_files.map_folder(scenario).roads
     if scenario.map is None or not roads.is_file():
         return driven
     return driven.union(load_road_network(roads).lane_area())
@@ -196,7 +182,7 @@ def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
 
 def plan_scenario_traffic(
     scenario: Scenario, trajectory: Trajectory, world: World | None = None
-) -> TrafficPlan:
+) -> traffic_plan.TrafficPlan:
     """Plans the traffic of a scenario.
 
     Args:
@@ -216,8 +202,8 @@ def plan_scenario_traffic(
     """
     wanted = scenario.traffic
     where = f"{scenario.source}: traffic"
-    check_files(scenario)
-    graph, walkways, _ = load_ways(map_folder(scenario))
+    scenario_files.check_files(scenario)
+    graph, walkways, _ = load_ways(scenario_files.map_folder(scenario))
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
@@ -238,7 +224,7 @@ def plan_scenario_traffic(
             ego_box=EGO_BOX,
         )
     if wanted.queues:
-        return plan_queues(
+        return traffic_plan.plan_queues(
             graph,
             seed=wanted.seed,
             duration=trajectory.duration,
@@ -256,7 +242,7 @@ def plan_scenario_traffic(
             graph, walkways, things
         )
     follows = scenario.driver.follows
-    plan = plan_traffic(
+    plan = traffic_plan.plan_traffic(
         graph,
         walkways,
         vehicles=wanted.vehicles,
@@ -338,7 +324,7 @@ def _check_room(
         )
 
 
-def with_traffic(world: World, plan: TrafficPlan) -> World:
+def with_traffic(world: World, plan: traffic_plan.TrafficPlan) -> World:
     """Returns a world with the traffic in its table and notes.
 
     Raises:

@@ -30,25 +30,14 @@ from cns_drake.scenarios.scenario_files import check_files, describe_scenario
 from cns_drake.scene.world import structures_in
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.patterns import BeamPattern
-from cns_drake.simulation.loaded_drive import (
-    LoadedDrive,
-    load_stage_and_traffic,
-    structure_list,
-)
-from cns_drake.simulation.recording_schedule import (
-    drive_schedule,
-    first_points_topic,
-)
+from cns_drake.simulation import loaded_drive, recording_schedule
 from cns_drake.simulation.station import make_station
 
 
 class PlannedDrive(Drive):
     """The contents of a scenario's recording, except its scans.
 
-    Attributes:
-        trajectory: motion of the vehicle.
-        period: time between frames [s].
-        X_BS: pose of the first LiDAR in base_link.
+    Frames are a period [s] apart; X_BS is the first LiDAR's pose in base_link.
     """
 
     # Each kind of drive sets it when its world is loaded.
@@ -116,16 +105,18 @@ class DriveInProgress(PlannedDrive):
     Reading a scan advances the simulation to its frame.
     """
 
-    def __init__(self, drive: LoadedDrive, simulator: Simulator):
+    def __init__(self, drive: loaded_drive.LoadedDrive, simulator: Simulator):
         """Takes the station of a drive before its first frame."""
         super().__init__(drive.scenario, drive.trajectory, drive.num_frames)
         self._instances = index_instances(
-            structure_list(drive.world), self.name
+            loaded_drive.structure_list(drive.world), self.name
         )
         self._simulator = simulator
         self._lidar = next(iter(drive.scenario.lidars))
-        schedule = drive_schedule(drive.scenario)
-        steps = schedule.steps[first_points_topic(drive.scenario)]
+        schedule = recording_schedule.drive_schedule(drive.scenario)
+        steps = schedule.steps[
+            recording_schedule.first_points_topic(drive.scenario)
+        ]
         self._frame_period = float(schedule.tick * steps)
         self._fault: BaseException | None = None
 
@@ -158,11 +149,7 @@ class DriveInProgress(PlannedDrive):
 
 @dataclass(frozen=True)
 class DriveSimulation:
-    """Opens a scenario's drive, as seen by its first LiDAR.
-
-    Attributes:
-        scenario: the scenario to simulate.
-    """
+    """Opens a scenario's drive, as seen by its first LiDAR."""
 
     scenario: Scenario
 
@@ -181,10 +168,8 @@ class DriveSimulation:
 class SimulatedDrive(PlannedDrive):
     """The scans of a scenario, as in its recording.
 
-    A scan is simulated on each access.
-
-    Attributes:
-        structures: names of all structures in the world.
+    A scan is simulated on each access. `structures` has the names of all
+    structures in the world.
     """
 
     def __init__(self, scenario: Scenario):
@@ -195,12 +180,14 @@ class SimulatedDrive(PlannedDrive):
         """
         check_files(scenario)
         trajectory = plan_drive(scenario)
-        world, traffic, trajectory = load_stage_and_traffic(
+        world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
             scenario, trajectory
         )
         num_frames = count_frames(scenario, trajectory)
         super().__init__(scenario, trajectory, num_frames)
-        self._instances = index_instances(structure_list(world), self.name)
+        self._instances = index_instances(
+            loaded_drive.structure_list(world), self.name
+        )
         self.structures = structures_in(world)
         self._diagram = make_station(
             scenario, world=world, trajectory=trajectory, traffic=traffic

@@ -19,12 +19,8 @@ from cns_drake.recording.bag_writer import BagWriter, take_over_frames
 from cns_drake.recording.recorded_topics import make_calibration
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.schedule import START_NS
+from cns_drake.scenarios import provenance
 from cns_drake.scenarios.planning import shown_beside
-from cns_drake.scenarios.provenance import (
-    INPUTS_KEY,
-    combined_digest,
-    dependency_versions,
-)
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
 from cns_drake.sensors.carriers import sensor_pose
@@ -206,7 +202,7 @@ def _make_bag(
                 sensor_pose(scenario.imu),
             ),
             "provenance.json": {
-                "versions": dependency_versions(),
+                "versions": provenance.dependency_versions(),
                 "inputs_sha256": inputs,
             },
             **imu_files,
@@ -216,7 +212,7 @@ def _make_bag(
         beside=imu_files | ({"calibration.yaml": units} if units else {}),
         custom_data={
             "cns_drake_version": __version__,
-            INPUTS_KEY: combined_digest(inputs),
+            provenance.INPUTS_KEY: provenance.combined_digest(inputs),
             **{
                 key: str(described[key])
                 for key in ("map", "stage", "world", "seed")

@@ -28,15 +28,7 @@ from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.imu import add_described_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.odometry.odometry import add_odometry
-from cns_drake.simulation.loaded_drive import (
-    load_stage,
-    plan_scenario_traffic,
-    with_traffic,
-)
-from cns_drake.simulation.recording_schedule import (
-    drive_schedule,
-    point_layouts,
-)
+from cns_drake.simulation import loaded_drive, recording_schedule
 from cns_drake.traffic.traffic_adding import add_traffic, connect_traffic
 from cns_drake.traffic.traffic_motion import TrafficMotion
 from cns_drake.traffic.traffic_plan import TrafficPlan
@@ -90,10 +82,12 @@ def make_station(
         scan = diagram.GetOutputPort("lidar_scan").Eval(context)
     """
     trajectory = trajectory or plan_drive(scenario)
-    world = world or load_stage(scenario, trajectory=trajectory)
+    world = world or loaded_drive.load_stage(scenario, trajectory=trajectory)
     if traffic is None and not scenario.traffic.is_off:
-        traffic = plan_scenario_traffic(scenario, trajectory, world)
-        world = with_traffic(world, traffic)
+        traffic = loaded_drive.plan_scenario_traffic(
+            scenario, trajectory, world
+        )
+        world = loaded_drive.with_traffic(world, traffic)
         if traffic.positions is not None:
             trajectory = plan_drive(scenario, traffic.positions)
     plant = world.plant
@@ -203,8 +197,8 @@ def make_station(
                 )
                 for name, sensor in scenario.further_sensors.items()
             },
-            schedule=drive_schedule(scenario),
-            layouts=point_layouts(scenario),
+            schedule=recording_schedule.drive_schedule(scenario),
+            layouts=recording_schedule.point_layouts(scenario),
             imu_variances=scenario.imu.noise(scenario.seed).variances(
                 scenario.imu.sample_rate(scenario.fastest_rate)
             ),

@@ -20,11 +20,7 @@ from pydrake.systems.sensors import Accelerometer, Gyroscope
 
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_imu import VehicleImu
-from cns_drake.sensors.carriers import (
-    body_and_pose,
-    connect_motion,
-    sensor_pose,
-)
+from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 
@@ -114,7 +110,7 @@ def add_imu(
         )
     if noise is not None and rate is None:
         raise ValueError("noise: it needs a rate; give rate as well")
-    body, X_BI = body_and_pose(body, X_PI)
+    body, X_BI = carriers.body_and_pose(body, X_PI)
     # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
     accelerometer = builder.AddNamedSystem(
@@ -128,10 +124,10 @@ def add_imu(
             "body_poses": sensor.get_body_poses_input_port(),
             "body_spatial_velocities": sensor.get_body_velocities_input_port(),
         }
-        connect_motion(builder, motion, body, inputs)
+        carriers.connect_motion(builder, motion, body, inputs)
     port = accelerometer.get_body_accelerations_input_port()
     inputs = {"body_spatial_accelerations": port}
-    connect_motion(builder, motion, body, inputs)
+    carriers.connect_motion(builder, motion, body, inputs)
     imu = Imu(accelerometer, gyroscope, rate, noise)
     if noise is None or rate is None:
         return imu
@@ -160,7 +156,7 @@ def add_described_imu(
     Raises:
         InputError: Kalibr's file cannot be used.
     """
-    X_BI = sensor_pose(config)
+    X_BI = carriers.sensor_pose(config)
     if config.is_ideal:
         return add_imu(builder, body, X_BI, motion=motion).ports()
     rate = config.sample_rate(scan_rate)

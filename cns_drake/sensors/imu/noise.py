@@ -99,9 +99,8 @@ class ImuErrors:
     def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
         """Returns exact values with the errors of their samples.
 
-        Args:
-            first: number of the first sample; 0 at time zero.
-            exact: (N, 6) specific force [m/s^2] and angular velocity [rad/s].
+        Samples are numbered from `first` on, 0 at time zero. The (N, 6) values
+        are specific force [m/s^2] and angular velocity [rad/s].
         """
         measured = exact + self._of_samples(first, len(exact))
         return np.minimum(np.maximum(measured, -self._range), self._range)
@@ -122,11 +121,7 @@ class ImuErrors:
         return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:
-        """Returns the errors of many samples.
-
-        Returns:
-            (1024, 6) errors from sample 1024 * number on.
-        """
+        """Returns the (1024, 6) errors from sample 1024 * number on."""
         errors = np.tile(self._turn_on, (_BLOCK, 1))
         if self._walk.any():
             errors += self._walk * self._walk_in_block(number)

@@ -214,10 +214,8 @@ def add_described_lidar(
 ) -> Lidar:
     """Adds the LiDAR that a description describes to a diagram.
 
-    Args:
-        body: P, the body that carries it, or a frame on one.
-        trajectory: prescribed motion of the body. A LiDAR with motion
-            distortion gets its poses from there, by a system `<name>_sweep`.
+    The body P carries it, or a frame on one does. With motion distortion and a
+    prescribed trajectory of the body, a system `<name>_sweep` gives its poses.
     """
     pattern = make_pattern(config)
     lidar = add_lidar(

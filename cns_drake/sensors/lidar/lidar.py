@@ -449,11 +449,9 @@ class SeenGeometry:
     ) -> None:
         """Moves moving geometry, and builds changed geometry anew.
 
-        Args:
-            revision: the geometry's (`geometry_revision_port`), None if
-                unknown; all geometries are then compared.
-            known: poses of frames, which replace calls of `query_object`.
-            seen: the ball in which beams can meet geometry.
+        Without a revision (`geometry_revision_port`), all geometries are
+        compared. Known poses of frames replace calls of the query object. Beams
+        can meet geometry only in the ball `seen`.
 
         Raises:
             InputError: see `GeometryReader.read`.
@@ -558,14 +556,11 @@ class BeamTable(NamedTuple):
 
 
 class _Turn:
-    """The beams of a turn, ready for casting and assembling.
+    """The beams of a turn of a number, ready for casting and assembling.
 
-    Attributes:
-        frame: number of the turn.
-        beams: in firing order.
-        d_Sset_cast: (N, 3) directions in the order of casting.
-        table: what beams add to points.
-        calibrated: the same for calibrated returns, None for ideal ones.
+    `d_Sset_cast` has (N, 3) directions in the order of casting, `table` what
+    beams add to points, and `calibrated` the same for calibrated returns, None
+    for ideal ones. `beams` are in firing order.
     """
 
     def __init__(
@@ -600,14 +595,9 @@ def assemble_points(
 ) -> None:
     """Fills a scan, one point of `POINT_DTYPE` for each of N returns.
 
-    NumPy takes a fifth of a frame.
-
-    Args:
-        met: (N,) int32 index of the hit geometry in `label` and `instance`;
-            negative for the weather.
-        label: uint16 classes.
-        instance: uint16 structures.
-        step: coordinates are rounded to multiples of it [m]; not rounded if 0.
+    `met` has the (N,) int32 index of the hit geometry in the uint16 labels and
+    instances; negative for the weather. Coordinates are rounded to multiples of
+    the step [m]; not rounded if it is 0. NumPy takes a fifth of a frame.
     """
     # As names of their own, fields are fast.
     beams, ranges, intensity = returns.beams, returns.ranges, returns.intensity

@@ -26,14 +26,10 @@ _NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
 
 @dataclass(frozen=True)
 class _TimedPattern(BeamPattern):
-    """Lines of beams that fire together, at a constant rate.
+    """Lines of beams that fire together, at a constant rate of all points.
 
-    Attributes:
-        points_per_second: rate of all lines together.
-        min_range: nearest range that is measured [m].
-        max_range: farthest range that is measured [m].
-        period: duration of a frame [s].
-        num_lines: lasers; line 0 is the highest.
+    Ranges are measured within limits [m]; a frame takes a period [s]. Line 0 of
+    the lasers is the highest.
     """
 
     _: KW_ONLY

@@ -71,12 +71,10 @@ class Beams:
 
 
 def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
-    """Returns beams that may point anywhere.
+    """Returns beams that may point anywhere, in the order of firing.
 
-    Args:
-        d_Sset: (N, 3) unit directions, in the order of firing.
-        ring: (N,).
-        t_ns: (N,) firing times, not decreasing.
+    They have (N, 3) unit directions, (N,) rings and (N,) firing times, which do
+    not decrease.
     """
     elevation = np.arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
     azimuth = np.arctan2(d_Sset[:, 1], d_Sset[:, 0])

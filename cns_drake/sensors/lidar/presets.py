@@ -14,12 +14,7 @@ from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
 
 
 class LidarPreset(NamedTuple):
-    """A unit.
-
-    Attributes:
-        pattern: its beams.
-        source: where their numbers come from.
-    """
+    """The beams of a unit, and the source of their numbers."""
 
     pattern: (
         SpinningPattern

@@ -131,18 +131,11 @@ class CalibratedReturns:
         times: np.ndarray,
         frame: int,
     ) -> Reported:
-        """Returns the reported points of a turn.
+        """Returns the reported points of a turn, the `frame`-th.
 
-        Args:
-            scene: casts rays.
-            materials: materials of the scene's geometries.
-            pattern: pattern of the beams.
-            turn: the beams of this turn.
-            p_WSset: (K, 3) positions of S; ray i of the order of casting
-                starts at position i mod K.
-            R_WSset: (K, 3, 3) its orientations, taken in turn likewise.
-            times: (T,) parts of the turn, taken in turn likewise.
-            frame: number of the turn.
+        Ray i of the order of casting takes the (K, 3) positions and (K, 3, 3)
+        orientations of S, and the (T,) times, at i mod K and i mod T. Times are
+        parts of the turn.
         """
         key = frame_key(self.seed, self.sensor_name, frame)
         reach = self.reach(pattern.max_range)
@@ -257,12 +250,9 @@ def _taken(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
 def _turned(
     d_Sset: np.ndarray, left: np.ndarray | float, up: np.ndarray | float
 ) -> np.ndarray:
-    """Returns directions with other azimuths and, a little, elevations.
+    """Returns (N, 3) directions with other azimuths and, a little, elevations.
 
-    Args:
-        d_Sset: (N, 3).
-        left: by how much azimuths differ [rad].
-        up: by how much elevations differ, over the cosine of each [rad].
+    Azimuths differ by `left` [rad], elevations by `up` over the cosine of each.
     """
     x, y, z = d_Sset.T
     c, s = cos(left), sin(left)

@@ -39,15 +39,9 @@ _FULL_INTENSITY = 255.0
 
 
 class Receiver(NamedTuple):
-    """The receiver of a unit.
+    """The receiver of a unit in weather of an extinction [1/m].
 
-    Attributes:
-        sheet: the unit's.
-        budget: its link budget.
-        extinction: the weather's [1/m].
-        min_range, max_range: limits of reported ranges [m].
-        choice: the echoes that it reports.
-        scattering: by the weather; None in clear air.
+    It reports ranges within limits [m]. `scattering` is None in clear air.
     """
 
     sheet: UnitSheet
@@ -77,16 +71,10 @@ class Reported(NamedTuple):
 
 
 class _Pulses(NamedTuple):
-    """N echoes of beams.
+    """N echoes of beams, numbered in their beams, at distances [m].
 
-    Attributes:
-        beam: (N,) number of the beam.
-        number: (N,) number of the echo in its beam.
-        distance: (N,) [m].
-        snr: (N,)
-        energy: (N,) as the unit infers it for clear air.
-        geometry: (N,) see `Reported`.
-        is_sure: (N,) whether it is detected in any case.
+    `energy` is as the unit infers it for clear air; see `Reported` for
+    `geometry`. An echo that is sure is detected in any case.
     """
 
     beam: np.ndarray
@@ -109,11 +97,8 @@ def report_echoes(
 
     Light less than a pulse apart is one echo, whose distance is the mean by
     energy. An echo is detected by the probability of its SNR, and its distance
-    has the standard deviation that belongs to that.
-
-    Args:
-        range_error: (N,) of each beam's laser [m].
-        gain: (N,) of each beam's laser.
+    has the standard deviation that belongs to that. The (N,) errors of range
+    [m] and gains are those of each beam's laser.
     """
     num_beams = len(gain)
     count = np.bincount(light.beam, minlength=num_beams)
@@ -323,13 +308,8 @@ def _find_greatest(
 ) -> np.ndarray:
     """Returns the row of the greatest value of each group, -1 for none.
 
-    Sorting takes ten times as long, a third of a frame in rain.
-
-    Args:
-        group: (N,) group of each value.
-        number: (N,) the least one wins among equal values.
-        values: (N,)
-        num_groups: number of groups.
+    Among equal values that of the least number wins. Sorting takes ten times as
+    long, a third of a frame in rain.
     """
     best = np.full(num_groups, -1)
     for row in range(len(group)):
@@ -349,12 +329,8 @@ def _number_echoes(
 ) -> np.ndarray:
     """Returns the number of each part's echo in its beam, (N,) from 0.
 
-    An echo begins where a part is farther than a pulse from the beginning of
-    the last one.
-
-    Args:
-        beam, distance: (N,) those of sorted parts of light.
-        resolution: length of a pulse [m].
+    Parts are sorted. An echo begins where one is farther than a pulse, the
+    resolution [m], from the beginning of the last echo.
     """
     number, begin = np.zeros(len(beam), np.int64), 0.0
     for part in range(len(beam)):

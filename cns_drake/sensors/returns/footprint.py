@@ -51,11 +51,8 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
 
     Two neighbours meet one surface, or two that touch, if one place is on the
     plane of the other, or both planes meet in between. Otherwise an edge is
-    between them: within one of their beams, or in the gap.
-
-    Args:
-        orders: (2, N) orders of the beams in which neighbours follow.
-        hits: by the axes of the beams.
+    between them: within one of their beams, or in the gap. Neighbours follow
+    each other in (2, N) orders of the beams, whose axes have the hits.
     """
     farthest = _NEIGHBOURS * shots.divergence
     edges = [_find_edges(order, hits, farthest) for order in orders]
@@ -94,15 +91,13 @@ def _aim(
     divergence: float,
     max_range: float,
 ) -> None:
-    """Fills in the directions of rays at sides, and their reach.
+    """Fills in the directions of rays at P sides, and their reach.
 
     Args:
-        sides: P of them.
         toward: (P, 3) unit vectors across the beams, to the neighbours.
         rest: (P,) part of a beam's light farther from its axis.
         angle: (P,) between `toward` and the way to the ray [rad].
         hits: by the axes of the beams.
-        divergence, max_range: see `Shots`.
     """
     for side in range(len(rest)):
         i, j = sides.row[side], sides.neighbour[side]
@@ -129,12 +124,8 @@ def _share(
     """Returns the (P,) part of the light at each side.
 
     A side has half of the beam, or a quarter if there are edges at other sides,
-    too. A second neighbour on the same side has no part.
-
-    Args:
-        num_beams: the number of beams.
-        row, number: see `Sides`.
-        toward: (P, 3) directions to the neighbours.
+    too. A second neighbour on the same side has no part. Directions `toward`
+    the neighbours are (P, 3).
     """
     side_of = np.full((num_beams, 4), -1)
     for side in range(len(row)):
@@ -156,17 +147,11 @@ def _share(
 
 @compiled
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
-    """Divides the light of beams among their axes and their sides.
+    """Divides the light of N beams among their axes and their sides.
 
     A ray that passes the nearer of two surfaces has met the farther one, on its
-    plane.
-
-    Args:
-        sides: see `find_sides`.
-        side_hits: by their rays within their reach. Those that meet the surface
-            of their beam become misses, those that pass the nearer surface
-            become hits.
-        hits: by the axes of N beams.
+    plane. Hits of rays at sides are within their reach. Those on the surface of
+    their beam become misses, those that pass the nearer surface become hits.
 
     Returns:
         The (N,) part of each beam's light that its axis stands for.
@@ -215,12 +200,8 @@ def _find_edges(
 ) -> np.ndarray:
     """Returns the (E, 2) rows of neighbours with an edge between them.
 
-    NumPy takes five times as long, a tenth of a frame.
-
-    Args:
-        order: (N,) rows of the beams, neighbours beside each other.
-        hits: by the axes of the beams.
-        farthest: greatest angle between neighbours [rad].
+    They are beside each other in the order of rows, up to an angle [rad]. NumPy
+    takes five times as long, a tenth of a frame.
     """
     edges, count = np.empty((len(order), 2), np.int64), 0
     # As names of their own, fields are fast.

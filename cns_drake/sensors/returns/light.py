@@ -122,15 +122,10 @@ def reflect(
     cosine: np.ndarray,
     materials: Materials,
 ) -> Light:
-    """Returns the light that surfaces reflect.
+    """Returns the light of N rays that surfaces reflect.
 
-    Args:
-        beam: (N,) number of each ray's beam.
-        share: (N,) part of the beam that each ray stands for.
-        distance: (N,) whole way of the light to the surface [m].
-        geometry: (N,) index of the surface.
-        cosine: (N,) cosine of the angle of incidence.
-        materials: materials of all geometries.
+    Each stands for a share of its beam, and `distance` is the whole way of the
+    light to the surface [m]. The cosine is that of the angle of incidence.
     """
     energy = np.empty(len(beam))
     for k in range(len(beam)):
@@ -181,11 +176,9 @@ def texture(
     deeper. No wall or floor lies along the axes of the cells.
 
     Args:
-        light: N parts.
         row: (B,) row of each beam in:
         d_Wset: (B, 3) directions.
         p_WSset: (K, 3) positions of S, taken in turn.
-        materials: materials of all geometries.
         group_of, normal_matrices, p_WLset: see
             `RayCastingScene.surface_frames`.
     """

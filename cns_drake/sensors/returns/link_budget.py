@@ -33,12 +33,9 @@ HOPELESS_SNR = 0.9
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A range on a data sheet.
+    """A range on a data sheet [m], with the probability of detection there.
 
-    Attributes:
-        reflectivity: that of the Lambertian target that faces the unit, 0 to 1.
-        range: distance at which it is detected [m].
-        probability: probability of its detection there.
+    The Lambertian target faces the unit; its reflectivity is from 0 to 1.
     """
 
     reflectivity: float
@@ -80,9 +77,7 @@ def fit_link_budget(
 ) -> LinkBudget:
     """Returns the budget that fits one or two rows of a sheet exactly.
 
-    Args:
-        rows: one row, or two of different ranges.
-        range_noise, range_floor, range_bias: see `LinkBudget`.
+    Two rows have different ranges.
     """
     # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
     logs = [math.log(row.snr * row.range**2 / row.reflectivity) for row in rows]
@@ -102,13 +97,10 @@ def target_snr(
     energy: np.ndarray,
     distance: np.ndarray,
 ) -> np.ndarray:
-    """Returns the SNR of targets.
+    """Returns the SNR of targets at positive distances [m].
 
-    Args:
-        budget: the unit's.
-        extinction: the weather's [1/m].
-        energy: reflectivity times cosine of incidence.
-        distance: distances to the targets, positive [m].
+    The extinction is the weather's [1/m], the energy is reflectivity times
+    cosine of incidence.
     """
     loss = 2.0 * (extinction + budget.own_extinction) * distance
     return budget.scale * energy * np.exp(-loss) / (distance * distance)

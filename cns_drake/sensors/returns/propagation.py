@@ -82,11 +82,8 @@ def start_ways(
 ) -> tuple[list[Light], Ways, BeamHits]:
     """Returns what opaque surfaces send back, and the rays that meet others.
 
-    Args:
-        rest: (N,) part of the light that its axis represents.
-        hits: by the axes of the beams.
-        sides: rays at the sides of beams.
-        side_hits: by those; misses do not count.
+    The axis of a beam represents the (N,) rest of its light. Misses at sides do
+    not count.
 
     Returns:
         The light, the rays that meet panes or leaves, and what they meet.
@@ -149,13 +146,7 @@ def pane_shares(cosine: float) -> tuple[float, float]:
 def follow(
     shots: Shots, ways: Ways, met: BeamHits, scale: float
 ) -> list[Light]:
-    """Returns the light that comes back.
-
-    Args:
-        ways: the rays of the beams that go on.
-        met: their hits.
-        scale: see `LinkBudget`.
-    """
+    """Returns the light that comes back; see `LinkBudget` for the scale."""
     found: list[Light] = []
     for step in range(_MOST_STEPS):
         light, ways = _step(

@@ -28,14 +28,10 @@ def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
 def uniform(
     key: np.uint64, beam: np.ndarray, draw: int | np.ndarray
 ) -> np.ndarray:
-    """Returns numbers that are uniform over [0, 1).
+    """Returns numbers that are uniform over [0, 1), by a `frame_key`.
 
     They are the n-th ones of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
-
-    Args:
-        key: see `frame_key`.
-        beam: numbers of beams, 0 or more.
-        draw: numbers of draws, 0 <= draw < `DRAWS_PER_BEAM`.
+    Beams are 0 or more; draws are below `DRAWS_PER_BEAM`.
     """
     number = (beam * DRAWS_PER_BEAM + (draw + 1)).astype(np.uint64)
     z = key + number * _GOLDEN
@@ -53,9 +49,6 @@ def normal(
 
     By algorithm AS 241 (Wichura, Applied Statistics 37, 1988), whose short
     form, PPND7, has seven digits.
-
-    Args:
-        key, beam, draw: see `uniform`.
     """
     result = uniform(key, beam, draw)
     for k, u in enumerate(result):

@@ -10,11 +10,7 @@ import numpy as np
 
 from cns_drake.base.elementary import exp, log
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.sensors.returns.link_budget import (
-    LinkBudget,
-    SheetRow,
-    fit_link_budget,
-)
+from cns_drake.sensors.returns import link_budget
 
 # Speed of light [m/s].
 _LIGHT = 299_792_458.0
@@ -92,7 +88,7 @@ class UnitSheet:
         head: the places of its lasers.
     """
 
-    rows: tuple[SheetRow, ...]
+    rows: tuple[link_budget.SheetRow, ...]
     range_noise: float
     range_floor: float
     divergence_deg: float
@@ -106,8 +102,8 @@ class UnitSheet:
     head: Head = Head()
 
     @property
-    def budget(self) -> LinkBudget:
-        return fit_link_budget(
+    def budget(self) -> link_budget.LinkBudget:
+        return link_budget.fit_link_budget(
             self.rows, self.range_noise, self.range_floor, self.range_bias
         )
 
@@ -137,7 +133,7 @@ def _sheet(
         heights = tuple(map(tuple, fields["head"]["heights"]))
         fields["head"] = Head(heights, fields["head"]["tick_deg"])
     return UnitSheet(
-        rows=tuple(SheetRow(*row) for row in rows),
+        rows=tuple(link_budget.SheetRow(*row) for row in rows),
         unknown=tuple(unknown),
         source=source,
         **fields,

@@ -24,11 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.elementary import exp
-from cns_drake.sensors.returns.link_budget import (
-    LinkBudget,
-    detection_probability,
-    target_snr,
-)
+from cns_drake.sensors.returns import link_budget
 
 
 def _geometric(first: float, last: float, count: int) -> np.ndarray:
@@ -98,11 +94,7 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns N(D) [1/(m3 mm)] and the reflectivity of each kind of drops.
-
-        Args:
-            diameters_mm: D.
-        """
+        """Returns N(D) [1/(m3 mm)] and reflectivity of each kind of drops."""
         kinds = []
         if self.rain > 0.0:
             slope = 4.1 * self.rain**-0.21
@@ -149,7 +141,7 @@ _QUANTILES = (np.arange(16) + 0.5) / 16
 @functools.lru_cache(maxsize=8)
 def tabulate_scattering(
     weather: Weather,
-    budget: LinkBudget,
+    budget: link_budget.LinkBudget,
     divergence: float,
     resolution: float,
     min_range: float,
@@ -157,14 +149,9 @@ def tabulate_scattering(
     """Returns the detected echoes of the weather.
 
     Drops are a Poisson process in distance and diameter. Each is detected by
-    the probability of its own SNR, which thins it to another such process.
-
-    Args:
-        weather: the weather.
-        budget: link budget of the unit.
-        divergence: half angle of a beam [rad].
-        resolution: length of a pulse, there and back [m].
-        min_range: nearest measured range [m].
+    the probability of its own SNR, which thins it to another such process. The
+    divergence is half the angle of a beam [rad], the resolution the length of a
+    pulse, there and back [m].
     """
     distances = _DISTANCES[min_range < _DISTANCES]
     distances = np.concatenate([[min_range], distances])
@@ -180,8 +167,8 @@ def tabulate_scattering(
             (_DIAMETERS_MM * 1e-3 / (2.0 * radius[:, None])) ** 2, 1.0
         )
         energy = reflectivity * part * overlap[:, None]
-        snr = target_snr(budget, alpha, energy, distances[:, None])
-        detected = detection_probability(snr)
+        snr = link_budget.target_snr(budget, alpha, energy, distances[:, None])
+        detected = link_budget.detection_probability(snr)
         density = number * steps * detected * np.pi * radius[:, None] ** 2
         rate += density.sum(axis=1)
         weights = np.hstack([weights, density])
