@@ -177,12 +177,7 @@ def lifetime(
 ) -> float:
     """Returns the years until a share is left; infinite if more is left.
 
-    Between two years the share falls evenly.
-
-    Args:
-        years: ascending, from 0 on.
-        kept: shares then, 1 at 0.
-        left: the share that is left.
+    The years ascend from 0, where the share is 1. Between two it falls evenly.
     """
     for k in range(1, len(years)):
         if kept[k] <= left:

@@ -56,8 +56,7 @@ Pair = tuple[RecordingInfo, RecordingInfo]
 class Repetition:
     """A method on a pair by the protocol of published numbers.
 
-    Attributes:
-        shares_places: whether the study's own protocol describes places alike.
+    Places are shared if the study's own protocol describes them alike.
     """
 
     method: MethodChoice
@@ -100,10 +99,8 @@ class City:
         """Returns pairs of database and query.
 
         Every earlier stage is a database for the last one. The last one is a
-        database too if the reference has such a pair.
-
-        Args:
-            with_itself: also each stage with itself, for loop closure.
+        database too if the reference has such a pair, and each stage its own
+        for loop closure (`with_itself`).
         """
         pairs = []
         for earlier, last in self.change_pairs():

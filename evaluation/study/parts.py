@@ -202,8 +202,7 @@ class Part:
     def write(self, inputs: Mapping, value: object) -> None:
         """Writes the part; its folder is made if needed.
 
-        Args:
-            inputs: all that the value depends on, ready for JSON.
+        The inputs are all that the value depends on, ready for JSON.
 
         Raises:
             InputError: if it cannot be kept or written.
@@ -373,11 +372,7 @@ class RecognitionFiles:
     folder: Path
 
     def result(self, key: str) -> Part:
-        """Returns the part with the `RecognitionResult` of a method.
-
-        Args:
-            key: the name of the method, or a `described_key`.
-        """
+        """Returns the part with the result of a method or a `described_key`."""
         return Part(self.folder / f"{file_name(key)}.data")
 
     @property
@@ -408,10 +403,6 @@ class StudyFiles:
         return RecognitionFiles(self.output / "parts" / "recognition" / name)
 
     def part(self, kind: str, *names: str) -> Part:
-        """Returns the part with a result of a kind, such as `changes`.
-
-        Args:
-            names: what it is of: drives, a rung, a figure.
-        """
+        """Returns the part of a kind (`changes`), named by drives or a rung."""
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")

@@ -276,9 +276,8 @@ class Study:
     ) -> Job:
         """Returns the job of a pair.
 
-        Args:
-            explains: whether it also finds why best places are wrong, and
-                repeats what is compared with published numbers.
+        If it explains, it also finds why best places are wrong, and repeats
+        what is compared with published numbers.
         """
         database, query = pair
         surveys = [self._files.survey(one.name) for one in pair]

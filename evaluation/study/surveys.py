@@ -140,12 +140,9 @@ class RecordedDrive:
 class SurveyedDrive:
     """A drive with its map on the grid of the TCR.
 
-    Attributes:
-        stamps_ns: (N,) int64 of its frames.
-        X_WS: (N, 4, 4) poses of the sensor along the drive.
-        frames: (K,) frames that are places or queries, increasing; none if
-            the drive has no role.
-        thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
+    There are N stamps (N,) int64, and poses (N, 4, 4) of the sensor. K frames,
+    increasing, are places or queries, and have reduced scans (see
+    `evaluation.maps.thumbnails`); there are none if the drive has no role.
     """
 
     placed: PlacedDrive
@@ -169,10 +166,8 @@ class SurveyedDrive:
 class KeptScans:
     """The scans of a drive's places and queries.
 
-    Attributes:
-        packed: frame -> coordinates and instances of the points within range,
-            as an .npy file, compressed by zstd.
-        instances: see `Drive.instances`.
+    Each frame has coordinates and instances (see `Drive.instances`) of the
+    points within range, packed as an .npy file, compressed by zstd.
     """
 
     packed: dict[int, bytes] = field(default_factory=dict)
@@ -337,9 +332,8 @@ def survey_recording(
 class Survey(Step):
     """Writes the survey of a drive, or its missing parts.
 
-    Attributes:
-        roles, with_scans, with_map: see `survey_recording`.
-        further: descriptions by a second protocol; none without a role.
+    See `survey_recording`. Further descriptions are by a second protocol; there
+    are none without a role.
     """
 
     source: DriveSource
@@ -369,11 +363,9 @@ class Survey(Step):
         reporter: Reporter,
         missing: Collection[Part] | None = None,
     ) -> RecordingSurvey:
-        """Returns the survey of a drive.
+        """Returns the survey of the source's drive, maybe while that is made.
 
-        Args:
-            drive: that of the source, or the same drive while it is being made.
-            missing: parts that are needed; all by default.
+        The `missing` parts are needed; all by default.
 
         Raises:
             InputError: see `survey_recording`.

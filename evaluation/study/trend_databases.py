@@ -157,10 +157,8 @@ def measure_drives(
 ) -> list[TrendPoint]:
     """Returns the points of drives that need not be recorded.
 
-    Args:
-        sources: name -> opens a drive: a database or a control.
-        controls: database -> the drive on its route through the city of the
-            query; None if there is none.
+    The sources, by name, open databases and controls. A database has a control
+    on its route through the city of the query, or None.
 
     Raises:
         InputError: see `measure_trend`.
@@ -208,12 +206,10 @@ def measure_database(
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
 ) -> list[TrendPoint]:
-    """Returns the points of one database.
+    """Returns the points of one database, in the world of the query.
 
-    Args:
-        source: opens the database, which is in the world of the query.
-        surveyed: the `SurveyedDrive` and the `KeptScans` of the query drive.
-        described: each method's descriptions of the query drive.
+    The query drive is a `SurveyedDrive` and `KeptScans`, and is described by
+    each method.
     """
     running = [method.make() for method in methods]
     database = survey_recording(
