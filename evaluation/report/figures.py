@@ -6,7 +6,7 @@ Boucheny 2009), which shows shape without normals.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
@@ -108,9 +108,7 @@ class Picture:
 
 
 _OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
-_SMALL_OBLIQUE = View(
-    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=1.8
-)
+_SMALL_OBLIQUE = replace(_OBLIQUE, pixels_per_metre=1.8)
 _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 
 
@@ -318,11 +316,8 @@ def _draw_route(axes: Axes, line: np.ndarray) -> None:
         capstyle="round",
     )
     axes.add_collection(segments)
-    for point, marker, label in (
-        (line[0], "^", "start"),
-        (line[-1], "s", "end"),
-    ):
-        axes.plot(*point, marker, color="black", markersize=6, label=label)
+    for end, marker, label in ((0, "^", "start"), (-1, "s", "end")):
+        axes.plot(*line[end], marker, color="black", markersize=6, label=label)
     axes.legend(fontsize=7, loc="upper right", framealpha=0.8)
 
 
@@ -400,16 +395,9 @@ def _shade(depth: np.ndarray) -> np.ndarray:
     padded = np.pad(depth, 1, constant_values=-np.inf)
     height, width = depth.shape
     steps = np.zeros_like(depth)
-    neighbours = [
-        (0, 1),
-        (1, 0),
-        (1, 2),
-        (2, 1),
-        (0, 0),
-        (0, 2),
-        (2, 0),
-        (2, 2),
-    ]
+    sides = [(0, 1), (1, 0), (1, 2), (2, 1)]
+    corners = [(0, 0), (0, 2), (2, 0), (2, 2)]
+    neighbours = sides + corners
     for row, column in neighbours:
         other = padded[row : row + height, column : column + width]
         with np.errstate(invalid="ignore"):

@@ -82,12 +82,10 @@ class MeasuredRung:
 class LadderRow:
     """A method on a rung: means over the draws.
 
-    Attributes:
-        drives: fingerprint of the drives of all draws.
-        unchanged: those on the rung `none` of the same map.
-        auc_interval: 95 % interval of AUC by bootstrap over blocks of the
-            route; a sample has the same ones in each draw.
-        kept: share of the AUC on the rung `none`.
+    `drives` is a fingerprint of those of all draws. The unchanged draws are on
+    the rung `none` of the same map; a share of their AUC is kept. The 95 %
+    interval of AUC is by bootstrap over blocks of the route; a sample has the
+    same ones in each draw.
     """
 
     rung: LadderRung

@@ -39,11 +39,9 @@ def encode(value: object) -> bytes:
     """Returns a value as bytes without code; equal values give equal bytes.
 
     Unpickling can run any code that the bytes name. Here a tree of JSON
-    contains the values, and arrays follow it as NumPy stores them.
-
-    Args:
-        value: None, a number, text, bytes, an array of no objects, or a
-            list, tuple, dict, named tuple or dataclass of such values.
+    contains the values, and arrays follow it as NumPy stores them. A value is
+    None, a number, text, bytes, an array of no objects, or a list, tuple, dict,
+    named tuple or dataclass of such values.
 
     Raises:
         TypeError: if there is anything else in it.

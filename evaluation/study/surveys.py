@@ -221,15 +221,11 @@ class KeptDrive(Drive):
 class RecordingSurvey:
     """A recording's maps, places and queries, which replace its scans.
 
-    Attributes:
-        placed: name and world of the drive.
-        described: method -> its descriptions of the drive; empty if the
-            recording has no role. Those by another protocol are under a
-            `described_key`.
-        scans: those of the places and queries; None unless they are kept.
-            Without maps they are (N, 3) float32, as their role sees them.
-        drive: with its map on the grid of the TCR; None without maps.
-        fine: (K, 3) cloud for pictures, in W [m]; likewise.
+    Each method has its descriptions of the drive, by another protocol under a
+    `described_key`; there are none without a role. The scans of places and
+    queries are None unless kept; without maps they are (N, 3) float32, as their
+    role sees them, and there is neither a surveyed drive nor `fine`, a cloud
+    (K, 3) for pictures, in W [m].
     """
 
     placed: PlacedDrive
@@ -258,12 +254,8 @@ def survey_recording(
     """Maps a recording and describes its places and queries.
 
     Each scan is read once, in order; without a map, only those of places and
-    queries.
-
-    Args:
-        roles: the roles of the drive in place recognition; may be empty.
-        with_scans: whether to keep the scans of places and queries, too.
-        further: descriptions by another protocol; none without a role.
+    queries, which are kept if asked. The drive may have no role; there are then
+    no further descriptions, which are by another protocol.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
