@@ -144,10 +144,7 @@ def show(
 
 
 def overlap_of(truth: str) -> float | None:
-    """Returns the least overlap of a match; None for matches by radius.
-
-    Args:
-        truth: `radius` or `overlap:PART`.
+    """Returns the least overlap, of `overlap:PART`; None for `radius`.
 
     Raises:
         InputError: if it is neither.
@@ -203,11 +200,9 @@ def with_protocol(
 ) -> Callable[..., None]:
     """Gives a command the options of the protocol.
 
-    Args:
-        command: has a keyword `protocol`, a `RetrievalProtocol`, which the
-            options replace on the command line.
-        named: whether `--protocol` says what the rest is; else it is the
-            default.
+    On the command line they replace its keyword `protocol`, a
+    `RetrievalProtocol`. If named, `--protocol` says what the rest is; else it
+    is the default.
     """
     _, *options = shown = _parameters(explained(_protocol))
     if named:
@@ -273,8 +268,7 @@ def _called(
 ) -> Callable[..., None]:
     """Returns a command as another function runs it, with its parameters.
 
-    Args:
-        text: the docstring; that of the command by default.
+    Its docstring is the text; that of the command by default.
     """
 
     @functools.wraps(command)

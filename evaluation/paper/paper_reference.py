@@ -128,10 +128,9 @@ def _judge(
 class Trend:
     """The trend of AUC over TCR_sym of some pairs.
 
-    Attributes:
-        rho: Spearman's rank correlation; NaN if either does not vary.
-        p_value: two-sided, of no correlation.
-        slope: slope of the least-squares line, AUC for 0.1 of TCR_sym.
+    It is Spearman's rank correlation, NaN if either does not vary, with the
+    two-sided p-value of no correlation. The slope is that of the least-squares
+    line, AUC for 0.1 of TCR_sym.
     """
 
     rho: float

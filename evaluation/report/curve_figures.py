@@ -58,9 +58,6 @@ def draw_auc_over_change(
 
     The left panel counts all queries, the next one those with a match. Right of
     them are the reference's values, if there are any.
-
-    Args:
-        reference: published values to draw beside ours.
     """
     methods = in_table_order(result.method for result in results)
     with_reference = any(map(reference.auc_over_change, methods))
@@ -182,11 +179,7 @@ def _draw_line(
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:
-    """Draws the error over the way, and below it the share without a map.
-
-    Args:
-        rows: (K,) of `TRACKED`.
-    """
+    """Draws errors of `TRACKED` rows over the way, and shares without a map."""
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for stretch in np.unique(rows["stretch"]):

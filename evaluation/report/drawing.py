@@ -73,11 +73,8 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
 
     Equal figures give equal bytes: no time of creation, no random ids. The
     page's has no legend of the whole figure: the page writes it below, in
-    letters that can be read on a phone.
-
-    Args:
-        stem: path without ending.
-        kinds: the formats, `LINES` or `PIXELS`.
+    letters that can be read on a phone. The stem is without ending, and the
+    formats are `LINES` or `PIXELS`.
 
     Raises:
         InputError: if a file cannot be written.

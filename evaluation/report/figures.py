@@ -6,7 +6,7 @@ Boucheny 2009), which shows shape without normals.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
@@ -62,11 +62,8 @@ _STEP_LIMIT = 4.0
 class View:
     """An orthographic camera that looks at the ground.
 
-    Attributes:
-        azimuth_deg: direction from the scene to the camera, seen from above
-            [deg].
-        elevation_deg: height of the camera above the horizon, up to 90
-            [deg].
+    The azimuth is the direction from the scene to the camera, seen from above;
+    the elevation is the camera's height above the horizon, up to 90 [deg].
     """
 
     azimuth_deg: float = -60.0
@@ -88,11 +85,9 @@ class View:
 
 @dataclass(frozen=True)
 class Picture:
-    """A rendered cloud.
+    """An image (height, width, 3) uint8 of a cloud, white where it is empty.
 
-    Attributes:
-        image: (height, width, 3) uint8; white where there is no point.
-        origin: coordinates along right and up of the lower left corner [m].
+    The origin is the lower left corner, along right and up [m].
     """
 
     image: np.ndarray
@@ -113,26 +108,18 @@ class Picture:
 
 
 _OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
-_SMALL_OBLIQUE = View(
-    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=1.8
-)
+_SMALL_OBLIQUE = replace(_OBLIQUE, pixels_per_metre=1.8)
 _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 
 
 def judge_points(
     points: np.ndarray, other: np.ndarray, tau: float = TAU
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Applies the two tests of the TCR to the points of a finer map.
+    """Applies the two tests of the TCR to points (N, 3) of a finer map [m].
 
-    Args:
-        points: (N, 3) points in one map, on any grid [m].
-        other: (M, 3) voxel centroids of the other map, M > 0 [m].
-        tau: distance up to which a point has a counterpart [m].
-
-    Returns:
-        (N,) bool, whether there is no counterpart in the other map;
-        (N,) bool, whether the point lies in the other map's hull, so that
-        this counts.
+    `other` holds M > 0 voxel centroids (M, 3) of the other map. Returns, each
+    (N,) bool, whether there is no counterpart in it up to the distance tau [m],
+    and whether the point lies in its hull, so that this counts.
     """
     # A distance beyond the bound only counts as far away, so the search stops
     # there.
@@ -143,9 +130,7 @@ def judge_points(
 def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
     """Returns the surroundings of a route from above, x to the right.
 
-    Args:
-        points: (K, 3) cloud for pictures, in W [m].
-        positions: (N, 3) where the sensor was along the route [m].
+    The cloud (K, 3) and the positions (N, 3) of the sensor are in W [m].
     """
     low, high = positions[:, :2].min(axis=0), positions[:, :2].max(axis=0)
     near = (
@@ -165,12 +150,7 @@ def draw_routes(
     routes: Sequence[np.ndarray],
     stem: Path,
 ) -> None:
-    """Draws the routes of a city over their maps, red to blue, from above.
-
-    Args:
-        views: N surroundings of the routes from above.
-        routes: N arrays (M, 3) of where the sensor was [m].
-    """
+    """Draws routes (M, 3) [m] over views from above, red to blue."""
     _draw_panels(
         [f"{map_name} {stage}" for stage in stages],
         views,
@@ -196,10 +176,8 @@ def draw_change(
     the TCR does not count the point. The second shows the sets H and O in both
     orders and united; a point has the colour of its voxel.
 
-    Args:
-        clouds: (K, 3) for pictures, of the earlier and the later stage, in W
-            [m].
-        maps: their maps on the grid of the TCR.
+    The clouds (K, 3) in W [m], and the maps on the grid of the TCR, are those
+    of the earlier and of the later stage.
     """
     titles, pictures = [], []
     for one, other in ((0, 1), (1, 0)):
@@ -215,17 +193,10 @@ def draw_change(
 
 
 def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
-    """Returns the voxel of their map in which each point lies.
+    """Returns the voxel of their map in which each point (N, 3) [m] lies.
 
     By a rounding error a point on a border may have been counted on its other
     side. The occupied voxel with the nearest centre is taken therefore.
-
-    Args:
-        points: (N, 3) points that made the map [m].
-        coarse: their map.
-
-    Returns:
-        (N,) index into the coarse map.
     """
     owners = coarse.find(points)
     elsewhere = np.flatnonzero(owners < 0)
@@ -345,23 +316,17 @@ def _draw_route(axes: Axes, line: np.ndarray) -> None:
         capstyle="round",
     )
     axes.add_collection(segments)
-    for point, marker, label in (
-        (line[0], "^", "start"),
-        (line[-1], "s", "end"),
-    ):
-        axes.plot(*point, marker, color="black", markersize=6, label=label)
+    for end, marker, label in ((0, "^", "start"), (-1, "s", "end")):
+        axes.plot(*line[end], marker, color="black", markersize=6, label=label)
     axes.legend(fontsize=7, loc="upper right", framealpha=0.8)
 
 
 def render(
     points: np.ndarray, rgb: np.ndarray, view: View, size_px: int = 3
 ) -> Picture:
-    """Draws a cloud.
+    """Draws a cloud, N > 0 points (N, 3) in W [m], with colours (N, 3) uint8.
 
-    Args:
-        points: (N, 3) in W [m], N > 0.
-        rgb: (N, 3) uint8 colour of each.
-        size_px: side of the square that a point covers.
+    Each point covers a square with sides of `size_px`.
     """
     seen = points @ view.axes().T
     # One column at a time: a minimum over rows takes many times as long.
@@ -394,12 +359,9 @@ def render(
 def shade_by_height(
     rgb: np.ndarray, heights: np.ndarray, darkest: float = 0.75
 ) -> np.ndarray:
-    """Returns colours that are darker the lower their points are.
+    """Returns colours (N, 3) uint8 that are darker the lower their points are.
 
-    Args:
-        rgb: (N, 3) uint8.
-        heights: (N,) [m].
-        darkest: factor at the lowest point.
+    `darkest` is the factor at the lowest of the heights (N,) [m].
     """
     factor = darkest + (1.0 - darkest) * _height_parts(heights)
     return (rgb * factor[:, None]).astype(np.uint8)
@@ -433,16 +395,9 @@ def _shade(depth: np.ndarray) -> np.ndarray:
     padded = np.pad(depth, 1, constant_values=-np.inf)
     height, width = depth.shape
     steps = np.zeros_like(depth)
-    neighbours = [
-        (0, 1),
-        (1, 0),
-        (1, 2),
-        (2, 1),
-        (0, 0),
-        (0, 2),
-        (2, 0),
-        (2, 2),
-    ]
+    sides = [(0, 1), (1, 0), (1, 2), (2, 1)]
+    corners = [(0, 0), (0, 2), (2, 0), (2, 2)]
+    neighbours = sides + corners
     for row, column in neighbours:
         other = padded[row : row + height, column : column + width]
         with np.errstate(invalid="ignore"):

@@ -54,10 +54,9 @@ _TITLES = {False: "without the gate", True: "with the gate"}
 class LadderRung:
     """The change between two drives.
 
-    Attributes:
-        cause: what changes; `none` without a change.
-        level: its strength, from 1 to 4; 0 without a change.
-        radius: greatest distance of a match [m]; NaN where places do not match.
+    Levels are 1 to 4; without a change the level is 0 and the cause `none`. The
+    radius is the greatest distance of a match [m]; NaN where places do not
+    match.
     """
 
     map_name: str
@@ -71,11 +70,7 @@ class LadderRung:
 
 @dataclass(frozen=True)
 class MeasuredRung:
-    """The outcomes of all methods on a rung, with one random draw.
-
-    Attributes:
-        outcomes: one for each method, without and with the gate.
-    """
+    """All methods, without and with the gate, on a rung, with one draw."""
 
     rung: LadderRung
     seed: int
@@ -87,12 +82,10 @@ class MeasuredRung:
 class LadderRow:
     """A method on a rung: means over the draws.
 
-    Attributes:
-        drives: fingerprint of the drives of all draws.
-        unchanged: those on the rung `none` of the same map.
-        auc_interval: 95 % interval of AUC by bootstrap over blocks of the
-            route; a sample has the same ones in each draw.
-        kept: share of the AUC on the rung `none`.
+    `drives` is a fingerprint of those of all draws. The unchanged draws are on
+    the rung `none` of the same map; a share of their AUC is kept. The 95 %
+    interval of AUC is by bootstrap over blocks of the route; a sample has the
+    same ones in each draw.
     """
 
     rung: LadderRung
@@ -139,11 +132,7 @@ class LadderRow:
 
 
 def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
-    """Returns a row for each rung, method and gate.
-
-    Args:
-        measured: rungs of all maps; the rung `none` of a map comes first.
-    """
+    """Returns a row for each rung, method and gate; `none` is a map's first."""
     groups: dict[tuple[LadderRung, str, bool], list[RungOutcome]] = {}
     drives: dict[LadderRung, list[str]] = {}
     for one in measured:
@@ -218,11 +207,7 @@ RUNG_COLUMNS: Columns[Any] = {
 
 
 def _keys(path: str = "") -> Columns[Any]:
-    """Returns the first columns.
-
-    Args:
-        path: attributes that lead from an item to its method and gate.
-    """
+    """Returns the first columns; the path leads to method and gate."""
     return {
         **RUNG_COLUMNS,
         "method": attrgetter(f"{path}method"),
@@ -289,8 +274,7 @@ def ladder_table(
 ) -> Table:
     """Returns one row for each rung, method and gate.
 
-    Args:
-        viewpoint: name of the database's place beside the queries.
+    The viewpoint names the place of the database beside the queries.
     """
     options: Columns[LadderRow] = keyed(
         {name: name for name in _OPTIONS},
@@ -328,10 +312,9 @@ def strongest_causes(rows: Sequence[LadderRow]) -> list[str]:
 class CrossedRow:
     """A method under two causes at once, and under each alone.
 
-    Attributes:
-        excess: what the two cost together beyond the product of what each
-            leaves, as a share of the AUC on the rung `none`.
-        interval: its 95 % interval, of the same samples of queries.
+    The excess is what the two cost together beyond the product of what each
+    leaves, as a share of the AUC on the rung `none`. Its 95 % interval is from
+    the same samples of queries.
     """
 
     pair: LadderRow
@@ -348,11 +331,7 @@ class CrossedRow:
 def crossed_rows(
     rows: Sequence[LadderRow], pairs: Iterable[LadderRow]
 ) -> list[CrossedRow]:
-    """Compares pairs of causes with each cause alone.
-
-    Args:
-        pairs: rows with two, whose names are joined by "+".
-    """
+    """Compares pairs of causes, with names joined by "+", with each alone."""
     strongest = _strongest(rows)
     found = []
     for pair in pairs:
@@ -562,11 +541,8 @@ def _percent(share: float) -> str:
 class CauseCell(NamedTuple):
     """One level of a cell of a figure of methods over causes.
 
-    Attributes:
-        map_name: its line of panels.
-        title: which of the two panels there.
-        share: the colour, from 0 to 1; NaN for none.
-        label: the number of the strongest level.
+    Each map has a line of two panels with different titles. The share, from 0
+    to 1 or NaN for none, is the colour; the strongest level's label is shown.
     """
 
     map_name: str
@@ -603,10 +579,6 @@ def draw_cells(cells: Sequence[CauseCell], meaning: str, stem: Path) -> None:
 
     A cell has a strip for each level, the weakest at its left; the number is
     that of the strongest level.
-
-    Args:
-        meaning: of the colours.
-        stem: path to write, without ending.
     """
     maps = list(dict.fromkeys(cell.map_name for cell in cells))
     titles = dict.fromkeys(cell.title for cell in cells)

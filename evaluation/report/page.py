@@ -14,12 +14,7 @@ import json
 from pathlib import Path
 from urllib.parse import quote
 
-from jinja2 import (
-    Environment,
-    PackageLoader,
-    StrictUndefined,
-    select_autoescape,
-)
+import jinja2
 from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
@@ -355,13 +350,13 @@ def _read_asset(name: str) -> Markup:
 
 
 @functools.cache
-def _environment() -> Environment:
-    found = Environment(
-        loader=PackageLoader(__package__, _TEMPLATES),
-        autoescape=select_autoescape(["html", "svg"]),
+def _environment() -> jinja2.Environment:
+    found = jinja2.Environment(
+        loader=jinja2.PackageLoader(__package__, _TEMPLATES),
+        autoescape=jinja2.select_autoescape(["html", "svg"]),
         trim_blocks=True,
         lstrip_blocks=True,
-        undefined=StrictUndefined,
+        undefined=jinja2.StrictUndefined,
     )
     found.filters |= {
         "captioned": _captioned,

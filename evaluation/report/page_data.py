@@ -85,10 +85,8 @@ def make_drive(
 ) -> PageDrive:
     """Returns a drive as the page shows it.
 
-    Args:
-        X_WS: (N, 4, 4) poses of the sensor at all frames.
-        frames: K of these that are places or queries.
-        thumbnails: K reduced scans.
+    X_WS (N, 4, 4) are the poses of the sensor at all frames. K of the frames
+    are places or queries, with K reduced scans.
     """
     positions = X_WS[:, :3, 3]
     stream = io.BytesIO()
@@ -117,13 +115,8 @@ def browser_data(
     """Returns what the query browser reads, ready for JSON.
 
     The maps from above are not included; the browser takes them from the
-    pictures that `evaluation.report.page.route_picture` makes.
-
-    Args:
-        pages: drive -> address of the page of its recording; drives without a
-            page may be left out.
-        evidence: (database, query) -> evidence of why best places are wrong;
-            pairs may be left out.
+    pictures that `evaluation.report.page.route_picture` makes. Drives without a
+    page, and pairs (database, query) without evidence, may be left out.
     """
     pairs: dict[tuple, list[RecognitionResult]] = {}
     for result in recognitions:

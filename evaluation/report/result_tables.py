@@ -169,11 +169,8 @@ def recognition_table(
 ) -> Table:
     """Returns Table II: a row for each pair, some columns for each method.
 
-    F1 is only in the form that is compared with the reference.
-
-    Args:
-        mode: mode in which methods are counted; None for the mode that the
-            reference used for each.
+    F1 is only in the form that is compared with the reference. Without a mode,
+    each method is counted in that which the reference used for it.
 
     Raises:
         InputError: results of two protocols.
@@ -320,11 +317,9 @@ def metric_numbers(results: Sequence[RecognitionResult]) -> Table:
 
 
 class MethodDifference(NamedTuple):
-    """Two results of a pair, with the difference of their AUC.
+    """Two results of a pair, and the AUC of the first less the second.
 
-    Attributes:
-        difference: the first less the second.
-        p_value: corrected for the number of all differences; NaN if unknown.
+    The p-value is corrected for the number of all differences; NaN if unknown.
     """
 
     result: RecognitionResult
@@ -542,12 +537,7 @@ def cost_numbers(costs: Sequence[Cost]) -> Table:
 
 @dataclass(frozen=True)
 class DriveTrack:
-    """Times and poses of the sensor.
-
-    Attributes:
-        stamps_ns: (N,) int64 of all frames.
-        X_WS: (N, 4, 4) poses there.
-    """
+    """Times (N,) int64 of all frames, and poses (N, 4, 4) of the sensor."""
 
     stamps_ns: np.ndarray
     X_WS: np.ndarray
@@ -555,12 +545,8 @@ class DriveTrack:
     def moments(self, frames: np.ndarray) -> list[np.ndarray]:
         """Returns frame, stamp, position and quaternion of the sensor.
 
-        Args:
-            frames: (Q,) indices of frames; those below 0 are missing.
-
-        Returns:
-            9 arrays (Q,) of objects, one for each name in `_MOMENT`; None
-            where a frame is missing.
+        They are 9 arrays (Q,) of objects, one for each name in `_MOMENT`; None
+        where a frame (Q,) is missing, which is then below 0.
         """
         X_WS = self.X_WS[frames]
         quats_xyzw = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat()
@@ -575,13 +561,10 @@ class DriveTrack:
 
 
 class _Queries(NamedTuple):
-    """The queries of a result.
+    """The queries of a result, for a pair: map, database and query.
 
-    Attributes:
-        pair: map, database and query.
-        query, match: moments of the queries, and of their best places.
-        distances: to the best places [m]; NaN without one.
-        evidence: for the pair; None if there is none.
+    `query` and `match` are moments of the queries, and of their best places;
+    the distances to these are NaN without one [m].
     """
 
     pair: tuple[str, str, str]
@@ -647,10 +630,8 @@ def query_table(
 ) -> Table:
     """Returns a row for each pair, method and query, in the queries' order.
 
-    Args:
-        tracks: drive -> its track, for all drives.
-        evidence: why best places are wrong; its columns are empty for pairs
-            without it.
+    All drives have a track. The columns of the evidence are empty for pairs
+    without it.
     """
 
     def queries() -> Iterator[_Queries]:

@@ -167,14 +167,9 @@ def draw_survival(
     """Draws AUC without and with the change, for each pair and method.
 
     A hollow marker is AUC without the change, a full one AUC with it; the kept
-    share stands beside them. Pairs without a control are left out. Where
-    some methods of a pair are beaten, the names of the others are bold.
-
-    Args:
-        survivals: one for each pair and method; at least one has a
-            control.
-        beaten: pair and name of methods that another beats with the change,
-            beyond doubt.
+    share stands beside them. At least one pair has a control; those without are
+    left out. Where others beat some methods of a pair with the change, beyond
+    doubt, the names of the rest are bold.
     """
     groups = by_pair([one for one in survivals if one.unchanged is not None])
     rows = sum(_TITLE_ROWS + len(group) for group in groups.values())

@@ -69,11 +69,8 @@ _MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
 class Cell:
     """A number that is ranked in its row, with the paper's number beside it.
 
-    Attributes:
-        value: our number; None or NaN if there is none.
-        printed: the paper's number; None if there is none.
-        rank: 1 for the best number in its row, 2 for the second, None for
-            others.
+    Without a number, ours is None or NaN and the paper's None. The rank is 1
+    for the best in the row, 2 for the second, None for others.
     """
 
     value: float | None
@@ -254,12 +251,7 @@ def keyed(
     keys: Mapping[str | tuple[str, str], _Key],
     value: Callable[[_Item, _Key], object],
 ) -> Columns[_Item]:
-    """Returns a column for each key.
-
-    Args:
-        keys: name of a column -> its key.
-        value: returns what a column shows, from an item and the key.
-    """
+    """Returns a column for each key; its value is of an item and the key."""
 
     def column(key: _Key) -> Callable[[_Item], object]:
         return lambda item: value(item, key)
@@ -268,11 +260,7 @@ def keyed(
 
 
 def protocol_columns(path: str) -> Columns[Any]:
-    """Returns columns for the options of an item's protocol, then its name.
-
-    Args:
-        path: attributes that lead from the item to its protocol.
-    """
+    """Returns columns of the protocol at a path of attributes, name last."""
     columns = keyed(
         {name: name for name in PROTOCOL_COLUMNS},
         lambda item, name: attrgetter(f"{path}.{name}")(item),
@@ -346,10 +334,8 @@ def _escape_latex(text: str) -> str:
 class _Form(NamedTuple):
     """How a markup language writes the values of a table.
 
-    Attributes:
-        escape: returns text that is shown unchanged.
-        marks: formats of the best and the second value in a row.
-        printed: format of our value with the paper's.
+    `marks` are formats of the best and the second value in a row, `printed`
+    that of our value with the paper's.
     """
 
     escape: Callable[[str], str]

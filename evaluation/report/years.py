@@ -32,14 +32,11 @@ UNCHANGED_TASK = "unchanged"
 class AgedPair:
     """The outcomes of all methods, with some years between the drives.
 
-    Attributes:
-        year: years between database and query; 0 without.
-        direction: `FORWARD` or `BACKWARD`.
-        tcr_sym: change of the city along the query's way; NaN if unknown.
-        outcomes: one for each method, without and with the gate.
-        further: (task, method) -> value, and how many count: the share of the
-            queries that end right in the map of the database; mean IoU; or the
-            share of the points of both maps that are neither gone nor new.
+    They are without and with the gate. The direction is `FORWARD` or
+    `BACKWARD`, and TCR_sym that along the query's way; NaN if unknown. For each
+    (task, method), `further` has a value and how many count: the share of the
+    queries that end right in the map of the database; mean IoU; or the share of
+    the points of both maps that are neither gone nor new.
     """
 
     map_name: str
@@ -177,12 +174,7 @@ def lifetime(
 ) -> float:
     """Returns the years until a share is left; infinite if more is left.
 
-    Between two years the share falls evenly.
-
-    Args:
-        years: ascending, from 0 on.
-        kept: shares then, 1 at 0.
-        left: the share that is left.
+    The years ascend from 0, where the share is 1. Between two it falls evenly.
     """
     for k in range(1, len(years)):
         if kept[k] <= left:

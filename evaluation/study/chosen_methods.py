@@ -25,10 +25,8 @@ _FORM = "METHOD.NAME=VALUE"
 class MethodChoice:
     """A method that any process can make.
 
-    Attributes:
-        file: the Python file that registers it; None for a method of this
-            package.
-        settings: name and value of parameters; the others have their defaults.
+    A file registers it if it is not of this package. Parameters without a
+    setting have their defaults.
     """
 
     name: str
@@ -64,10 +62,7 @@ class MethodChoice:
 
 
 def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
-    """Returns name and value of a setting, the text after `--set`.
-
-    Args:
-        text: the setting; commas separate several values.
+    """Returns name and value of a setting; commas separate several values.
 
     Raises:
         InputError: if it has no name or no equals sign.

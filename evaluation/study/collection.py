@@ -23,11 +23,9 @@ _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 class RecordingInfo:
     """A recording that exists or will be made, and its place in a study.
 
-    Attributes:
-        path: its file or folder, which may not exist yet.
-        stage: the stage of the city's life; stages sort by name.
-        way: where the drive leads (see `driven_way`); None if it is unknown.
-        made_by: opens the drive if it is not read from `path`.
+    Stages of the city's life sort by name. Where the drive leads is its way
+    (see `driven_way`); None if unknown. It is read from the path, a file or
+    folder, unless `made_by` opens it.
     """
 
     name: str
@@ -56,8 +54,7 @@ Pair = tuple[RecordingInfo, RecordingInfo]
 class Repetition:
     """A method on a pair by the protocol of published numbers.
 
-    Attributes:
-        shares_places: whether the study's own protocol describes places alike.
+    Places are shared if the study's own protocol describes them alike.
     """
 
     method: MethodChoice
@@ -79,11 +76,8 @@ class Repetition:
 class City:
     """The drives through one map.
 
-    Attributes:
-        stages: one recording a stage, by stage: `<map>_<stage>`.
-        others: further drives through one of the stages, which may serve as
-            controls.
-        reference: names the pairs that are compared both ways.
+    Each stage has one recording, `<map>_<stage>`; others may be controls. The
+    reference names the pairs that are compared both ways.
     """
 
     name: str
@@ -100,10 +94,8 @@ class City:
         """Returns pairs of database and query.
 
         Every earlier stage is a database for the last one. The last one is a
-        database too if the reference has such a pair.
-
-        Args:
-            with_itself: also each stage with itself, for loop closure.
+        database too if the reference has such a pair, and each stage its own
+        for loop closure (`with_itself`).
         """
         pairs = []
         for earlier, last in self.change_pairs():

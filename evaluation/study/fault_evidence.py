@@ -46,9 +46,7 @@ def explain_faults(
 ) -> PairEvidence | None:
     """Returns the evidence of two drives; None if a drive closes no loop.
 
-    Args:
-        surveyed: the `SurveyedDrive` and the `KeptScans` of the database, and
-            of the query.
+    The database and the query are each a `SurveyedDrive` and `KeptScans`.
     """
     found = []
     for choice, part in zip(methods, results, strict=True):
@@ -144,13 +142,10 @@ def _wrong_places(result: RecognitionResult) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """A scan.
+    """A scan (N, 3) in the frame of the sensor [m], and its pose (4, 4).
 
-    Attributes:
-        X_WS: (4, 4) of its sensor.
-        points: (N, 3) in the frame of the sensor [m].
-        instances: (N,) of the structures that they lie on; None where the
-            recording does not say.
+    The points lie on structures, the instances (N,); these are None where the
+    recording does not say.
     """
 
     X_WS: np.ndarray
@@ -188,10 +183,9 @@ class _Shown:
         return cKDTree(self.standing, balanced_tree=False, compact_nodes=False)
 
     def coinciding(self, points: np.ndarray) -> float:
-        """Returns the part of points (N, 3) that coincide with standing ones.
+        """Returns the part of points that coincide with standing ones.
 
-        Args:
-            points: in the frame of the sensor [m], N > 0.
+        There are N > 0 points (N, 3) in the frame of the sensor [m].
         """
         found, _ = self.tree.query(points, distance_upper_bound=_COINCIDENT)
         return float(np.isfinite(found).mean())

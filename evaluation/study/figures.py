@@ -22,9 +22,7 @@ def draw_city(
 ) -> dict[str, PageDrive]:
     """Draws the routes of a city; returns its drives for the page, by name.
 
-    Args:
-        stages: the name of each, and its drive's `SurveyedDrive` and cloud.
-        stem: path of the figure, without ending.
+    Each stage is a name, and the `SurveyedDrive` and the cloud of its drive.
     """
     names, views, routes, drives = [], [], [], {}
     for done, (name, surveyed, fine) in enumerate(stages):
@@ -51,10 +49,7 @@ def draw_changes(
 ) -> None:
     """Draws what changed between two stages, and the sets of the TCR.
 
-    Args:
-        drives: `SurveyedDrive` and cloud of the earlier drive, and of the later
-            one.
-        stems: paths of the two figures, without endings.
+    Each drive is a `SurveyedDrive` and a cloud; the earlier one comes first.
     """
     del reporter
     earlier, later = drives
@@ -151,11 +146,7 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
 
 
 def auc_illustration(folder: Path, beside: str = "") -> Illustration:
-    """Returns the figure of all cities together.
-
-    Args:
-        beside: title of the reference in the figure; empty for none.
-    """
+    """Returns the figure of all cities, beside a reference if it is named."""
     others = f", and of {beside}" if beside else ""
     return Illustration(
         folder / "auc_over_tcr",

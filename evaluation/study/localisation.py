@@ -31,12 +31,7 @@ SHIPPED = tuple(
 
 @dataclass(frozen=True)
 class ComparedPair:
-    """Two drives that are compared.
-
-    Attributes:
-        rung: the change between them; the drive of the map is the database.
-        sources: open both drives.
-    """
+    """Two drives that are compared; that of the map is the database."""
 
     rung: ladder.LadderRung
     sources: tuple[Callable[[], Drive], Callable[[], Drive]]
@@ -67,12 +62,8 @@ def localise_pairs(
     Writes `localisation.csv`, a row for each pair, method and start,
     `localisation_queries.csv`, one for each query of them, and a figure: the
     share of right ends, and the median error at the strongest level [cm].
-    Finished pairs are not repeated.
-
-    Args:
-        pairs: in a map, the first is the one without a change.
-        methods: see `make_estimator`.
-        spacing: between two queries [m].
+    Finished pairs are not repeated. In a map, the first pair is the one without
+    a change; queries have a spacing [m]. For methods see `make_estimator`.
 
     Returns:
         The path of `localisation.csv`.
@@ -154,11 +145,9 @@ def measure_pairs(
 ) -> list[Any]:
     """Returns what a function finds for each pair, once it is measured.
 
-    Args:
-        output: the folder for everything; it is made.
-        function: takes a `Reporter`, the sources of a pair, and the arguments.
-        arguments: further ones, see `MakePart`.
-        kind: see `StudyFiles.part`.
+    The function takes a `Reporter`, the sources of a pair, and the arguments
+    (see `MakePart`). Everything is in the output folder, which is made; for
+    kinds see `StudyFiles.part`.
 
     Raises:
         InputError: the folder cannot be made, or a step failed.
@@ -188,12 +177,9 @@ def measure_localisation(
 ) -> list[np.ndarray]:
     """Localises the queries of a pair of drives in one world.
 
-    Each scan is read once, since a drive may be made while it is read.
-
-    Args:
-        methods: names, or Python files.
-        texts: the content of these files, which makes them other inputs.
-        spacing: between two queries [m].
+    Each scan is read once, since a drive may be made while it is read. Methods
+    are names, or Python files, whose texts make them other inputs. The spacing
+    is between two queries [m].
 
     Returns:
         (K,) of `QUERY` for each method and start, the starts of a method side

@@ -30,9 +30,7 @@ def measure_change(
 ) -> ChangeResult:
     """Returns the change between two drives; they must be of one world.
 
-    Args:
-        drives: the `SurveyedDrive` of the earlier drive, of the later one, and
-            of their control if there is one.
+    The earlier, the later and maybe a control are each a `SurveyedDrive`.
     """
     del reporter
     read: list[SurveyedDrive] = [part.read() for part in drives]
@@ -83,9 +81,7 @@ def measure_costs(
 ) -> list[Cost]:
     """Returns the cost of each method, measured on one core.
 
-    Args:
-        described: each method's descriptions of a database, and of the query
-            drive.
+    Each method described a database and the query drive.
     """
     drive, known = source(), surveyed.read()
     # A recording would be unpacked as a whole for its poses.

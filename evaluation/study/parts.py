@@ -39,11 +39,9 @@ def encode(value: object) -> bytes:
     """Returns a value as bytes without code; equal values give equal bytes.
 
     Unpickling can run any code that the bytes name. Here a tree of JSON
-    contains the values, and arrays follow it as NumPy stores them.
-
-    Args:
-        value: None, a number, text, bytes, an array of no objects, or a
-            list, tuple, dict, named tuple or dataclass of such values.
+    contains the values, and arrays follow it as NumPy stores them. A value is
+    None, a number, text, bytes, an array of no objects, or a list, tuple, dict,
+    named tuple or dataclass of such values.
 
     Raises:
         TypeError: if there is anything else in it.
@@ -202,8 +200,7 @@ class Part:
     def write(self, inputs: Mapping, value: object) -> None:
         """Writes the part; its folder is made if needed.
 
-        Args:
-            inputs: all that the value depends on, ready for JSON.
+        The inputs are all that the value depends on, ready for JSON.
 
         Raises:
             InputError: if it cannot be kept or written.
@@ -373,11 +370,7 @@ class RecognitionFiles:
     folder: Path
 
     def result(self, key: str) -> Part:
-        """Returns the part with the `RecognitionResult` of a method.
-
-        Args:
-            key: the name of the method, or a `described_key`.
-        """
+        """Returns the part with the result of a method or a `described_key`."""
         return Part(self.folder / f"{file_name(key)}.data")
 
     @property
@@ -408,10 +401,6 @@ class StudyFiles:
         return RecognitionFiles(self.output / "parts" / "recognition" / name)
 
     def part(self, kind: str, *names: str) -> Part:
-        """Returns the part with a result of a kind, such as `changes`.
-
-        Args:
-            names: what it is of: drives, a rung, a figure.
-        """
+        """Returns the part of a kind (`changes`), named by drives or a rung."""
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")

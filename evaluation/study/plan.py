@@ -44,14 +44,10 @@ _RECOGNITION_COST = 2.0
 class Study:
     """The comparison of recordings, which need not exist yet.
 
-    Attributes:
-        recordings: each may be made by the jobs that it needs; drives of
-            one map that share stage and route with others serve as same-stage
-            controls.
-        methods: by default those of this package.
-        with_costs: whether to measure the costs of the methods, too, after all
-            other jobs.
-        reference: published numbers beside those of the report.
+    Each may be made by the jobs that it needs; drives of one map that share
+    stage and route with others serve as same-stage controls. The methods are by
+    default those of this package; their costs, if wanted, are measured after
+    all other jobs. The reference has published numbers beside ours.
     """
 
     recordings: Sequence[RecordingInfo]
@@ -276,9 +272,8 @@ class Study:
     ) -> Job:
         """Returns the job of a pair.
 
-        Args:
-            explains: whether it also finds why best places are wrong, and
-                repeats what is compared with published numbers.
+        If it explains, it also finds why best places are wrong, and repeats
+        what is compared with published numbers.
         """
         database, query = pair
         surveys = [self._files.survey(one.name) for one in pair]
@@ -328,17 +323,11 @@ class Study:
             (places.described(one.name), queries.described(one.name))
             for one in self.methods
         )
-        arguments = (
-            pair[1].source,
-            queries.drive,
-            self.methods,
-            described,
-            self.protocol,
-        )
+        source, drive = pair[1].source, queries.drive
         step = MakePart(
             self._files.part("costs", "costs"),
             measurements.measure_costs,
-            arguments,
+            (source, drive, self.methods, described, self.protocol),
         )
         return Job("costs of the methods", step, needs, _DRAWING_COST)
 

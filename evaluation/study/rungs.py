@@ -47,11 +47,8 @@ def measure_rung(
 ) -> list[RungOutcome]:
     """Returns the outcomes of a rung, two for each method.
 
-    Args:
-        database, query: the drives, in one world.
-        distractors: descriptions of drives through other cities, whose places
-            are added to the database.
-        num_distractors: number of these places.
+    The drives are in one world. A number of places of distractors, described
+    drives through other cities, is added to the database.
     """
     place_scans, places = _describe(
         database, "places", methods, protocol, reporter
@@ -121,11 +118,9 @@ def joined_places(
 ) -> description.DescribedScans:
     """Returns the places of a drive together with places of others.
 
-    Args:
-        drives: the first is that of the query's world. The others are moved so
-            far away that none of their places is a match.
-        num_others: greatest number of places of the others, from the first one
-            on.
+    The first drive is that of the query's world. The others are moved so far
+    away that none of their places is a match. They add `num_others` places at
+    most, from the first one on.
     """
     first, *others = drives
     poses = [first.X_WS]
@@ -147,12 +142,9 @@ def joined_places(
 class SizePoint:
     """A method in a database with places of other cities.
 
-    Times are of the processor.
-
-    Attributes:
-        auc: without the gate; NaN if all queries would take over an hour.
-        query_ms: of one query, the median of some [ms].
-        build_ms: to build the database from descriptions [ms].
+    Times are of the processor [ms]: the median of some queries, and for the
+    database from descriptions. The AUC is without the gate; NaN if all queries
+    would take over an hour.
     """
 
     method: str
@@ -174,11 +166,9 @@ def measure_size(
     choice: MethodChoice,
     protocol: RetrievalProtocol,
 ) -> SizePoint:
-    """Returns the point of a method.
+    """Returns the point of a method that described these drives.
 
-    Args:
-        database, query: the method's descriptions of both drives.
-        distractors: likewise of drives through other cities.
+    The distractors lead through other cities.
     """
     method = choice.make()
     (_, mapped), (_, asked) = database.read(), query.read()

@@ -140,12 +140,9 @@ class RecordedDrive:
 class SurveyedDrive:
     """A drive with its map on the grid of the TCR.
 
-    Attributes:
-        stamps_ns: (N,) int64 of its frames.
-        X_WS: (N, 4, 4) poses of the sensor along the drive.
-        frames: (K,) frames that are places or queries, increasing; none if
-            the drive has no role.
-        thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
+    There are N stamps (N,) int64, and poses (N, 4, 4) of the sensor. K frames,
+    increasing, are places or queries, and have reduced scans (see
+    `evaluation.maps.thumbnails`); there are none if the drive has no role.
     """
 
     placed: PlacedDrive
@@ -169,10 +166,8 @@ class SurveyedDrive:
 class KeptScans:
     """The scans of a drive's places and queries.
 
-    Attributes:
-        packed: frame -> coordinates and instances of the points within range,
-            as an .npy file, compressed by zstd.
-        instances: see `Drive.instances`.
+    Each frame has coordinates and instances (see `Drive.instances`) of the
+    points within range, packed as an .npy file, compressed by zstd.
     """
 
     packed: dict[int, bytes] = field(default_factory=dict)
@@ -226,15 +221,11 @@ class KeptDrive(Drive):
 class RecordingSurvey:
     """A recording's maps, places and queries, which replace its scans.
 
-    Attributes:
-        placed: name and world of the drive.
-        described: method -> its descriptions of the drive; empty if the
-            recording has no role. Those by another protocol are under a
-            `described_key`.
-        scans: those of the places and queries; None unless they are kept.
-            Without maps they are (N, 3) float32, as their role sees them.
-        drive: with its map on the grid of the TCR; None without maps.
-        fine: (K, 3) cloud for pictures, in W [m]; likewise.
+    Each method has its descriptions of the drive, by another protocol under a
+    `described_key`; there are none without a role. The scans of places and
+    queries are None unless kept; without maps they are (N, 3) float32, as their
+    role sees them, and there is neither a surveyed drive nor `fine`, a cloud
+    (K, 3) for pictures, in W [m].
     """
 
     placed: PlacedDrive
@@ -263,12 +254,8 @@ def survey_recording(
     """Maps a recording and describes its places and queries.
 
     Each scan is read once, in order; without a map, only those of places and
-    queries.
-
-    Args:
-        roles: the roles of the drive in place recognition; may be empty.
-        with_scans: whether to keep the scans of places and queries, too.
-        further: descriptions by another protocol; none without a role.
+    queries, which are kept if asked. The drive may have no role; there are then
+    no further descriptions, which are by another protocol.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
@@ -337,9 +324,8 @@ def survey_recording(
 class Survey(Step):
     """Writes the survey of a drive, or its missing parts.
 
-    Attributes:
-        roles, with_scans, with_map: see `survey_recording`.
-        further: descriptions by a second protocol; none without a role.
+    See `survey_recording`. Further descriptions are by a second protocol; there
+    are none without a role.
     """
 
     source: DriveSource
@@ -369,11 +355,9 @@ class Survey(Step):
         reporter: Reporter,
         missing: Collection[Part] | None = None,
     ) -> RecordingSurvey:
-        """Returns the survey of a drive.
+        """Returns the survey of the source's drive, maybe while that is made.
 
-        Args:
-            drive: that of the source, or the same drive while it is being made.
-            missing: parts that are needed; all by default.
+        The `missing` parts are needed; all by default.
 
         Raises:
             InputError: see `survey_recording`.

@@ -222,14 +222,10 @@ def _draw_panel(
 
 
 def smooth(x: np.ndarray, y: np.ndarray, grid: np.ndarray) -> np.ndarray:
-    """Returns the local linear regression of y over x at places.
+    """Returns the local linear regression of y over x at places (M,).
 
-    Gaussian weights; Fan and Gijbels, Local Polynomial Modelling (1996),
-    equation 3.1 with p = 1.
-
-    Args:
-        x, y: (N,) points; x not all equal.
-        grid: (M,) places.
+    Not all x are equal. Gaussian weights; Fan and Gijbels, Local Polynomial
+    Modelling (1996), equation 3.1 with p = 1.
     """
     width = _BANDWIDTH * max(np.ptp(grid), 1e-12)
     offset = x[None, :] - grid[:, None]

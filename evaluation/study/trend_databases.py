@@ -26,16 +26,9 @@ from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.retrieval import compare as score
+from evaluation.study import surveys
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.parts import MakePart, Part, StudyFiles
-from evaluation.study.surveys import (
-    DriveSource,
-    KeptDrive,
-    KeptScans,
-    RecordedDrive,
-    Survey,
-    survey_recording,
-)
 
 
 @dataclass(frozen=True)
@@ -93,11 +86,9 @@ def measure_trend(
 
     Results of an earlier run, finished or not, are used if they belong to the
     same recordings and methods. Only the points of a database are kept, because
-    the surveys of many would fill a disk.
-
-    Args:
-        controls: drives on the routes of databases, but in the stage of the
-            query; each serves the databases whose route it has.
+    the surveys of many would fill a disk. Controls are drives on the routes of
+    databases, but in the stage of the query; each serves the databases whose
+    route it has.
 
     Raises:
         InputError: a recording cannot be read, two have one name, a control
@@ -132,9 +123,9 @@ def measure_trend(
             raise InputError(f"--control: {path}: no database has its route")
     return measure_drives(
         query_drive.name,
-        RecordedDrive(query.absolute(), lidar),
+        surveys.RecordedDrive(query.absolute(), lidar),
         {
-            drive.name: RecordedDrive(path.absolute(), lidar)
+            drive.name: surveys.RecordedDrive(path.absolute(), lidar)
             for path, drive in opened.items()
         },
         serving,
@@ -147,8 +138,8 @@ def measure_trend(
 
 def measure_drives(
     query_name: str,
-    query: DriveSource,
-    sources: Mapping[str, DriveSource],
+    query: surveys.DriveSource,
+    sources: Mapping[str, surveys.DriveSource],
     controls: Mapping[str, str | None],
     output: Path,
     cluster: Cluster,
@@ -157,10 +148,8 @@ def measure_drives(
 ) -> list[TrendPoint]:
     """Returns the points of drives that need not be recorded.
 
-    Args:
-        sources: name -> opens a drive: a database or a control.
-        controls: database -> the drive on its route through the city of the
-            query; None if there is none.
+    The sources, by name, open databases and controls. A database has a control
+    on its route through the city of the query, or None.
 
     Raises:
         InputError: see `measure_trend`.
@@ -169,7 +158,9 @@ def measure_drives(
     make_folder(output)
     survey = files.survey(query_name)
     asked = frozenset[Role]({"queries"})
-    step = Survey(query, asked, methods, protocol, survey, with_scans=True)
+    step = surveys.Survey(
+        query, asked, methods, protocol, survey, with_scans=True
+    )
     jobs = [Job(f"survey {query_name}", step)]
     parts = {name: files.part("trend", name, query_name) for name in sources}
     shared = (
@@ -202,26 +193,24 @@ def measure_drives(
 
 def measure_database(
     reporter: Reporter,
-    source: DriveSource,
+    source: surveys.DriveSource,
     surveyed: tuple[Part, Part],
     described: tuple[Part, ...],
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
 ) -> list[TrendPoint]:
-    """Returns the points of one database.
+    """Returns the points of one database, in the world of the query.
 
-    Args:
-        source: opens the database, which is in the world of the query.
-        surveyed: the `SurveyedDrive` and the `KeptScans` of the query drive.
-        described: each method's descriptions of the query drive.
+    The query drive is a `SurveyedDrive` and `KeptScans`, and is described by
+    each method.
     """
     running = [method.make() for method in methods]
-    database = survey_recording(
+    database = surveys.survey_recording(
         source(), {"places"}, running, protocol, reporter.track, with_scans=True
     )
     drive, scans = database.drive, database.scans
     assert drive is not None
-    assert isinstance(scans, KeptScans)
+    assert isinstance(scans, surveys.KeptScans)
     query_track, query_scans = (part.read() for part in surveyed)
     check_same_world(database.placed, query_track.placed)
     change = temporal_change(
@@ -239,8 +228,8 @@ def measure_database(
         if not points:
             # Matches do not depend on the method.
             visible_change = _visible_change(
-                KeptDrive(drive, scans),
-                KeptDrive(query_track, query_scans),
+                surveys.KeptDrive(drive, scans),
+                surveys.KeptDrive(query_track, query_scans),
                 retrieval,
                 protocol,
             )
@@ -265,8 +254,8 @@ def measure_database(
 
 
 def _visible_change(
-    database: KeptDrive,
-    query: KeptDrive,
+    database: surveys.KeptDrive,
+    query: surveys.KeptDrive,
     retrieval: Retrieval,
     protocol: RetrievalProtocol,
 ) -> float:

@@ -13,7 +13,7 @@ from evaluation.paper.paper_reference import (
     trend,
 )
 from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.report.result_tables import recognition_tables
+from evaluation.report.result_tables import recognition_table
 
 MODES = ("all", "filtered")
 
@@ -111,7 +111,8 @@ def test_the_best_method_is_that_of_table_ii(seed):
             one.metrics["filtered"] = metrics(
                 min(one.metrics["all"].auc + 0.3, 1.0)
             )
-    alike, _, of_paper = recognition_tables(results, (), paper(), results)
+    alike = recognition_table(results, (), "all")
+    of_paper = recognition_table(results, (), None, paper())
     (ring,) = findings(results, [])
     wins = bold_of(of_paper)["RING++"]
     assert ring.verdict == ("holds in part" if wins < 6 else "holds")
