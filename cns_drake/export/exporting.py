@@ -145,9 +145,8 @@ def _write_drive(
             try:
                 made = layout.scan_files(frame, stamp_ns, scan)
             except ValueError as error:
-                raise InputError(
-                    f"{drive.name}: scan {frame}: {error}"
-                ) from error
+                where = f"{drive.name}: scan {frame}"
+                raise InputError(f"{where}: {error}") from error
             for name, content in made.items():
                 path = folder / name
                 if frame == 0:

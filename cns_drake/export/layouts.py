@@ -144,8 +144,7 @@ def _cns_folder(drive: McapDrive) -> PurePosixPath:
     name = Path(str(place)).stem
     number = drive.name.removeprefix(f"{name}_")
     return PurePosixPath(
-        checked_name(drive, name.capitalize()),
-        checked_name(drive, number),
+        checked_name(drive, name.capitalize()), checked_name(drive, number)
     )
 
 
@@ -170,10 +169,8 @@ def _cns_inner_files(drive: McapDrive) -> dict[str, str]:
 def _mount(X_BC: np.ndarray) -> str:
     """Returns the pose of a sensor C on the vehicle as YAML."""
     quat_xyzw = Rotation.from_matrix(X_BC[:3, :3]).as_quat(canonical=True)
-    values = {
-        "translation": X_BC[:3, 3].tolist(),
-        "rotation": quat_xyzw.tolist(),
-    }
+    p_BC, rotation = X_BC[:3, 3].tolist(), quat_xyzw.tolist()
+    values = {"translation": p_BC, "rotation": rotation}
     return yaml.safe_dump(values, sort_keys=False)
 
 

@@ -322,9 +322,7 @@ class BagWriter:
             The writer, and topic -> channel id.
         """
         writer = Writer(
-            stream,
-            chunk_size=_CHUNK_BYTES,
-            compression=CompressionType.ZSTD,
+            stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD
         )
         writer.start(profile="ros2", library=f"cns-drake {__version__}")
         for name, value in self._attachments.items():
@@ -440,12 +438,8 @@ def take_over_frames(
     """Writes the complete frames of an interrupted run into its successor.
 
     A frame has all messages from one message on `frame_topic` until the next;
-    latched topics have one message, at tick 0.
-
-    Args:
-        bag: an open bag, to which nothing has been written.
-        schedule: ticks of the topics that are not latched, by name.
-        frame_topic: the topic with one message a frame.
+    latched topics have one message, at tick 0. Nothing has been written yet to
+    the bag, which is open; the schedule is that of the other topics, by name.
 
     Returns:
         The number of frames, from frame 0 on.

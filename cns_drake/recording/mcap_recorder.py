@@ -38,20 +38,14 @@ from cns_drake.recording.schedule import Schedule, make_schedule
 # Events of a periodic schedule come at multiples of the period. Their times
 # differ from a tick's only by rounding, at most this [ticks].
 _TICK_TOLERANCE = 1e-3
-_IMAGES = {
-    "color": ImageRgba8U,
-    "depth": ImageDepth32F,
-    "label": ImageLabel16I,
-}
+_IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
 
 
 class RecordedCamera(NamedTuple):
-    """A camera of a recording.
+    """A camera of a recording, with its intrinsics.
 
-    Attributes:
-        info: its intrinsics.
-        X_BC: pose of its optical frame C (z ahead, y down) in the sensor's
-            frame B, whose pose is on the port `<camera>_pose`.
+    X_BC is the pose of its optical frame C (z ahead, y down) in the sensor's
+    frame B, whose pose is on the port `<camera>_pose`.
     """
 
     info: CameraInfo
@@ -61,12 +55,8 @@ class RecordedCamera(NamedTuple):
 class RecordedSensor(NamedTuple):
     """A further sensor of a recording, with a port of its name.
 
-    Attributes:
-        topic: where its messages go.
-        X_BC: pose of its frame C in the vehicle's frame B; the frame has the
-            sensor's name.
-        make_message: makes the message of a value of the port, from the value,
-            the name of the frame and the time [ns].
+    X_BC is the pose of its frame C, which has its name, in the vehicle's frame
+    B. The port's value, the frame's name and the time [ns] make a message.
     """
 
     topic: Topic
@@ -286,6 +276,7 @@ class McapRecorder(LeafSystem):
 
     def _add_camera(self, name: str, info: CameraInfo) -> None:
         topic = recorded_topics.camera_info_topic(name)
+        encode = messages.make_image
         ports = {
             kind: self._declare(f"{name}_{kind}", image())
             for kind, image in _IMAGES.items()
@@ -296,11 +287,8 @@ class McapRecorder(LeafSystem):
             for kind, port in ports.items():
                 image = _value_of(port, context)
                 if image is not None:
-                    encoding = messages.ENCODINGS[kind]
-                    made[recorded_topics.image_topic(name, kind)] = (
-                        messages.make_image(
-                            image.data, encoding, name, stamp_ns
-                        )
+                    made[recorded_topics.image_topic(name, kind)] = encode(
+                        image.data, messages.ENCODINGS[kind], name, stamp_ns
                     )
             if made:
                 made[topic] = messages.make_camera_info(info, name, stamp_ns)
@@ -311,12 +299,8 @@ class McapRecorder(LeafSystem):
     def _declare_events(self) -> None:
         """Declares an event for each tick that needs one."""
         waits = {IMU_TOPIC.name} if self._imu_samples is not None else set()
-        steps = [
-            step
-            for name, step in self._schedule.steps.items()
-            if name not in waits
-        ]
-        step = math.gcd(*steps)
+        steps = self._schedule.steps
+        step = math.gcd(*(steps[name] for name in steps if name not in waits))
         self.DeclarePeriodicPublishEvent(
             period_sec=float(self._schedule.tick * step),
             offset_sec=0.0,
@@ -362,21 +346,18 @@ class McapRecorder(LeafSystem):
     ) -> dict[Topic, Any]:
         """Returns the messages of odometry and transforms."""
         odometry = _value_of(self._odometry, context)
-        X_WCs = {}
+        X_WCs, made = {}, {}
         if odometry is not None:
             X_WCs[messages.BASE_FRAME] = odometry.X_WB
-        for name, (port, X_PC) in self._poses.items():
-            if port.HasValue(context):
-                X_WCs[name] = port.Eval(context) @ X_PC
-        made = {}
-        if X_WCs:
-            made[TF_TOPIC] = messages.make_tf(
-                messages.MAP_FRAME, X_WCs, stamp_ns
-            )
-        if odometry is not None:
             made[ODOMETRY_TOPIC] = messages.make_odometry(
                 odometry.X_WB, odometry.V_WB_B, stamp_ns
             )
+        for name, (port, X_PC) in self._poses.items():
+            if port.HasValue(context):
+                X_WCs[name] = port.Eval(context) @ X_PC
+        if X_WCs:
+            tf = messages.make_tf(messages.MAP_FRAME, X_WCs, stamp_ns)
+            return {TF_TOPIC: tf, **made}
         return made
 
     def _imu_message(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:

@@ -130,9 +130,8 @@ def marked_detections(
 ) -> Any:
     """Returns a Detection3DArray in the map, with a mark as its stamp.
 
-    Args:
-        who: id and class of N objects.
-        numbers: (N, 10) position, orientation (x, y, z, w) and size.
+    It takes id and class of N objects, and (N, 10) position, orientation (x, y,
+    z, w) and size.
     """
     header = messages.make_header(messages.MAP_FRAME, _STAMP_MARK_NS)
     detections = []

@@ -11,15 +11,10 @@ from cns_drake.base.files import part_path, user_errors
 
 
 class RecordingFolder:
-    """A rosbag2 folder with one MCAP file.
+    """A rosbag2 folder with one MCAP file; its last part names the recording.
 
-    Attributes:
-        path: the folder; its last part names the recording.
-        mcap: the messages.
-        scenario: the recorded scenario.
-        fingerprint: that of all inputs; see `cns_drake.scenarios.provenance`.
-        metadata: for rosbag2. It gets its name last: with it, the recording is
-            finished.
+    The fingerprint is that of all inputs; see `cns_drake.scenarios.provenance`.
+    The metadata get their name last: with them, the recording is finished.
     """
 
     def __init__(self, path: Path):

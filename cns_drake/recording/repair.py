@@ -30,14 +30,8 @@ from mcap.records import (
 from mcap.writer import CompressionType, Writer
 import zstandard
 
-from cns_drake.base.drives.mcap_file import (
-    CHUNK_LIMIT_BYTES,
-    MAGIC,
-    RECORD_HEADER,
-    RecordContent,
-    parse_attachment,
-    uncompress,
-)
+from cns_drake.base.drives import mcap_file
+from cns_drake.base.drives.mcap_file import MAGIC, RECORD_HEADER, RecordContent
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, completing, user_errors
 from cns_drake.base.version import __version__
@@ -78,7 +72,7 @@ _READERS = {
     **_IN_CHUNKS,
     Opcode.HEADER: lambda content: Header.read(RecordContent(content)),
     Opcode.METADATA: lambda content: Metadata.read(RecordContent(content)),
-    Opcode.ATTACHMENT: parse_attachment,
+    Opcode.ATTACHMENT: mcap_file.parse_attachment,
 }
 # Schemas and channels are kept in memory; more of them is no recording.
 _DEFINITIONS_LIMIT = 64 * 1024 * 1024
@@ -103,10 +97,8 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
 
     Those are header, schemas, channels, messages, attachments and metadata;
     chunks are opened, indexes left out. A Fault stands for each part that
-    cannot be read, also for a missing end.
-
-    Args:
-        stream: the file; it may be moved between two records.
+    cannot be read, also for a missing end. The stream may be moved between two
+    records.
     """
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)
@@ -124,7 +116,7 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
                 yield Fault(position, "too much damage, the rest is not read")
                 return
             start = position + RECORD_HEADER.size
-            if end - start > CHUNK_LIMIT_BYTES:
+            if end - start > mcap_file.CHUNK_LIMIT_BYTES:
                 raise _DamageError(
                     f"a record of {end - start} bytes is too large"
                 )
@@ -194,11 +186,11 @@ def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
 def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
     """Yields the records of interest that a record is or contains."""
     if opcode == Opcode.CHUNK:
-        inner = RecordContent(uncompress(Chunk.read(RecordContent(content))))
+        chunk = Chunk.read(RecordContent(content))
+        inner = RecordContent(mcap_file.uncompress(chunk))
         while inner.left:
-            opcode, length = RECORD_HEADER.unpack(
-                inner.read(RECORD_HEADER.size)
-            )
+            header = inner.read(RECORD_HEADER.size)
+            opcode, length = RECORD_HEADER.unpack(header)
             content = inner.read(length)
             if opcode in _IN_CHUNKS:
                 yield _IN_CHUNKS[opcode](content)
@@ -208,14 +200,10 @@ def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
 
 @dataclass(frozen=True)
 class Repair:
-    """The result of a repair.
+    """The result of a repair: the new file, and the messages recovered.
 
-    Attributes:
-        output: the new file.
-        num_messages: messages recovered.
-        seconds: time from the earliest of them to the latest [s].
-        num_faults: places that could not be read; 0 if the file was whole.
-        first_fault: the first of them, in words.
+    From the earliest to the latest of them it is `seconds`. Faults are places
+    that could not be read, 0 if the file was whole; the first is in words.
     """
 
     output: Path
@@ -279,12 +267,9 @@ def repair_mcap(
 
 
 class _Definitions(NamedTuple):
-    """What messages refer to.
+    """What messages refer to: schemas and channels by id.
 
-    Attributes:
-        profile: of the file's header, if readable.
-        schemas: by id; the first one of an id counts.
-        channels: likewise, but only those whose schema is known.
+    The first one of an id counts, and only channels with a known schema do.
     """
 
     profile: str

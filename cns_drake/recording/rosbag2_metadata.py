@@ -67,14 +67,10 @@ def make_bag_information(
     end_ns: int,
     custom_data: Mapping[str, str] | None = None,
 ) -> dict:
-    """Returns the description of a recording of one file.
+    """Returns the description of a recording of one file in its folder.
 
-    Args:
-        file_name: name of the MCAP file within its folder.
-        topics: as `describe_topic` gives them.
-        start_ns: time of the first message [ns].
-        end_ns: time of the last message [ns].
-        custom_data: key -> text for `ros2 bag info`.
+    Topics are as `describe_topic` gives them. The first and the last message
+    are at start and end [ns]; `ros2 bag info` shows the custom data.
     """
     count = sum(topic["message_count"] for topic in topics)
     span = {
@@ -122,11 +118,7 @@ def _qos_yaml(topic: Topic) -> str:
 def to_yaml(value: Any) -> str:
     """Returns plain YAML in the order of `value`, without aliases."""
     return yaml.dump(
-        value,
-        Dumper=_Dumper,
-        sort_keys=False,
-        allow_unicode=True,
-        width=1000,
+        value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000
     )
 
 

@@ -139,11 +139,8 @@ def make_areas(
     for name, road in roads.items():
         if road.parking > 0 and road.length > 2 * _BAY_CLEARANCE:
             edge, far = road.half_width, road.half_width + road.parking
-            for side, low, high in (
-                ("right", -far, -edge),
-                ("left", edge, far),
-            ):
-                bays[name, side] = _band(road, low, high, _BAY_CLEARANCE)
+            bays[name, "right"] = _band(road, -far, -edge, _BAY_CLEARANCE)
+            bays[name, "left"] = _band(road, edge, far, _BAY_CLEARANCE)
     wide = [r for r in roads.values() if 0 < r.median < r.length]
     medians = unary_union([_median(road) for road in wide])
     without_bays = _join([*lanes.values(), *junction_areas.values()])
@@ -153,11 +150,8 @@ def make_areas(
         for name, road in roads.items()
     ]
     for name, area in junction_areas.items():
-        width = min(
-            road.sidewalk
-            for road in roads.values()
-            if name in (road.start, road.end)
-        )
+        arms = [r for r in roads.values() if name in (r.start, r.end)]
+        width = min(road.sidewalk for road in arms)
         walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
     outline = _simplified(_join(walks))
     return Areas(
@@ -212,9 +206,6 @@ def _join(parts: Iterable[BaseGeometry]) -> BaseGeometry:
 
 def _multi(area: BaseGeometry) -> MultiPolygon:
     """Returns an area as a MultiPolygon."""
-    pieces = [
-        piece
-        for piece in getattr(area, "geoms", [area])
-        if isinstance(piece, Polygon) and not piece.is_empty
-    ]
-    return MultiPolygon(pieces)
+    pieces = getattr(area, "geoms", [area])
+    full = [p for p in pieces if isinstance(p, Polygon) and not p.is_empty]
+    return MultiPolygon(full)

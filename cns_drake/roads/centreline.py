@@ -131,13 +131,8 @@ def blend(
     If the straight continuations meet ahead of the start and behind the end,
     the curve is the widest allowed arc that touches both, with lines in front
     of and behind it, as a driver turns. Otherwise (parallel lanes that are
-    offset, S-bends) it is a cubic Hermite curve.
-
-    Args:
-        p_start, p_end: (2,) points [m].
-        heading_start, heading_end: directions of travel [rad].
-        spacing: about the distance of the (N, 2) points, ends included [m].
-        max_radius: radius of the arc [m].
+    offset, S-bends) it is a cubic Hermite curve. Its (N, 2) points, ends
+    included, are about a spacing apart [m]; headings are in rad.
     """
     p_start, p_end = np.asarray(p_start, float), np.asarray(p_end, float)
     d_start = _direction(heading_start)

@@ -45,11 +45,7 @@ _CROSSING_TOLERANCE = 1.0
 class Connection:
     """A way through a junction from one lane to another.
 
-    Attributes:
-        junction: name of the junction.
-        incoming, outgoing: the lanes that it joins.
-        turn: whether it bends left, right or neither.
-        points: (N, 3) positions, both lane ends included [m].
+    Its points (N, 3) include both lane ends [m].
     """
 
     junction: str

@@ -303,14 +303,10 @@ class Road:
 
 @dataclass(frozen=True)
 class Arm:
-    """One road end at a junction.
+    """One end of a road, at a junction; its heading leads away [rad].
 
-    Attributes:
-        road: name of the road.
-        end: which end of the road it is.
-        heading: direction of the centreline away from the junction [rad].
-        half_width: half the width of the road's carriageway [m].
-        setback: distance from the junction's position to the road [m].
+    The half width is that of the carriageway, the setback the distance from
+    the junction's position to the road [m].
     """
 
     road: str

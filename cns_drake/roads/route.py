@@ -96,7 +96,6 @@ def make_lane_path(
     allows.
 
     Args:
-        network, route: the roads, and the legs on them.
         spacing: the distance of the points, rounded so that it divides the
             length of the route [m].
         source: the file that errors name.
@@ -196,11 +195,7 @@ def _check_ends(
 
 
 def _leg_points(
-    network: RoadNetwork,
-    leg: RouteLeg,
-    start: float,
-    end: float,
-    aside: float,
+    network: RoadNetwork, leg: RouteLeg, start: float, end: float, aside: float
 ) -> np.ndarray:
     """Returns the (N, 3) points of a leg on its road, from start to end [m].
 
@@ -211,19 +206,15 @@ def _leg_points(
         ValueError: the leg does not fit its road.
     """
     road = network.roads[leg.road]
-    offsets = [
-        road.lane_offset(leg.direction, lane.lane)
-        for lane in (leg.entry_lane, leg.exit_lane)
-    ]
+    first = road.lane_offset(leg.direction, leg.entry_lane.lane)
+    last = road.lane_offset(leg.direction, leg.exit_lane.lane)
     if start >= end:
         raise ValueError(
             f"the road is too short for turning round at {end:.1f} m"
         )
     count = int(np.ceil((end - start) / _DENSE_SPACING)) + 1
     travelled = np.linspace(start, end, count)
-    offset = offsets[0] + (offsets[1] - offsets[0]) * _lane_change(
-        travelled, offsets[0] != offsets[1]
-    )
+    offset = first + (last - first) * _lane_change(travelled, first != last)
     offset = _moved_right(road, leg.direction, offset, travelled, aside)
     return road.evaluate(_stations(road, leg, travelled), offset)[:, :3]
 

@@ -45,14 +45,9 @@ def loop_corners(
 
     A car comes along a line, leaves it to the right, goes round the centre to
     the left, and joins the line on which it leaves, again from the right. It
-    turns by more than 90 degrees.
-
-    Args:
-        centre: (2,) of the loop [m].
-        heading_in, heading_out: headings of both lines [rad].
-        radius: that of the loop and of the bends at its ends [m].
-        aside_in, aside_out: distance of the centre to the left of the lines, at
-            most the radius [m].
+    turns by more than 90 degrees. The bends at its ends have the loop's radius;
+    its centre is at most as far to the left of the lines [m]. Headings are
+    those of the lines [rad].
     """
     swing_in = math.acos(min(1.0, (radius + aside_in) / (2 * radius)))
     swing_out = math.acos(min(1.0, (radius + aside_out) / (2 * radius)))
@@ -81,12 +76,9 @@ def loop_corners(
 
 
 class Loop(NamedTuple):
-    """A car's turn between two lanes.
+    """A car's turn, which begins at a distance along its lane [m].
 
-    Attributes:
-        begin: distance along its lane at which the car leaves it [m].
-        points: (N, 2) from there to the place where it joins the other lane,
-            opposite [m].
+    From there (N, 2) points lead to the opposite place in the other lane [m].
     """
 
     begin: float

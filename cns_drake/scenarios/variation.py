@@ -169,31 +169,20 @@ def _vary(
     routes: dict[str | None, Route | None] = {None: None}
     if family.routes is not None:
         network = load_road_network(scenario_files.map_folder(base).roads)
-        rngs = [
-            np.random.default_rng([family.routes.seed, k])
-            for k in range(family.routes.count)
-        ]
-        routes = {
-            f"r{k}": draw_route(network, family.routes.length, rng)
-            for k, rng in enumerate(rngs)
-        }
+        routes = {}
+        for k in range(family.routes.count):
+            rng = np.random.default_rng([family.routes.seed, k])
+            routes[f"r{k}"] = draw_route(network, family.routes.length, rng)
     units: dict[str | None, dict] = {None: base.lidars}
     if family.lidars:
-        units = {
-            preset: base.with_lidar_preset(preset).lidars
-            for preset in family.lidars
-        }
+        units = {n: base.with_lidar_preset(n).lidars for n in family.lidars}
     cities: dict[int | None, Scenario] = {None: base}
     if family.city_seeds:
         if redraw is None:
             raise ValueError("a family with city_seeds needs `redraw`")
-        folders = redraw(
-            scenario_files.map_folder(base).path, stage, family.city_seeds
-        )
-        cities = {
-            seed: base.replaced(map=str(folder))
-            for seed, folder in folders.items()
-        }
+        here = scenario_files.map_folder(base).path
+        folders = redraw(here, stage, family.city_seeds)
+        cities = {n: base.replaced(map=str(f)) for n, f in folders.items()}
     drawn = {}
     for city_seed, seed in product(cities, family.seeds):
         table = scenario_files.map_folder(cities[city_seed]).structures
@@ -280,9 +269,8 @@ def _difference(
     for one in (stage, other):
         scenario = base.replaced(stage=one)
         scenario_files.check_files(scenario, source)
-        names.append(
-            structures_in(load_world(scenario_files.world_file(scenario)))
-        )
+        world = load_world(scenario_files.world_file(scenario))
+        names.append(structures_in(world))
     difference = names[0] - names[1]
     if not difference:
         raise InputError(
@@ -333,11 +321,8 @@ def _draw_losses(
 
     A greater part includes all structures of a smaller one. Parts are 0 to 1.
     """
-    rows = [
-        row
-        for _, row in read_records(table, ("name", "class"))
-        if not _is_on_a_lot(row)
-    ]
+    records = [row for _, row in read_records(table, ("name", "class"))]
+    rows = [row for row in records if not _is_on_a_lot(row)]
     missing: set[str] = set()
     for kind, part in parts.items():
         names = sorted(row["name"] for row in rows if row["class"] == kind)

@@ -37,12 +37,8 @@ class BodyShape(NamedTuple):
 class Limb(NamedTuple):
     """A part of a body that moves as one: it swings about its y axis.
 
-    Attributes:
-        name: name of the limb.
-        joint: its origin in the body's frame [m].
-        swing: amplitude of its swing at a walk, negative if it begins backwards
-            [rad].
-        shapes: its parts.
+    Its origin in the body's frame is the joint [m]. The swing is the amplitude
+    at a walk, negative if it begins backwards [rad].
     """
 
     name: str

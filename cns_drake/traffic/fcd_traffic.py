@@ -62,13 +62,9 @@ class TracedObject:
 
 @dataclass(frozen=True)
 class FcdTrace:
-    """A trace of K times.
+    """A trace of `num_steps` times: the first [s], and their distance [s].
 
-    Attributes:
-        begin: the first time [s].
-        dt: between two times [s].
-        num_steps: K.
-        vehicles, persons: in the order in which they come.
+    Vehicles and persons are in the order in which they come.
     """
 
     begin: float
@@ -175,15 +171,9 @@ def play_trace(
     """Returns the traffic of a trace, whose first time is that of the drive.
 
     Road users that would collide with the ego car, which is not part of SUMO's
-    simulation, are left out.
-
-    Args:
-        trace: to play.
-        path: its file, for errors.
-        graph, walkways: those of the map, which give heights.
-        seed: seed of the kinds of cars.
-        duration, end: time to the last frame, and when the ego car arrives [s].
-        ego, ego_box: its motion and size.
+    simulation, are left out. Errors name the trace's path, the map's graph and
+    walkways give heights, and the seed is that of the kinds of cars. The last
+    frame is at `duration` [s], and the ego car arrives at `end` [s].
 
     Raises:
         InputError: the trace is shorter than the drive, or is of another map.
@@ -198,14 +188,11 @@ def play_trace(
     _check_place(trace, path, lanes)
     kinds = [_kind(one, seed) for one in trace.vehicles]
     heights = _Heights(lanes)
-    rows = [
-        _vehicle_rows(*pair, heights)
-        for pair in zip(trace.vehicles, kinds, strict=True)
-    ]
+    pairs = zip(trace.vehicles, kinds, strict=True)
+    rows = [_vehicle_rows(*pair, heights) for pair in pairs]
     vehicles = _make_tracks(trace, trace.vehicles, rows)
-    heights = _Heights(
-        np.concatenate([lanes, *(walkway.points for walkway in walkways)])
-    )
+    strips = [walkway.points for walkway in walkways]
+    heights = _Heights(np.concatenate([lanes, *strips]))
     rows = [_person_rows(one, heights, trace.dt) for one in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
@@ -297,9 +284,7 @@ def _person_rows(one: TracedObject, heights: _Heights, dt: float) -> np.ndarray:
 
 
 def _make_tracks(
-    trace: FcdTrace,
-    traced: Sequence[TracedObject],
-    rows: Sequence[np.ndarray],
+    trace: FcdTrace, traced: Sequence[TracedObject], rows: Sequence[np.ndarray]
 ) -> Tracks:
     """Returns tracks of objects that are there at some of the times."""
     values = np.zeros((trace.num_steps, len(traced), 5))

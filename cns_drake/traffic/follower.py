@@ -9,20 +9,11 @@ import shapely
 from cns_drake.motion.path_geometry import REACH
 from cns_drake.motion.speed_profile import KNOT_PERIOD
 from cns_drake.motion.trajectory import Trajectory
+from cns_drake.traffic import vehicles as motion
 from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.streets import STEP, EgoBox, Streets
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
-from cns_drake.traffic.vehicles import (
-    BEFORE_LINE,
-    CURRENT,
-    SIGHT,
-    VEHICLE,
-    Traffic,
-    find_ahead,
-    find_prior,
-    free_acceleration,
-    interaction,
-)
+from cns_drake.traffic.vehicles import CURRENT, SIGHT, Traffic, find_ahead
 
 # Distance of the places at which the car's lane is known [m].
 _STEP = 1.0
@@ -142,11 +133,8 @@ class Follower:
     """The ego car in a simulation of traffic.
 
     It follows its path by the Intelligent Driver Model, asks for its ways as
-    the others do, and keeps the bounds of its drive.
-
-    Attributes:
-        u: its place on the path at each step so far [m].
-        arrived: whether it stands at the end of the path.
+    the others do, and keeps the bounds of its drive. At each step so far it was
+    at the place u on the path [m]; it has arrived when it stands at the end.
     """
 
     def __init__(
@@ -174,7 +162,7 @@ class Follower:
 
     def record(self, streets: Streets) -> np.ndarray:
         """Returns the (1,) record `VEHICLE` of the car at its first place."""
-        car = np.zeros(1, VEHICLE)
+        car = np.zeros(1, motion.VEHICLE)
         bound = _PART * self._profile.acceleration
         for name, value in (
             ("length", self._box.front - self._box.rear),
@@ -198,17 +186,17 @@ class Follower:
         if k < self._leaves or self.arrived:
             self.u.append(u)
             return
-        wanted = free_acceleration(car, car["top"])
+        wanted = motion.free_acceleration(car, car["top"])
         gap, speed, line = self._ahead(traffic, car)
-        stop, gap_2, speed_2 = find_prior(traffic, len(traffic.cars) - 1)
+        stop, gap_2, speed_2 = motion.find_prior(traffic, len(traffic.cars) - 1)
         line = min(line, stop)
         if gap_2 < gap:
             gap, speed = gap_2, speed_2
-        loss = interaction(
-            car, line + STANDSTILL_GAP - BEFORE_LINE, float(car["v"])
+        loss = motion.interaction(
+            car, line + STANDSTILL_GAP - motion.BEFORE_LINE, float(car["v"])
         )
         if gap < SIGHT:
-            loss = max(loss, interaction(car, gap, car["v"] - speed))
+            loss = max(loss, motion.interaction(car, gap, car["v"] - speed))
         bound = _PART * self._profile.acceleration
         v = max(0.0, car["v"] + max(wanted - loss, -bound) * STEP)
         ahead = u + max(car["v"] * STEP, _AHEAD)

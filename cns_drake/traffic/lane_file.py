@@ -12,13 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
-from cns_drake.traffic.lane_graph import (
-    LaneGraph,
-    Piece,
-    Walkway,
-    make_crossing,
-    resampled,
-)
+from cns_drake.traffic import lane_graph
+from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
 
 # Between the points of a lane in a file [m].
 _FILE_SPACING = 1.0
@@ -183,7 +178,8 @@ def read_lanes(path: Path) -> LaneFile:
         for way in found.walkways
     ]
     crossings = tuple(
-        make_crossing(np.array(one.line), one.width) for one in found.crossings
+        lane_graph.make_crossing(np.array(one.line), one.width)
+        for one in found.crossings
     )
     return LaneFile(
         LaneGraph(pieces, crossings), walkways, tuple(found.in_the_way)

@@ -116,9 +116,8 @@ class Walkway:
         """The (N, 2) least and greatest offset to the right [m]."""
         if self.free is not None:
             return self.free
-        return np.tile(
-            self.half_width * np.array([-1, 1]), (len(self.points), 1)
-        )
+        sides = self.half_width * np.array([-1, 1])
+        return np.tile(sides, (len(self.points), 1))
 
     @property
     def is_narrow(self) -> np.ndarray:
@@ -137,9 +136,7 @@ def kept_clear(
     both ends.
     """
     tree, found = shapely.STRtree(things), []
-    num_nodes = 1 + max(
-        (max(way.start, way.end) for way in walkways), default=0
-    )
+    node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
     for way in walkways:
         points = _lengthened(way.points[:, :2], _BEFORE)
         right = np.gradient(points, axis=0)[:, ::-1] * (1.0, -1.0)
@@ -190,7 +187,7 @@ def kept_clear(
                 continue
             for k, is_cut in enumerate((before >= 0, after < len(barred))):
                 if is_cut:
-                    nodes[k], num_nodes = num_nodes, num_nodes + 1
+                    nodes[k], node = node, node + 1
             found.append(
                 replace(
                     way,
@@ -203,11 +200,7 @@ def kept_clear(
             )
     # No crossing leads to where there is no walkway.
     reached = {n for w in found if w.crossing < 0 for n in (w.start, w.end)}
-    return [
-        way
-        for way in found
-        if way.crossing < 0 or {way.start, way.end} <= reached
-    ]
+    return [w for w in found if w.crossing < 0 or {w.start, w.end} <= reached]
 
 
 def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
@@ -221,12 +214,7 @@ def _lengthened(points: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LaneGraph:
-    """Pieces by number, and the crossings over them.
-
-    Attributes:
-        pieces: all of them.
-        crossings: where walkers cross lanes.
-    """
+    """Pieces by number, and the walkers' crossings over them."""
 
     pieces: tuple[Piece, ...]
     crossings: tuple[Crossing, ...] = ()

@@ -5,13 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.traffic.lane_graph import (
-    SPACING,
-    LaneGraph,
-    Piece,
-    resampled,
-    without_dead_ends,
-)
+from cns_drake.traffic import lane_graph
+from cns_drake.traffic.lane_graph import SPACING, LaneGraph, Piece, resampled
 
 # A lane must have room for any vehicle; a shorter one is part of the ways
 # that lead over it [m].
@@ -23,12 +18,9 @@ _MOST_SHORT, _MOST_WAYS = 8, 12
 
 
 class DirectedLane(NamedTuple):
-    """A lane in one direction.
+    """A lane in one direction: the (N, 3) points of its middle [m].
 
-    Attributes:
-        points: (N, 3) its middle in driving direction [m].
-        limit: speed limit [m/s].
-        connects: whether it leads through a junction.
+    It has a speed limit [m/s], and connects lanes if it is in a junction.
     """
 
     points: np.ndarray
@@ -43,15 +35,10 @@ def join_lanes(
 ) -> LaneGraph:
     """Returns the graph of lanes of a map, cut at its own places.
 
-    Args:
-        lanes: all of them.
-        links: pairs of lane numbers; the second lane follows the first.
-        right_of: number of a lane -> that of the lane on its right, in the
-            same direction; without it, vehicles do not change lanes.
-
-    Returns:
-        A graph without signals and crossings; it is empty if vehicles cannot
-        drive for ever anywhere.
+    The second lane of a link follows the first. `right_of` is the number of a
+    lane -> that of the lane on its right, in the same direction; without it,
+    vehicles do not change lanes. The graph has no signals and crossings, and is
+    empty if vehicles cannot drive for ever anywhere.
     """
     merged, after, beside = _merge(lanes, links, right_of or {})
     points = [resampled(lane.points) for lane in merged]
@@ -73,23 +60,16 @@ def join_lanes(
     ways = []
     for k in long:
         for short, last in _ways(k, after, set(long)):
-            line = np.concatenate(
-                [
-                    points[k][-_STOP_STEPS - 1 :],
-                    *(points[one] for one in short),
-                    points[last][: _STOP_STEPS + 1],
-                ]
-            )
+            tail = points[k][-_STOP_STEPS - 1 :]
+            head = points[last][: _STOP_STEPS + 1]
+            between = (points[one] for one in short)
+            line = np.concatenate([tail, *between, head])
             limit = min(merged[one].limit for one in (k, *short, last))
             ways.append((k, last, line, limit))
             for place in ((last, "start"), *((one, "whole") for one in short)):
                 parents[cluster(place)] = cluster((k, "end"))
-    junctions = {
-        key: row
-        for row, key in enumerate(
-            dict.fromkeys(cluster((k, "end")) for k in long)
-        )
-    }
+    keys = dict.fromkeys(cluster((k, "end")) for k in long)
+    junctions = {key: row for row, key in enumerate(keys)}
     pieces = [
         Piece(
             points[k][_STOP_STEPS:-_STOP_STEPS],
@@ -114,7 +94,7 @@ def join_lanes(
         )
         for k, last, line, limit in ways
     ]
-    return LaneGraph(tuple(without_dead_ends(pieces)))
+    return LaneGraph(tuple(lane_graph.without_dead_ends(pieces)))
 
 
 def _merge(
@@ -133,12 +113,8 @@ def _merge(
         if len(after[k]) != 1:
             return False
         (other,) = after[k]
-        return (
-            len(before[other]) == 1
-            and other != k
-            and not lanes[k].connects
-            and not lanes[other].connects
-        )
+        connects = lanes[k].connects or lanes[other].connects
+        return len(before[other]) == 1 and other != k and not connects
 
     chains: list[list[int]] = []
     placed: set[int] = set()

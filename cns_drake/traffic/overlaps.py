@@ -39,12 +39,10 @@ def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
 def find_overlaps(
     poses: np.ndarray, half: np.ndarray, found: np.ndarray
 ) -> None:
-    """Finds the pairs of bodies that ever overlap.
+    """Finds the pairs of bodies that ever overlap; `found` is (N, N) bool.
 
-    Args:
-        poses: (K, N, 3) x, y [m], heading [rad]; NaN while a body is absent.
-        half: (N, 2) half length and half width [m].
-        found: (N, N) bool to fill.
+    Poses are (K, N, 3) x, y [m], heading [rad], NaN while a body is absent;
+    half lengths and half widths (N, 2) [m].
     """
     reach = np.sqrt(half[:, 0] ** 2 + half[:, 1] ** 2)
     for k in range(len(poses)):

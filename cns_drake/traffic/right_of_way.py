@@ -283,9 +283,8 @@ def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
             continue
         rear, size = rear_on_way(streets, car), int(car.large)
         ahead = streets.begin[size, car.held, place] - rear - car.length
-        if rear < streets.clear[
-            size, car.held, place
-        ] and ahead < _stops_within(car):
+        clear = streets.clear[size, car.held, place]
+        if rear < clear and ahead < _stops_within(car):
             return last
     # A placeholder holds the permit until the group has begun to walk.
     one.users, one.opened, one.is_open = 1, t, True

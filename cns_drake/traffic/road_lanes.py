@@ -11,17 +11,8 @@ import shapely
 from cns_drake.roads.centreline import blend
 from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import ENDS, End, Junction, LaneRef, Road
-from cns_drake.traffic.lane_graph import (
-    Crossing,
-    LaneGraph,
-    Piece,
-    Walkway,
-    distances_along,
-    length_of,
-    make_crossing,
-    resampled,
-    without_dead_ends,
-)
+from cns_drake.traffic import lane_graph
+from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
 
 # Distance of stop lines from the end of a road with and without a crossing;
 # distance of a crossing's middle from the end, and its width [m].
@@ -101,24 +92,17 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
             across = abs(np.sin(heading - axes[junction]))
             phase = int(across > np.sin(np.pi / 4))
         for way, last in _ways(onward, ref, long):
-            tail_length = _trims_of(ref, trims)[1]
-            tail = _cut(lines[ref], length_of(lines[ref]) - tail_length, 0)
-            head_length = _trims_of(last, trims)[0]
-            head = _cut(lines[last], 0, length_of(lines[last]) - head_length)
-            between = [
-                piece
-                for connection in way
-                for piece in (
-                    connection.points,
-                    lines[connection.outgoing]
-                    if connection.outgoing != last
-                    else head,
-                )
-            ]
+            length = lane_graph.length_of(lines[ref])
+            parts = [_cut(lines[ref], length - _trims_of(ref, trims)[1], 0)]
+            length = lane_graph.length_of(lines[last])
+            head = _cut(lines[last], 0, length - _trims_of(last, trims)[0])
+            for one in way:
+                after = head if one.outgoing == last else lines[one.outgoing]
+                parts += [one.points, after]
             roads = {ref.road, *(c.outgoing.road for c in way)}
             pieces.append(
                 Piece(
-                    resampled(np.concatenate([tail, *between])),
+                    resampled(np.concatenate(parts)),
                     min(network.roads[name].speed_limit for name in roads),
                     True,
                     (number[last],),
@@ -129,9 +113,8 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
         pieces[number[ref]] = replace(
             pieces[number[ref]], after=tuple(range(first, len(pieces)))
         )
-    return LaneGraph(
-        tuple(without_dead_ends(pieces)), tuple(_crossings(network, trims))
-    )
+    crossings = tuple(_crossings(network, trims))
+    return LaneGraph(tuple(lane_graph.without_dead_ends(pieces)), crossings)
 
 
 def _stop_line(network: RoadNetwork, road: Road, end: End) -> float:
@@ -151,7 +134,7 @@ def _trims_of(
 
 def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
     """Returns a line (N, 3) shortened at both ends [m]."""
-    along = distances_along(line)
+    along = lane_graph.distances_along(line)
     low, high = start, along[-1] - end
     inside = along[(along > low + 1e-3) & (along < high - 1e-3)]
     wanted = np.concatenate([[low], inside, [high]])
@@ -210,11 +193,12 @@ def _ways(
 
 def _crossings(
     network: RoadNetwork, trims: dict[tuple[str, End], float]
-) -> Iterator[Crossing]:
+) -> Iterator[lane_graph.Crossing]:
     for road in network.roads.values():
         for end in ENDS:
             if trims[road.name, end] == _STOP_LINE:
-                yield make_crossing(_crossing_line(road, end), _CROSSING_WIDTH)
+                line = _crossing_line(road, end)
+                yield lane_graph.make_crossing(line, _CROSSING_WIDTH)
 
 
 def _crossing_line(road: Road, end: End) -> np.ndarray:
@@ -237,9 +221,7 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
         if _is_walked(road):
             for end, side in itertools.product(ENDS, (1, -1)):
                 nodes[road.name, end, side] = len(nodes)
-    places = {
-        key: _place(network.roads[key[0]], key[1], key[2]) for key in nodes
-    }
+    places = {key: _place(network.roads[key[0]], *key[1:]) for key in nodes}
     found: list[Walkway] = []
     for road in network.roads.values():
         if not _is_walked(road):
@@ -356,7 +338,7 @@ def _corners(
         z = np.linspace(p[2], q[2], len(line))
         width = min(_walked_width(network.roads[key[0]]) for key in (a, b))
         points = np.column_stack([line, z])
-        if length_of(points) < _SHORTEST:
+        if lane_graph.length_of(points) < _SHORTEST:
             continue
         found.append(
             Walkway(resampled(points), _half_width(width), nodes[a], nodes[b])

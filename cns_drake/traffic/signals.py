@@ -125,10 +125,7 @@ def _flows(graph: LaneGraph) -> np.ndarray:
 
 
 def _offsets(
-    graph: LaneGraph,
-    flow: np.ndarray,
-    owner: np.ndarray,
-    signals: Signals,
+    graph: LaneGraph, flow: np.ndarray, owner: np.ndarray, signals: Signals
 ) -> np.ndarray:
     """Returns the (J,) offsets of the junctions' cycles [s].
 

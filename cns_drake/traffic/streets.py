@@ -93,12 +93,7 @@ class Streets(NamedTuple):
 
 
 class EgoBox(NamedTuple):
-    """The ego car's box on the ground.
-
-    Attributes:
-        rear, front: x of its ends in the vehicle frame [m].
-        half_width: half its width [m].
-    """
+    """The ego car's box on the ground, from rear to front in its frame [m]."""
 
     rear: float
     front: float
@@ -262,13 +257,9 @@ def swept_hulls(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the areas that a vehicle sweeps on a way, step by step.
 
-    Args:
-        piece: the way.
-        size: length and width of the vehicle [m].
-        axles: x of its rear and front axle from its middle [m].
-
-    Returns:
-        (N + 1,) places of its front bumper [m], and (N,) areas between two.
+    It has a length and a width, and its rear and front axle at x from its
+    middle [m]. There are (N + 1,) places of its front bumper [m], and (N,)
+    areas between two.
     """
     line = piece.points[:, :2]
     along = distances_along(line)

@@ -54,8 +54,7 @@ def make_traffic(
     """Adds vehicles and walkers to a SceneGraph; returns the moving system.
 
     Args:
-        scene_graph, plan: takes the geometry of the traffic, on frames of a
-            source of its own.
+        scene_graph: takes the geometry, on frames of a source of its own.
         seed: seed of colours and sizes.
         structures: has an instance id for each body; by default
             `traffic_structures` of the plan.

@@ -87,11 +87,7 @@ def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
 
 
 class LimbTable:
-    """The M limbs of N bodies, one after the other.
-
-    Attributes:
-        body: (M,) number of each limb's body.
-    """
+    """The M limbs of N bodies in turn; `body` has the (M,) body numbers."""
 
     def __init__(self, bodies: Sequence[tuple[Limb, ...]]):
         """Takes the limbs of each body."""
@@ -160,18 +156,10 @@ class TrafficMotion(LeafSystem):
         source_id: SourceId,
         turn: float,
     ):
-        """Prepares the motion.
-
-        Args:
-            plan: the traffic.
-            bodies: the vehicles, then the walkers of the plan.
-            source_id: the source of their geometry.
-            turn: duration of a LiDAR's turn [s].
-        """
+        """Takes the plan's vehicles, then walkers, and a LiDAR's turn [s]."""
         super().__init__()
         self.source_id = source_id
         self._plan = plan
-        # The vehicles, then the walkers.
         self.bodies = tuple(bodies)
         self._limbs = LimbTable([body.limbs for body in bodies])
         frames = (frame for body in self.bodies for frame in body.frames)

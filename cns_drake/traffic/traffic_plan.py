@@ -63,13 +63,9 @@ class Tracks:
     present: np.ndarray | None = None
 
     def at(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates and their rates.
+        """Returns coordinates and their rates, (N, D) each.
 
-        Args:
-            t: a time, or (T,) times [s].
-
-        Returns:
-            (N, D) each; of several times (T, N, D).
+        At (T,) times instead of one they are (T, N, D) [s].
         """
         k, u, beyond = self._interval(t)
         p0, p1 = self.values[k], self.values[k + 1]
@@ -179,19 +175,11 @@ def plan_traffic(
     ego_box: EgoBox,
     drive: Trajectory | None = None,
 ) -> TrafficPlan:
-    """Plans traffic for a drive; equal arguments give an equal plan.
+    """Plans traffic of wanted numbers for a drive of some duration [s].
 
-    Args:
-        graph, walkways: lanes of the vehicles, and strips for the walkers.
-        vehicles, walkers: wanted numbers.
-        seed: seed of all draws.
-        duration: length of the drive [s].
-        ego, ego_box: the ego car's motion and size.
-        drive: the ego car's, if it follows other vehicles; `ego` then stands at
-            its first place, and `duration` is the longest.
-
-    Returns:
-        The plan, without any collisions. It may have fewer bodies than wanted.
+    Equal arguments give an equal plan. If the ego car follows other vehicles,
+    it has a `drive`, `ego` stands at its first place, and `duration` is the
+    longest. The plan has no collisions, but maybe fewer bodies than wanted.
     """
     # Traffic goes on after the drive, for a LiDAR that is turning then.
     num_steps = _FIRST + int(np.ceil(duration / STEP)) + 4
@@ -253,9 +241,8 @@ class Trial:
         cars, found = motion.place_vehicles(kinds, task.streets, rng)
         self._kinds = [kinds[k] for k in found]
         crossings = motion.make_crossings(task.graph)
-        self._crowd = Crowd(
-            _with_spare(task.walkers), task.walkways, crossings, rng
-        )
+        walkers = _with_spare(task.walkers)
+        self._crowd = Crowd(walkers, task.walkways, crossings, rng)
         self._seed = int(rng.integers(2**31))
         self._follower: Follower | None = None
         self._num_steps = 0
@@ -307,20 +294,16 @@ class Trial:
         # The step before, for the half step between.
         first = max(steps.start - 1, 0)
         rows = slice(first, steps.stop)
+        half_steps = np.arange(2 * first, 2 * steps.stop - 1)
         if self._follower is None:
-            ego = self._task.ego_track[2 * first : 2 * steps.stop - 1]
+            ego = self._task.ego_track[half_steps]
         else:
-            ego = self._follower.poses(
-                np.arange(2 * first, 2 * steps.stop - 1) / 2
-            )
-        poses = np.concatenate(
-            [
-                ego[:, None],
-                _at_half_steps(self._vehicles[rows]),
-                _at_half_steps(self._walkers[rows]),
-            ],
-            axis=1,
+            ego = self._follower.poses(half_steps / 2)
+        vehicles, walkers = (
+            _at_half_steps(bodies[rows])
+            for bodies in (self._vehicles, self._walkers)
         )
+        poses = np.concatenate([ego[:, None], vehicles, walkers], axis=1)
         find_overlaps(poses, self._half_sizes, self._overlaps)
         self._num_steps = steps.stop
 

@@ -128,14 +128,9 @@ CROSSING = np.dtype(
 class Traffic(NamedTuple):
     """Vehicles and crossings while they are simulated.
 
-    Attributes:
-        streets: the lanes, and the ego car.
-        cars: (N,) records `VEHICLE`.
-        crossings: (C,) records `CROSSING`.
-        seed: seed of the drawn ways.
-        head: (P,) the first entry in the list of what is on each piece, -1 for
-            none; see `find_occupants`.
-        entries: records `_ENTRY`.
+    There are (N,) cars `VEHICLE`, (C,) crossings `CROSSING`, and (P,) `head`:
+    the first one of the `_ENTRY` of what is on each piece, -1 for none; see
+    `find_occupants`. The seed is that of the drawn ways.
     """
 
     streets: Streets
@@ -214,26 +209,21 @@ def place_vehicles(
             paths.append(lane)
             places.append(s)
             break
-    chosen = [kinds[k] for k in found]
     cars = np.zeros(len(found), VEHICLE)
     for name in ("held", "left_lane", "path"):
         cars[name] = -1
     cars["since"], cars["change_length"] = np.inf, 1.0
     cars["path"][:, CURRENT], cars["s"] = paths, places
-    cars["length"] = [kind.size[0] for kind in chosen]
-    cars["rear_axle"] = [kind.axles[0] for kind in chosen]
-    cars["front_axle"] = [kind.axles[1] for kind in chosen]
-    cars["top"] = [kind.top_speed for kind in chosen]
-    cars["a"] = [kind.acceleration for kind in chosen]
-    cars["b"] = [kind.deceleration for kind in chosen]
-    cars["headway"] = [kind.headway for kind in chosen]
-    cars["large"] = [kind.is_large for kind in chosen]
-    cars["factor"] = [kind.speed_factor for kind in chosen]
+    for car, kind in zip(cars, (kinds[k] for k in found), strict=True):
+        car["length"], car["large"] = kind.size[0], kind.is_large
+        car["rear_axle"], car["front_axle"] = kind.axles
+        car["top"], car["factor"] = kind.top_speed, kind.speed_factor
+        car["a"], car["b"] = kind.acceleration, kind.deceleration
+        car["headway"] = kind.headway
     cars["factor"] *= rng.uniform(0.9, 1.1, len(cars))
-    lanes = streets.pieces[cars["path"][:, CURRENT]]
-    allowed = streets.speed[
-        lanes["first"] + (cars["s"] / lanes["step"]).astype(int)
-    ]
+    lanes = streets.pieces[paths]
+    points = lanes["first"] + (cars["s"] / lanes["step"]).astype(int)
+    allowed = streets.speed[points]
     v = _PART_OF_SPEED * np.minimum(cars["top"], cars["factor"] * allowed)
     # Vehicles can stop before the stop line, or behind the one ahead.
     left = np.minimum(lanes["length"] - cars["s"], _SPACE / 2)
@@ -295,11 +285,8 @@ def _places(
 @compiled
 def find_occupants(traffic: Traffic, k: int) -> None:
     """Notes the places of all vehicles at the k-th time."""
-    streets, cars, pieces = (
-        traffic.streets,
-        traffic.cars,
-        traffic.streets.pieces,
-    )
+    streets, cars = traffic.streets, traffic.cars
+    pieces = streets.pieces
     traffic.head[:] = -1
     free = 0
     for i in range(len(cars)):
@@ -325,10 +312,8 @@ def find_occupants(traffic: Traffic, k: int) -> None:
                 front = pieces[before].length
     for piece in range(len(pieces)):
         if streets.until[k, piece] == 0.0:
-            rear, front = (
-                streets.ego_rear[k, piece],
-                streets.ego_front[k, piece],
-            )
+            rear = streets.ego_rear[k, piece]
+            front = streets.ego_front[k, piece]
             speed = streets.ego_speed[k, piece]
             free = _enter(traffic, free, piece, EGO, rear, front, speed)
 
@@ -505,11 +490,8 @@ def rear_on_way(streets: Streets, car: Any) -> float:
 @compiled
 def accelerations(traffic: Traffic) -> np.ndarray:
     """Returns the (N,) accelerations [m/s^2]."""
-    streets, cars, pieces = (
-        traffic.streets,
-        traffic.cars,
-        traffic.streets.pieces,
-    )
+    streets, cars = traffic.streets, traffic.cars
+    pieces = streets.pieces
     result = np.zeros(len(cars))
     for i in range(len(cars)):
         car = cars[i]

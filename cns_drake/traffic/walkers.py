@@ -122,10 +122,9 @@ def gait_rate(speed: np.ndarray) -> np.ndarray:
 
 
 class Crowd:
-    """All walkers while they are planned.
+    """All `walkers` while they are planned, (N,) records.
 
-    Attributes:
-        walkers: (N,) records; fewer than wanted if there is no room for all.
+    There are fewer than wanted if there is no room for all.
     """
 
     def __init__(
@@ -218,9 +217,8 @@ class Crowd:
                 break
             walkers["at"] += passed
         last = paths["first"] + paths["num_points"] - 1
-        return (walkers["at"] >= paths["num_points"] - 3) & (
-            ahead(last) < _AT_NODE
-        )
+        is_near = ahead(last) < _AT_NODE
+        return is_near & (walkers["at"] >= paths["num_points"] - 3)
 
     def _go_on(self, i: int, t: float, seed: int, waited: np.ndarray) -> bool:
         """Lets the i-th walker begin its next path, unless it has to wait.
@@ -268,15 +266,10 @@ class Crowd:
         likings = []
         for other in choices:
             over = int(self._paths.paths["crossing"][other])
-            likings.append(
-                0.0
-                if other // 2 == path // 2
-                else 1.0
-                if over < 0
-                else _CROSSES
-                if marked[over]
-                else _CROSSES_ELSEWHERE
-            )
+            liking = 1.0
+            if over >= 0:
+                liking = _CROSSES if marked[over] else _CROSSES_ELSEWHERE
+            likings.append(0.0 if other // 2 == path // 2 else liking)
         who, draw = self.walkers[["group", "draws"]][i]
         pick = uniform(seed, who, draw) * sum(likings)
         below = np.flatnonzero(pick < np.cumsum(likings))
@@ -363,11 +356,8 @@ def _place_walkers(
         if rng.uniform() < _COMPANIONS and len(rows) < count and at >= _BEHIND:
             place(way, forward, at - _BEHIND, len(rows) - 1)
     walkers = np.zeros(len(rows), _WALKER)
-    for name, values in zip(
-        ("path", "at", "xy", "yaw", "group"),
-        zip(*rows, strict=True),
-        strict=False,
-    ):
+    names = ("path", "at", "xy", "yaw", "group")
+    for name, values in zip(names, zip(*rows, strict=True), strict=False):
         walkers[name] = values
     number = len(rows)
     walkers["speed"] = np.clip(rng.normal(_SPEED, _SPREAD, number), 0.6, 2.2)
