@@ -205,11 +205,8 @@ class Cubics:
     ) -> np.ndarray:
         """Returns the values (N,) at distances (N,), or the slopes there.
 
-        Args:
-            s: where [m].
-            inside: places that select the piece, which differ on both sides of
-                a joint [m].
-            is_slope: whether to return the first derivatives.
+        `inside` selects the piece of each place: it differs from `s` [m] on
+        both sides of a joint.
         """
         if not self:
             return np.zeros(len(s))
@@ -258,12 +255,8 @@ class MarkLine:
 class RoadMark:
     """A line painted on the border of a lane.
 
-    Attributes:
-        start: along the road [m].
-        kind: its type, such as `solid broken`.
-        colour: as the file names it.
-        width: how wide one line is [m].
-        lines: the lines it consists of; those usual for its kind if empty.
+    It begins at `start` along the road [m]. A kind is such as `solid broken`;
+    without lines, those usual for it are meant, each with the width [m].
     """
 
     start: float
