@@ -253,7 +253,7 @@ class MarkLine:
 
 @dataclass(frozen=True)
 class RoadMark:
-    """A line painted on the border of a lane.
+    """A line painted on the border of a lane, in a colour of the file.
 
     It begins at `start` along the road [m]. A kind is such as `solid broken`;
     without lines, those usual for it are meant, each with the width [m].
@@ -268,15 +268,12 @@ class RoadMark:
 
 @dataclass(frozen=True)
 class Lane:
-    """A lane of a section.
+    """A lane of a section, of a type such as driving.
 
-    Attributes:
-        number: counted from the middle outwards, positive on the left.
-        kind: its type, such as driving.
-        width: over the distance along the road; or border: distance of its
-            outer edge from the middle.
-        height: how high its inner edge stands above the road [m].
-        marks: on its outer border, one after the other.
+    Numbers count from the middle outwards, positive on the left. A lane has a
+    width over the distance along the road, or a border: the distance of its
+    outer edge from the middle. Its inner edge stands at the height above the
+    road [m]; marks are on its outer border, one after the other.
     """
 
     number: int
@@ -333,21 +330,13 @@ class Thing(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedRoad:
-    """A road.
+    """A road; its name is its id in letters, digits, dots and dashes, unique.
 
-    Attributes:
-        name: its id in letters, digits, dots and dashes, unique.
-        junction: id of the junction that it belongs to, or none.
-        length: its length [m].
-        pieces: parts of its course, one after the other.
-        elevation: height of the reference line [m].
-        superelevation: roll about it [rad].
-        lane_offset: how far the middle of its lanes lies to the left [m].
-        sections: stretches with the same lanes, one after the other.
-        keeps_left: whether its traffic keeps left.
-        limits: pairs of start and value of a speed limit [m, m/s].
-        things: beside it.
-        spans: `bridge` or `tunnel` for each of them that the file has on it.
+    Pieces of its course follow one another, as do sections, stretches with the
+    same lanes. The middle of the lanes lies `lane_offset` [m] to the left of
+    the reference line, which has a height [m] and a roll [rad]. Limits are
+    pairs of start and value of a speed limit [m, m/s]; spans are `bridge` or
+    `tunnel` for each of them that the file has on it.
     """
 
     name: str
