@@ -49,12 +49,8 @@ _GROWTH, _LEAST_TREE = 0.4, 2.0
 class AgedMap:
     """What ageing a map made.
 
-    Attributes:
-        years: stage -> year; 0 is today.
-        structures: stage -> number of structures.
-        events: event -> number of rows of the history.
-        changed: (N, 3) places of buildings that changed [m].
-        trajectory: of the last drive.
+    It has the year and number of structures of each stage, where year 0 is
+    today, the number of each event, and places (N, 3) of changed buildings [m].
     """
 
     years: Mapping[str, int]

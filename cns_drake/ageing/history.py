@@ -26,12 +26,8 @@ from cns_drake.ageing.rates import Tally
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.polygons import polygons_of
 from cns_drake.city.geometry.structures import Part, Structure, assemble, block
+from cns_drake.city.growth import stage_structures
 from cns_drake.city.growth.lowering import top_of
-from cns_drake.city.growth.stage_structures import (
-    lot_objects,
-    scaled,
-    use_by_size,
-)
 from cns_drake.city.placement.frontage import lines_along, lot_at
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
@@ -92,14 +88,9 @@ class Event:
 class _Lot:
     """A plot and what stands on it.
 
-    Attributes:
-        number: of the lot in the city.
-        height: that of the buildings usual there [m].
-        building: name of its building.
-        parts: names of annexes, storeys, balconies.
-        finished, coming: the coming building, and the year in which it will
-            stand.
-        old: the building that it replaces, if any.
+    The height is that of the buildings usual there [m]; parts are annexes,
+    storeys, balconies. The coming building is finished in that year, and
+    replaces the old one, if any.
     """
 
     number: int
@@ -116,14 +107,9 @@ class _Lot:
 class _Tree:
     """A tree that stands or was felled.
 
-    Attributes:
-        name: of the tree today.
-        whole: the tree at the height `full`.
-        full: that height [m].
-        height: the present one; 0 if felled [m].
-        size: greatest height [m].
-        planted: year of planting.
-        replanted: year of its successor's planting.
+    It has its name of today. The tree is `whole` at the height `full`; its
+    present height is 0 if felled, and its greatest is `size` [m]. Its successor
+    is `replanted` in that year.
     """
 
     name: str
@@ -136,18 +122,15 @@ class _Tree:
 
     def structure(self) -> Structure:
         share = round(self.height / self.full, 4)
-        model = scaled(self.whole.model, share)
+        model = stage_structures.scaled(self.whole.model, share)
         return replace(self.whole, name=self.name, model=model)
 
 
 class City:
     """A city at the end of a year.
 
-    Attributes:
-        year: the years since today.
-        standing: name -> structure; None for one that is as today.
-        events: all events so far.
-        new: structures that are not of today, in the order of their coming.
+    `standing` has name -> structure, None for one that is as today; `new` has
+    those that are not of today, in the order of their coming.
     """
 
     def __init__(
@@ -474,7 +457,9 @@ class City:
         bare = lot.plot.thing(name, "building", model)
         cars = {"hatchback": 3.0, "saloon": 3.0, "estate": 2.0, "van": 1.0}
         rng = self._rng("lot", name)
-        for one in lot_objects(bare, use_by_size(bare), cars, rng):
+        for one in stage_structures.lot_objects(
+            bare, stage_structures.use_by_size(bare), cars, rng
+        ):
             if not self.near(one.footprint_W):
                 self._put(one)
                 lot.parts.append(one.name)

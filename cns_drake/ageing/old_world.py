@@ -33,15 +33,9 @@ _AROUND = 40.0
 class OldWorld:
     """A stage of a map.
 
-    Attributes:
-        folder: the map.
-        path: the stage's file.
-        rows: the rows of the map's table of structures, by name.
-        columns: the columns of that table.
-        things: name -> structure in W, in the order of names.
-        visuals: name -> the SDF text of its visuals.
-        built: name -> year in which it was built, if the table has it.
-        today: the year of the stage, where buildings have years.
+    Rows and columns are those of the map's table of structures. `things` in W,
+    SDF texts of `visuals` and years in which they were `built`, if the table
+    has them, go by name. `today` is the year of the stage if there are any.
     """
 
     def __init__(self, folder: MapFolder):

@@ -82,13 +82,10 @@ _INSULATION = 0.15
 
 @dataclass(frozen=True)
 class Plot:
-    """The ground of one building.
+    """The ground of one building: its area in W and height z [m].
 
-    Attributes:
-        area: in W [m].
-        xy, yaw: the frame S, whose x axis runs along the street and whose y
-            axis points away from it [m, rad].
-        z: height of its ground [m].
+    Its frame S is at `xy` and `yaw` [m, rad]. Its x axis runs along the street,
+    and its y axis points away from it.
     """
 
     area: BaseGeometry

@@ -75,11 +75,8 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
 class Tally:
     """Counts how often events met the things of a city.
 
-    Attributes:
-        rates: event -> its rate a year.
-        expected: event -> expected number.
-        exposure: event -> things at risk, summed over the years.
-        number: event -> how often it came about.
+    For each event: its rate a year, its expected and true number, and the
+    things at risk, summed over the years.
     """
 
     rates: Mapping[str, float]

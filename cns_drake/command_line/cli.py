@@ -8,34 +8,27 @@ from collections.abc import Callable
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
-from cns_drake.command_line import learning, studying
+from cns_drake.command_line import learning, simulating, studying
 from cns_drake.command_line.maps import age, city, import_city, list_drives
-from cns_drake.command_line.simulating import (
-    export,
-    generate,
-    repair,
-    scan,
-    simulate,
-)
 from evaluation.command_line.options import explained
 
 # Command -> its example, line by line.
 _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
     list_drives: ("list",),
-    simulate: ("simulate metropolis_01 --output drives",),
-    scan: (
+    simulating.simulate: ("simulate metropolis_01 --output drives",),
+    simulating.scan: (
         "scan worlds/metropolis/stage_01.sdf \\",
         "    --pose 0 0 1.6 0 0 1.57 --output scan.pcd",
     ),
-    export: (
+    simulating.export: (
         "export drives/metropolis_01 \\",
         "    --format kitti --output kitti",
     ),
-    generate: (
+    simulating.generate: (
         "generate metropolis_01 metropolis_04 \\",
         "    --output drives --jobs 2",
     ),
-    repair: ("repair damaged.mcap --output whole.mcap",),
+    simulating.repair: ("repair damaged.mcap --output whole.mcap",),
     studying.reproduce: ("reproduce metropolis --output study --quick",),
     studying.fresh: ("fresh suburbia --number 2 --output fresh",),
     studying.trend: (

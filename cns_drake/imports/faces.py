@@ -146,14 +146,10 @@ def extruded(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns walls and roof of a footprint, (M, 3, 3) each [m].
 
-    Args:
-        polygon: the footprint.
-        low, high: heights of its lowest and its highest point.
-        name: the object's name, for the faults.
-        faults: counts roofs that became flat.
-        roof: shape: flat; pyramidal on any footprint; gabled or hipped on
-            one of four corners. Others are made flat.
-        roof_height: the roof's height above the eaves [m].
+    The roof is flat; pyramidal on any footprint; gabled or hipped on one of
+    four corners. Others are made flat, and counted as faults of the object.
+    Heights are those of the lowest and highest point, and that of the roof
+    above the eaves [m].
     """
     polygon = orient(polygon)
     eaves = high - roof_height

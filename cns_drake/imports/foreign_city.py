@@ -42,20 +42,13 @@ def _number(seed: int, purpose: str, name: str) -> int:
 # Compared by identity: a city has thousands, and comparing meshes takes long.
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """A structure of an imported city.
+    """A structure of an imported city, from an object such as a Building.
 
-    Attributes:
-        structure: in the world.
-        kind: type of its object, such as Building.
-        year: in which it was built, if known.
-        triangles: (M, 3, 3) all surfaces that a car could hit or drive over,
-            in the world [m].
-        until: year in which it was demolished, if it was.
-        tags: its tags or attributes in the file.
-        lod: level of detail; 0 if unknown.
-        original: name of the structure that it is a variant of; its own if
-            empty.
-        is_gone: whether it was demolished, at an unknown date.
+    Triangles (M, 3, 3) are all surfaces that a car could hit or drive over, in
+    the world [m]. It was built in the year, if known, and demolished in that of
+    `until`, or at an unknown date if `is_gone`. A level of detail of 0 is
+    unknown. The original is the structure that it is a variant of; itself if
+    empty.
     """
 
     structure: Structure

@@ -321,21 +321,15 @@ def _has_years(one: Imported) -> bool:
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Returns a city with a stage before its only one.
+    """Returns a city with a stage before its only one, and the changes.
 
     The draws depend on the names of buildings, so that the rest of a file does
     not change them. What is gone by the only stage stands at the first, and
     what has its place today does not.
 
-    Args:
-        city: a single stage.
-        part: share of its buildings that are missing or lower at first.
-        seed: the seed of the draws.
-
-    Returns:
-        The city and the changes: names of buildings that are `missing` at
-        first, the `part_of_height` of lower ones there, and, if any stood
-        there, those of the file that are `gone_since`.
+    At first, a `part` of its buildings is missing or lower. The changes are the
+    names of buildings that are `missing`, the `part_of_height` of lower ones,
+    and, if any stood there, those of the file that are `gone_since`.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]

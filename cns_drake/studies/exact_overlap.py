@@ -32,8 +32,7 @@ from evaluation.recognition.seen_surfaces import TOLERANCE
 class VisibleSurfaces:
     """The surfaces that a LiDAR sees from a place of a simulated drive.
 
-    Attributes:
-        max_range: greatest coordinate of a point in the sensor's frame [m].
+    Points with a coordinate beyond `max_range` [m] in its frame are left out.
     """
 
     scene: RayCastingScene

@@ -39,12 +39,8 @@ def knob_effects(
 ) -> dict[str, list[trend_databases.TrendPoint]]:
     """Simulates the pair as it is and with each knob taken back.
 
-    Returns:
-        Title -> a point for each method.
-
-    Args:
-        earlier: a drive; the database.
-        later: a drive of the same map at a later stage; the query.
+    The earlier drive is the database, and one of the same map at a later stage
+    the query. The result is title -> a point for each method.
 
     Raises:
         InputError: the map's files cannot be used.

@@ -69,14 +69,9 @@ def climb_ladder(
 
     `<output>/ladder.csv` and `queries.csv` are the tables, `ladder.png` (and
     PDF, SVG) the figure, `findings.txt` the findings. Finished work is not
-    repeated.
-
-    Args:
-        with_pairs: also cross the six causes that cost most two by two, and
-            write `pairs.csv`.
-
-    Returns:
-        The path of `ladder.csv`, and the findings.
+    repeated. `with_pairs` also crosses the six causes that cost most two by
+    two, and writes `pairs.csv`. Returns the path of `ladder.csv`, and the
+    findings.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step
@@ -209,11 +204,7 @@ def query_drives(maps: Iterable[str]) -> list[Scenario]:
 
 @dataclass
 class RungPlan:
-    """The jobs of one map.
-
-    Attributes:
-        distractors: drives with places of other cities.
-    """
+    """The jobs of one map; distractors drive through other cities."""
 
     _query: Scenario
     _viewpoint: str
@@ -325,12 +316,8 @@ def distracting_drives(
     These are the shipped drives of other maps, each through its own stage;
     then those of this map, along the same streets between other buildings, if
     it is shipped; then the drives of other maps through the other stages; then
-    through those cities drawn anew.
-
-    Args:
-        query: a drive through the city whose places are not to stand among
-            these; its LiDARs measure the others, too.
-        spacing: between two places [m].
+    through those cities drawn anew. The LiDARs of the query, whose city is left
+    out, measure all of them. Places are `spacing` apart [m].
 
     Raises:
         InputError: a shipped map cannot be used.

@@ -138,12 +138,9 @@ class RungDrives:
         )
 
     def radius(self, along: float) -> float:
-        """Returns the radius of a match [m].
+        """Returns the radius of a match from its reach along the way [m].
 
         On a straight road, as many places match at any lateral distance.
-
-        Args:
-            along: greatest distance of a match along the way [m].
         """
         return math.hypot(along, self.lateral)
 
@@ -251,12 +248,7 @@ def _seen_from(drive: Scenario, left: float, heading_deg: float) -> Scenario:
 def mapped_from(
     scenario: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a scenario with its LiDARs moved on the vehicle.
-
-    Args:
-        ahead, left: how far they move [m].
-        heading_deg: how far they turn to the left [deg].
-    """
+    """Returns a scenario with LiDARs moved [m] and turned to the left [deg]."""
     lidars = {}
     for name, config in scenario.lidars.items():
         (x, y, z), (roll, pitch, yaw) = config.xyz, config.rpy_deg
@@ -270,12 +262,7 @@ def mapped_from(
 
 @dataclass(frozen=True)
 class Rung:
-    """One cause at one level.
-
-    Attributes:
-        cause: one of `CAUSES`.
-        level: from 1 to 4; 0 for `none`.
-    """
+    """One of `CAUSES` at a level from 1 to 4; `none` has level 0."""
 
     cause: str
     level: int

@@ -39,12 +39,9 @@ Levels = Mapping[tuple[str, int], str]
 
 @dataclass(frozen=True)
 class LevelResult:
-    """A method on a level of a map.
+    """A method on a level, 0 to 4, of a map; AUC with its 95 % interval.
 
-    Attributes:
-        level: from 0 to 4.
-        is_gated: whether the gate was used (the method had the radius).
-        auc, low, high: with its 95 % interval.
+    With the gate, `is_gated`, the method had the radius.
     """
 
     map_name: str
@@ -77,11 +74,9 @@ def frozen_levels() -> dict[tuple[str, int], str]:
 
 
 def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
-    """Returns the results of several tables, checked.
+    """Returns the results of several tables like `ladder.csv`, checked.
 
-    Args:
-        files: tables like `ladder.csv`, of one or several methods. Other rungs
-            than levels are ignored.
+    Each may have several methods. Other rungs than levels are ignored.
 
     Raises:
         InputError: a table cannot be read; a method lacks a level of a map, was

@@ -28,11 +28,7 @@ from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies.map_truth import (
-    open_survey,
-    simulate_survey,
-    write_truth,
-)
+from cns_drake.studies import map_truth
 from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import Label, read_pair, read_truth
@@ -73,10 +69,8 @@ STUDY_SPACING = 5.0
 class MapPair:
     """A test pair.
 
-    Attributes:
-        source: a shipped map, or the name of a city's file.
-        years: that a shipped map lives; None for an import.
-        sha256: digest of the file.
+    The source is a shipped map that lives for so many years, or the file of a
+    city, with its digest and without years.
     """
 
     name: str
@@ -113,13 +107,8 @@ def make_pair(
 ) -> Path:
     """Makes the city and the labelled maps of a pair, unless they are there.
 
-    Args:
-        folder: for `city` and `maps`.
-        files: folder of cities' files, for imports.
-        spacing: way between two scans [m].
-
-    Returns:
-        The folder of the maps.
+    They are `city` and `maps` in the folder; the latter is returned. `files` is
+    the folder of cities' files, for imports. Scans are `spacing` apart [m].
 
     Raises:
         InputError: a file is missing or another one, or cannot be written.
@@ -140,10 +129,10 @@ def make_pair(
     # An imported city has another way at each stage.
     others = sorted(city.glob("other_*.yaml")) or drives
     surveys = [
-        simulate_survey(load_scenario(file).replaced(stage=stage))
+        map_truth.simulate_survey(load_scenario(file).replaced(stage=stage))
         for file, stage in ((drives[0], stages[0]), (others[-1], stages[-1]))
     ]
-    write_truth(surveys[0], surveys[1], maps, spacing, track)
+    map_truth.write_truth(surveys[0], surveys[1], maps, spacing, track)
     return maps
 
 
@@ -158,8 +147,7 @@ def score_pairs(
 ) -> Path:
     """Makes pairs and scores baselines on them; returns the table's path.
 
-    Args:
-        names: of the pairs; all without one.
+    All pairs are made if none is named.
 
     Raises:
         InputError: a name is unknown, or a pair cannot be made.
@@ -186,10 +174,7 @@ def score_pairs(
 def score_methods(
     maps: Path, methods: Sequence[str], track: Track = silent
 ) -> dict[str, dict[str, float | None]]:
-    """Returns method -> name -> value of the scores of baselines.
-
-    Args:
-        methods: baselines, or `TRUTH`.
+    """Returns method -> name -> value of scores of baselines or of `TRUTH`.
 
     Raises:
         InputError: the folder cannot be read, or a baseline cannot run.
@@ -224,24 +209,21 @@ def measure_maps(
     methods: tuple[str, ...],
     spacing: float,
 ) -> dict[str, dict[str, float | None]]:
-    """Maps two drives, and scores methods by exact labels.
+    """Maps two drives and scores methods like `score_methods`.
 
-    Args:
-        methods: see `score_methods`.
-        spacing: way between two scans [m].
-
-    Returns:
-        Method -> name -> value.
+    Scans are `spacing` apart [m].
     """
     a, b = (
-        simulate_survey(source.scenario)
+        map_truth.simulate_survey(source.scenario)
         if isinstance(source, DriveSimulation)
-        else open_survey(source.path)
+        else map_truth.open_survey(source.path)
         for source in (database, query)
     )
     with tempfile.TemporaryDirectory() as folder:
         maps = Path(folder) / "maps"
-        write_truth(a, b, maps, spacing, reporter.track, across_maps=True)
+        map_truth.write_truth(
+            a, b, maps, spacing, reporter.track, across_maps=True
+        )
         return score_methods(maps, methods, reporter.track)
 
 

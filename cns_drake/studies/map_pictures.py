@@ -6,11 +6,7 @@ from pathlib import Path
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.pictures.stage_pictures import (
-    draw_drives,
-    draw_stages,
-    load_views,
-)
+from cns_drake.pictures import stage_pictures
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -84,7 +80,9 @@ def picture_drives(
     """Draws the drives of a map from above."""
     del reporter
     scenarios = [one.scenario for one in drives]
-    draw_drives({s.name.replace("_", " "): s for s in scenarios}, picture)
+    stage_pictures.draw_drives(
+        {s.name.replace("_", " "): s for s in scenarios}, picture
+    )
 
 
 def picture_stages(
@@ -93,8 +91,8 @@ def picture_stages(
     """Draws a street of a map in its first and its last stage."""
     del reporter
     views, *stages = (one.path for one in read)
-    draw_stages(
+    stage_pictures.draw_stages(
         {stage.stem.replace("_", " "): stage for stage in stages},
-        load_views(views)["street"],
+        stage_pictures.load_views(views)["street"],
         picture,
     )

@@ -114,13 +114,7 @@ _MOST_ROWS = 200
 
 @dataclass(frozen=True)
 class Survey:
-    """One of both drives, with its world.
-
-    Attributes:
-        drive: its scans and poses, recorded or simulated.
-        simulated: the same drive, in its world.
-        scenario: what was simulated.
-    """
+    """One of both drives, recorded or simulated, and the same in its world."""
 
     drive: Drive
     simulated: SimulatedDrive
@@ -140,10 +134,7 @@ class Survey:
 
 
 def open_survey(place: str | Path) -> Survey:
-    """Opens a recording of a simulated drive, or simulates a scenario.
-
-    Args:
-        place: a recording, the name of a shipped drive or a scenario's file.
+    """Opens a recording, or simulates a shipped drive or a scenario's file.
 
     Raises:
         InputError: it cannot be used, the points have no instances, or the
@@ -253,8 +244,7 @@ def label_points(
 ) -> np.ndarray:
     """Returns a label for each point of a map, (N,) uint8.
 
-    Args:
-        frames: (K,) frames of the other drive that look.
+    The other drive looks from its frames (K,).
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
@@ -271,11 +261,9 @@ def observed(
     frames: np.ndarray,
     track: Track = silent,
 ) -> np.ndarray:
-    """Returns which points (N, 3) in the world a drive observes, (N,) bool.
+    """Returns which points (N, 3) in W [m] a drive observes, (N,) bool.
 
-    Args:
-        points: in the world [m].
-        frames: (K,) its frames.
+    It looks from its frames (K,).
     """
     result = np.zeros(len(points), bool)
     pattern = drive.pattern
@@ -342,11 +330,7 @@ class _Look:
 
 
 class _Tiles:
-    """Points by square tiles of the ground.
-
-    Attributes:
-        left: rows of the points of each tile that are not yet seen.
-    """
+    """Points by square tiles of the ground; `left` has rows not yet seen."""
 
     def __init__(self, points: np.ndarray):
         cells = np.floor(points[:, :2] / _TILE).astype(np.int64)
@@ -368,11 +352,7 @@ class _Tiles:
 
 
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
-    """Returns which points (N, 3) a surface passes within `NEAR`, (N,) bool.
-
-    Args:
-        points: in the world [m].
-    """
+    """Returns (N,) bool: points (N, 3) in W [m] within `NEAR` of a surface."""
     result = np.zeros(len(points), bool)
     left = np.arange(len(points))
     for axis in _AXES / np.linalg.norm(_AXES, axis=1, keepdims=True):

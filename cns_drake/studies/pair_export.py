@@ -73,14 +73,10 @@ def export_pairs(
     options: ExportOptions,
     cluster: Cluster,
 ) -> list[Path]:
-    """Writes a set for a trainer; finished drives are not simulated again.
+    """Writes a set for a trainer; returns the files that name the pairs.
 
-    Args:
-        held_out: drives for the evaluation alone; without any, that is of the
-            others.
-
-    Returns:
-        The files that name the pairs.
+    Finished drives are not simulated again. Drives held out are for the
+    evaluation alone; without any, that is of the others.
 
     Raises:
         InputError: two drives have one name, or one cannot be simulated; all
@@ -195,13 +191,7 @@ def compare_runs(
 
 @dataclass(frozen=True)
 class Run:
-    """An exported drive.
-
-    Attributes:
-        folder: of its clouds, below the set's folder.
-        X_WS: (N, 4, 4) poses of the clouds.
-        city: number of its city.
-    """
+    """An exported drive: clouds below the set's folder, poses (N, 4, 4)."""
 
     folder: str
     X_WS: np.ndarray

@@ -65,12 +65,8 @@ def plan_recordings(
 ) -> list[Job]:
     """Returns a job for each unfinished recording; notes the finished ones.
 
-    The job has the recording's name.
-
-    Args:
-        overwrite: replace other recordings of these names.
-        pages: name -> web page of the drive. A recording without its page
-            counts as not finished.
+    The job has the recording's name; `overwrite` lets it replace another one.
+    A recording without its web page in `pages`, if given, is not finished.
 
     Raises:
         InputError: two have one name, or a folder must not be used.
@@ -114,10 +110,8 @@ def plan_recordings(
 class Record(Step):
     """Records a scenario, and saves a web page of the drive.
 
-    Attributes:
-        page: file of the page, if any.
-        survey: surveys the recording, made during the simulation. After an
-            interruption, the step that needs the survey makes it.
+    A survey is made during the simulation. After an interruption, the step that
+    needs the survey makes it.
     """
 
     scenario: Scenario

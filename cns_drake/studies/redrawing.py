@@ -56,13 +56,9 @@ def redraw_cities(
 ) -> dict[int, Path]:
     """Draws the city of a map anew, with progress on stderr.
 
-    An existing city of the same inputs and program is kept.
-
-    Args:
-        map_folder: the map, with `roads.yaml` and `city.yaml`.
-
-    Returns:
-        Seed -> map folder of that city, `<output>/<map>_c<seed>`, absolute.
+    An existing city of the same inputs and program is kept. The map needs
+    `roads.yaml` and `city.yaml`. The result is seed -> map folder of that city,
+    `<output>/<map>_c<seed>`, absolute.
 
     Raises:
         InputError: the map cannot be used, another file or folder has the name
@@ -88,12 +84,9 @@ def redraw_cities(
 
 @dataclass(frozen=True)
 class RedrawCity(Step):
-    """Draws the city of a map anew.
+    """Draws the city of a map anew, with one stage, the whole city.
 
-    Attributes:
-        stage: name of the only stage, the whole city.
-        folder: the map folder to write; an older redrawn city of this name is
-            replaced, anything else is refused.
+    An older redrawn city in `folder` is replaced, anything else is refused.
     """
 
     map_folder: Path
@@ -147,15 +140,11 @@ class RedrawCity(Step):
 
 
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
-    """Returns the inputs of a map's city drawn anew.
+    """Returns the inputs of a map's city drawn anew: name -> content.
 
-    Args:
-        stage: name of the only stage, the whole city. The map's own
-            stages name structures that another draw need not have.
-
-    Returns:
-        Name -> content of `roads.yaml`, which is the map's own, `city.yaml`
-        and `stages.yaml`.
+    They are `roads.yaml`, which is the map's own, `city.yaml` and `stages.yaml`
+    with one stage, the whole city. The map's own stages name structures that
+    another draw need not have.
 
     Raises:
         InputError: a file of the map cannot be read, or is no plan.
@@ -203,12 +192,7 @@ def _is_replaced(folder: Path) -> bool:
 
 @dataclass(frozen=True)
 class Version:
-    """A version of a shipped map.
-
-    Attributes:
-        number: from 1 on.
-        turn_deg: turn of the whole city about the world's origin [deg].
-    """
+    """A version of a shipped map, from 1 on, turned about the origin [deg]."""
 
     map_name: str
     number: int
@@ -305,11 +289,9 @@ class DrawFreshCity(RedrawCity):
 
 
 def turned(values: Any, turn_deg: float) -> Any:
-    """Returns roads or a plan, turned about the world's origin.
+    """Returns the content of `roads.yaml` or `city.yaml`, turned about W.
 
-    Args:
-        values: content of `roads.yaml` or `city.yaml`.
-        turn_deg: anticlockwise [deg].
+    The turn is anticlockwise [deg].
     """
     if isinstance(values, list):
         return [turned(one, turn_deg) for one in values]
@@ -345,13 +327,10 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 
 
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
-    """Returns stages without the structures that a city lacks.
+    """Returns the content of `stages.yaml` without structures a city lacks.
 
     A draw has another number of houses in a row. Groups without any structure
     are left out.
-
-    Args:
-        stages: content of `stages.yaml`.
     """
     if isinstance(stages, list):
         return [

@@ -45,14 +45,10 @@ def reproduce_maps(
     web page of each drive, `<output>/pictures` the routes of each
     map from above and a street in its first and last stage,
     `<output>/report` the tables and figures. Finished work is not repeated.
+    The path of the report's page is returned.
 
-    Args:
-        quick: make only the report, of the same frames: drives that are not
-            recorded yet are evaluated while they are simulated, and not
-            recorded.
-
-    Returns:
-        The path of the report's page.
+    With `quick`, only the report is made, of the same frames: drives that are
+    not recorded yet are evaluated while they are simulated, and not recorded.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step

@@ -43,13 +43,8 @@ def measure_sizes(
 ) -> Path:
     """Measures methods with more and more places of other cities.
 
-    Finished work is not repeated.
-
-    Args:
-        map_name: name or folder of the map whose last drive asks.
-
-    Returns:
-        The path of `size.csv`.
+    The last drive of the map, given by name or folder, asks. Finished work is
+    not repeated. Returns the path of `size.csv`.
 
     Raises:
         InputError: the map is unknown, a number is not from 0 to 100,000, or a

@@ -277,14 +277,9 @@ def train(
     track: Track = silent,
     on_step: Callable[[int, Parameters], None] = lambda step, values: None,
 ) -> tuple[Parameters, np.ndarray]:
-    """Trains a network.
+    """Trains a network; an interrupted training goes on from its `state` file.
 
-    Args:
-        state: file that keeps the state; a training that was interrupted goes
-            on from there.
-
-    Returns:
-        The weights, and (steps, 2) loss and share of right best places.
+    Returns the weights, and (steps, 2) loss and share of right best places.
 
     Raises:
         InputError: there is nothing to pair, the state is another training's,
@@ -415,8 +410,7 @@ def write_weights(
 ) -> None:
     """Writes a file of weights, as the method `learned` reads it.
 
-    Args:
-        seen: least and greatest part of the sectors with a point in training.
+    `seen` is the least and greatest part of sectors with a point in training.
     """
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
@@ -438,10 +432,9 @@ _CITIES_A_MINUTE, _STEPS_A_MINUTE = 0.3, 60
 class TrainingPlan:
     """What a training sees, and for how long.
 
-    Attributes:
-        change: whether drives see different stages, and passing changes.
-        returns: whether some have calibrated returns and weather.
-        driver: whether drivers wander and change lanes.
+    With `change`, drives see different stages and passing changes; with
+    `returns`, some have calibrated returns and weather; with `driver`, drivers
+    wander and change lanes.
     """
 
     cities: int

@@ -27,20 +27,8 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies import ladder_rungs, map_pairs
 from cns_drake.studies.ladder import RungPlan, query_drives
-from cns_drake.studies.ladder_rungs import (
-    NEAR,
-    NONE,
-    Rung,
-    RungDrives,
-    plain_drives,
-)
-from cns_drake.studies.map_pairs import (
-    STUDY_SPACING,
-    TRUTH,
-    measure_maps,
-    study_methods,
-)
 from evaluation.change.tcr import temporal_change
 from evaluation.drives.sampling import sample_frames
 from evaluation.localisation.localise import is_right
@@ -141,15 +129,9 @@ def measure_years(
 
     `<output>/years.csv` and `lifetimes.csv` are the tables, `years.png` (and
     PDF, SVG) the chart, `findings.txt` the findings, `cities/` the aged maps.
-    Finished work is not repeated.
-
-    Args:
-        years: positive, ascending.
-        directions: whether the database is of today, the query, or both in
-            turn.
-
-    Returns:
-        The path of `years.csv`, and the findings.
+    Finished work is not repeated. Years are positive and ascending; the
+    directions say whether the database is of today, the query, or both in turn.
+    Returns the path of `years.csv`, and the findings.
 
     Raises:
         InputError: an argument or a map cannot be used, the folder cannot be
@@ -192,11 +174,11 @@ def measure_years(
     if updates:
         tasks[MAP_TASK] = (
             "maps",
-            measure_maps,
-            (study_methods(on_note), STUDY_SPACING),
+            map_pairs.measure_maps,
+            (map_pairs.study_methods(on_note), map_pairs.STUDY_SPACING),
         )
 
-    def add_tasks(name: str, drives: RungDrives) -> None:
+    def add_tasks(name: str, drives: ladder_rungs.RungDrives) -> None:
         both = DriveSimulation(drives.database), DriveSimulation(drives.query)
         for task, (kind, function, arguments) in tasks.items():
             part = files.part(kind, name)
@@ -205,10 +187,12 @@ def measure_years(
             further.setdefault(task, []).append(step.part)
 
     for drive in drives:
-        plan = RungPlan(drive, NEAR, methods, protocol, files)
-        plain = plain_drives(drive)
+        plan = RungPlan(drive, ladder_rungs.NEAR, methods, protocol, files)
+        plain = ladder_rungs.plain_drives(drive)
         today = _map_job(drive, files, jobs)
-        part = plan.add_rung(Rung(NONE, 0, 0, "", plain))
+        part = plan.add_rung(
+            ladder_rungs.Rung(ladder_rungs.NONE, 0, 0, "", plain)
+        )
         found.append((drive, 0, 0, FORWARD, part, today, today))
         add_tasks(drive.name, plain)
         for seed in seeds:
@@ -226,7 +210,9 @@ def measure_years(
                     BACKWARD: replace(plain, database=before),
                 }
                 for direction in directions:
-                    rung = Rung(direction, year, seed, "", pairs[direction])
+                    rung = ladder_rungs.Rung(
+                        direction, year, seed, "", pairs[direction]
+                    )
                     part = plan.add_rung(rung)
                     found.append(
                         (drive, year, seed, direction, part, today, mapped)
@@ -272,11 +258,11 @@ def _values(task: str, found: Any) -> dict[tuple[str, str], tuple[float, int]]:
             (task, method): (float(is_right(rows).mean()), len(rows))
             for method, rows in zip(SHIPPED, found, strict=True)
         }
-    truth = found.pop(TRUTH)
+    truth = found.pop(map_pairs.TRUTH)
     number = truth["gone"] + truth["new"]
     unchanged = 1.0 - truth["called_points"]
     return {
-        (UNCHANGED_TASK, TRUTH): (unchanged, number),
+        (UNCHANGED_TASK, map_pairs.TRUTH): (unchanged, number),
         **{
             (task, method): (scores["miou"], number)
             for method, scores in found.items()
@@ -297,8 +283,7 @@ def map_city(
 ) -> np.ndarray:
     """Returns the centroids (N, 3) of the voxel map of a drive's scans [m].
 
-    Args:
-        spacing: between two scans [m].
+    Scans are `spacing` apart [m].
     """
     drive = source()
     frames = sample_frames(drive.X_WS[:, :3, 3], spacing)

@@ -69,8 +69,7 @@ class Bay:
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
         """Returns the bay, extended, seen from above [m].
 
-        Args:
-            beyond: lengths at front, back, left and right [m].
+        `beyond` has lengths at front, back, left and right [m].
         """
         front, back, left, right = self.reach + beyond
         c, s = math.cos(self.yaw), math.sin(self.yaw)

@@ -171,13 +171,10 @@ _OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
 
 
 class _Stretch:
-    """A straight piece of kerb.
+    """A straight piece of kerb, with the name of its cell.
 
-    Attributes:
-        name: name of its cell.
-        middle: (2,) of it [m].
-        yaw: heading of its x axis; y points away from the carriageway [rad].
-        length: distance of its ends [m].
+    At its middle (2,) [m] is a frame at `yaw` [rad], whose x axis runs along it
+    and whose y axis points away from the carriageway.
     """
 
     def __init__(self, name: str, points: np.ndarray, outward: np.ndarray):

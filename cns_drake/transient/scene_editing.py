@@ -47,10 +47,8 @@ Named = TypeVar("Named", bound=_Named)
 class Look(NamedTuple):
     """The look of new surfaces.
 
-    Attributes:
-        rgb: diffuse colour.
-        reflectivity: near 900 nm, 0 to 1; None if it follows from class and
-            colour.
+    The reflectivity, 0 to 1 near 900 nm, is None if it follows from class and
+    diffuse colour.
     """
 
     rgb: tuple[float, float, float]
@@ -269,12 +267,8 @@ class SceneEditing:
 class Surroundings:
     """A drive's surroundings while they are changed.
 
-    Attributes:
-        editing: changes the world.
-        things: structure name -> structure, all of them.
-        drive: the way of the vehicle, seen from above [m].
-        kept_free: area that stays free of new things, seen from above [m].
-        seed: seed of all draws.
+    The drive is the way of the vehicle, and `kept_free` the area that stays
+    free of new things, seen from above [m].
     """
 
     editing: SceneEditing

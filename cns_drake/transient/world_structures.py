@@ -206,9 +206,7 @@ _LEAST_AREA = 4.0
 class Kerb(NamedTuple):
     """A stretch of the edge of the carriageway.
 
-    Attributes:
-        points: (N, 2) along it [m].
-        outwards: (N, 2) unit vectors, away from the carriageway.
+    Points (N, 2) [m] lie along it; unit vectors (N, 2) are away from the road.
     """
 
     points: np.ndarray

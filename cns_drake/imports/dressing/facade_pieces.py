@@ -20,13 +20,9 @@ from cns_drake.city.facades import bays, details
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
 from cns_drake.city.facades.walls import Relief, lifted, single_wall
+from cns_drake.city.geometry import upper_sides
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import triangulate
-from cns_drake.city.geometry.upper_sides import (
-    UpperSides,
-    long_normals,
-    unit_normals,
-)
 from cns_drake.imports.dressing.styles import Style, Use
 from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.faces import parts_of
@@ -111,7 +107,7 @@ class FacadePlan:
         x, z = np.transpose(at)
         return panel.place(x, z, _BEFORE)
 
-    def threshold(self, door: Opening, paving: UpperSides) -> float:
+    def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
         """Returns the height of a threshold, a step above the paving [m].
 
         The highest paving before the door and in its recess counts, unless it
@@ -169,7 +165,7 @@ def plan_facade(
     return FacadePlan(panel, style, openings, floor, ground, to_drive)
 
 
-def with_shops(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
+def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     """Returns a wall whose windows on the ground floor are shop windows."""
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)
@@ -184,7 +180,7 @@ def with_shops(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
     return replace(plan, openings=openings)
 
 
-def with_doors(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
+def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     """Returns a wall with doors in place of windows on its ground floor."""
     street = plan.on_street
     if not street or any(o.kind == "shop" for o in street):
@@ -487,8 +483,8 @@ _RIDGE = 0.15
 
 def is_flat_roof(roof: np.ndarray) -> bool:
     """Returns whether most of a roof (M, 3, 3) is level."""
-    above = np.abs(long_normals(roof)[:, 2])
-    level = np.abs(unit_normals(roof)[:, 2]) > _LEVEL
+    above = np.abs(upper_sides.long_normals(roof)[:, 2])
+    level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
 
 
@@ -508,7 +504,7 @@ def add_roof_pieces(
 
 def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:
     """Returns the largest level part of a roof without holes, and its z."""
-    level = roof[unit_normals(roof)[:, 2] > _LEVEL]
+    level = roof[upper_sides.unit_normals(roof)[:, 2] > _LEVEL]
     best: tuple[Polygon, float] | None = None
     if not len(level):
         return None
@@ -549,7 +545,7 @@ def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
     end = ridge[np.linalg.norm(ridge - start, axis=1).argmax()]
     length = float(np.linalg.norm(end - start))
     yaw = math.atan2(end[1] - start[1], end[0] - start[0])
-    sides = UpperSides(roof)
+    sides = upper_sides.UpperSides(roof)
     count = 1 + int(length > 15.0)
     for k, share in enumerate(out.rng.uniform(0.12, 0.88, 2)[:count]):
         x, y, z = start + share * (end - start)

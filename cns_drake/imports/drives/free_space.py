@@ -4,12 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import (
-    binary_closing,
-    binary_fill_holes,
-    distance_transform_edt,
-    label,
-)
+from scipy import ndimage
 import shapely
 from shapely import STRtree
 
@@ -106,7 +101,7 @@ def find_free_space(
             walls.append(triangles)
     free = ~(blocked | (in_water & ~on_road))
     least = _FROM_WALL
-    paved = binary_closing(on_road, iterations=1) & ~blocked
+    paved = ndimage.binary_closing(on_road, iterations=1) & ~blocked
     if _largest(_clearance(paved) >= _FROM_EDGE) * CELL**2 >= _LEAST_ROAD:
         free, least = paved, _FROM_EDGE
     elif blocked.any():
@@ -167,28 +162,28 @@ def _filled(
     shape = np.array([row.max(), column.max()]) - first + 1
     walls = np.zeros(shape, dtype=bool)
     walls[row - first[0], column - first[1]] = True
-    row, column = np.nonzero(binary_fill_holes(walls))
+    row, column = np.nonzero(ndimage.binary_fill_holes(walls))
     return row + first[0], column + first[1]
 
 
 def _clearance(free: np.ndarray) -> np.ndarray:
     """Returns the distance of each cell to one that is not free [m]."""
     # No car can drive beyond the grid.
-    return distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
+    return ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
 
 
 def _between(blocked: np.ndarray) -> np.ndarray:
     """Returns the cells that have buildings on both sides."""
     reach = int(_HALF_STREET / CELL)
-    near = distance_transform_edt(~np.pad(blocked, 2 * reach)) <= reach
-    return (distance_transform_edt(near) > reach)[
+    near = ndimage.distance_transform_edt(~np.pad(blocked, 2 * reach)) <= reach
+    return (ndimage.distance_transform_edt(near) > reach)[
         2 * reach : -2 * reach, 2 * reach : -2 * reach
     ]
 
 
 def _largest(cells: np.ndarray) -> int:
     """Returns the number of cells of the largest connected part."""
-    parts, number = label(cells, np.ones((3, 3)))
+    parts, number = ndimage.label(cells, np.ones((3, 3)))
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 

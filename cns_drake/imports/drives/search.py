@@ -70,12 +70,9 @@ _MOST_REACHED = 400_000
 
 @dataclass(frozen=True)
 class WaypointDrive:
-    """A drive through a city.
+    """A drive: waypoints (N, 2) or (N, 3), the path (M, 2) between them [m].
 
-    Attributes:
-        waypoints: (N, 2) or (N, 3) [m].
-        path: (M, 2) that a car follows [m].
-        limit: the lowest speed limit on the way, or none [m/s].
+    The limit is the lowest speed limit on the way, or none [m/s].
     """
 
     waypoints: np.ndarray
@@ -146,11 +143,9 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class WayGraph(ABC):
-    """Pieces of way, each with its successors.
+    """Pieces of way with lengths (N,) [m], each with its successors.
 
-    Attributes:
-        lengths: (N,) lengths of the pieces [m].
-        is_open: (N,) whether a car can drive along them, as far as is known.
+    A piece is open, (N,), if a car can drive along it as far as is known.
     """
 
     def __init__(

@@ -205,11 +205,8 @@ class Cubics:
     ) -> np.ndarray:
         """Returns the values (N,) at distances (N,), or the slopes there.
 
-        Args:
-            s: where [m].
-            inside: places that select the piece, which differ on both sides of
-                a joint [m].
-            is_slope: whether to return the first derivatives.
+        `inside` selects the piece of each place: it differs from `s` [m] on
+        both sides of a joint.
         """
         if not self:
             return np.zeros(len(s))
@@ -256,14 +253,10 @@ class MarkLine:
 
 @dataclass(frozen=True)
 class RoadMark:
-    """A line painted on the border of a lane.
+    """A line painted on the border of a lane, in a colour of the file.
 
-    Attributes:
-        start: along the road [m].
-        kind: its type, such as `solid broken`.
-        colour: as the file names it.
-        width: how wide one line is [m].
-        lines: the lines it consists of; those usual for its kind if empty.
+    It begins at `start` along the road [m]. A kind is such as `solid broken`;
+    without lines, those usual for it are meant, each with the width [m].
     """
 
     start: float
@@ -275,15 +268,12 @@ class RoadMark:
 
 @dataclass(frozen=True)
 class Lane:
-    """A lane of a section.
+    """A lane of a section, of a type such as driving.
 
-    Attributes:
-        number: counted from the middle outwards, positive on the left.
-        kind: its type, such as driving.
-        width: over the distance along the road; or border: distance of its
-            outer edge from the middle.
-        height: how high its inner edge stands above the road [m].
-        marks: on its outer border, one after the other.
+    Numbers count from the middle outwards, positive on the left. A lane has a
+    width over the distance along the road, or a border: the distance of its
+    outer edge from the middle. Its inner edge stands at the height above the
+    road [m]; marks are on its outer border, one after the other.
     """
 
     number: int
@@ -340,21 +330,13 @@ class Thing(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedRoad:
-    """A road.
+    """A road; its name is its id in letters, digits, dots and dashes, unique.
 
-    Attributes:
-        name: its id in letters, digits, dots and dashes, unique.
-        junction: id of the junction that it belongs to, or none.
-        length: its length [m].
-        pieces: parts of its course, one after the other.
-        elevation: height of the reference line [m].
-        superelevation: roll about it [rad].
-        lane_offset: how far the middle of its lanes lies to the left [m].
-        sections: stretches with the same lanes, one after the other.
-        keeps_left: whether its traffic keeps left.
-        limits: pairs of start and value of a speed limit [m, m/s].
-        things: beside it.
-        spans: `bridge` or `tunnel` for each of them that the file has on it.
+    Pieces of its course follow one another, as do sections, stretches with the
+    same lanes. The middle of the lanes lies `lane_offset` [m] to the left of
+    the reference line, which has a height [m] and a roll [rad]. Limits are
+    pairs of start and value of a speed limit [m, m/s]; spans are `bridge` or
+    `tunnel` for each of them that the file has on it.
     """
 
     name: str

@@ -14,12 +14,7 @@ from shapely import STRtree
 from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.faces import (
-    extruded,
-    flat_surface,
-    parts_of,
-    sound_parts,
-)
+from cns_drake.imports import faces
 from cns_drake.imports.foreign_city import (
     LAWN,
     WATER,
@@ -121,9 +116,9 @@ def laid(
     """
     source = name.partition("_")[2]
     surface = [
-        flat_surface(polygon, look.z, source, faults)
+        faces.flat_surface(polygon, look.z, source, faults)
         for area in areas
-        for polygon in sound_parts(area, source, faults)
+        for polygon in faces.sound_parts(area, source, faults)
     ]
     if surface:
         yield _made(name, look, "surface", surface)
@@ -140,10 +135,10 @@ def raised(
     The source is the name of its element in the file, and the faults.
     """
     solids = [
-        np.concatenate(extruded(polygon, 0.0, look.z, *source))
+        np.concatenate(faces.extruded(polygon, 0.0, look.z, *source))
         for area in areas
-        for part in parts_of(area)
-        for polygon in sound_parts(part, *source)
+        for part in faces.parts_of(area)
+        for polygon in faces.sound_parts(part, *source)
     ]
     if solids:
         yield _made(name, look, "body", solids)
@@ -211,9 +206,9 @@ def street_surfaces(
                 walks.append((f"{name}_{'lr'[side < 0]}", strip))
     paved = shapely.union_all([area for _, area in roads])
     for name, area in roads:
-        yield from laid(f"road_{name}", _ROAD, parts_of(area), faults)
+        yield from laid(f"road_{name}", _ROAD, faces.parts_of(area), faults)
     for name, area in walks:
-        areas = parts_of(area.difference(paved))
+        areas = faces.parts_of(area.difference(paved))
         yield from laid(f"walk_{name}", _WALK, areas, faults)
 
 
@@ -289,7 +284,7 @@ def crossing_stripes(
             stripes = _stripes(places[k], along / np.hypot(*along), width)
             name = f"n{number}"
             surface = [
-                flat_surface(s, _STRIPE_HEIGHT, name, features.faults)
+                faces.flat_surface(s, _STRIPE_HEIGHT, name, features.faults)
                 for s in stripes
             ]
             yield make_imported(
@@ -422,7 +417,9 @@ def sea(
     edges = shapely.union_all([whole.boundary, *cuts])
     areas = shapely.get_parts(shapely.polygonize([edges]))
     water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
-    yield from laid(f"sea_{coasts[0].name}", _WATER, parts_of(water), faults)
+    yield from laid(
+        f"sea_{coasts[0].name}", _WATER, faces.parts_of(water), faults
+    )
 
 
 def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:

@@ -23,11 +23,7 @@ from cns_drake.imports.foreign_city import (
     cut_at_nodes,
     ends_at_nodes,
 )
-from cns_drake.imports.openstreetmap.tags import (
-    LaneLayout,
-    lane_layout,
-    speed_limit,
-)
+from cns_drake.imports.openstreetmap import tags
 from cns_drake.imports.options import DriveOn
 from cns_drake.roads.centreline import blend
 from cns_drake.traffic import lane_graph
@@ -245,7 +241,7 @@ class Stretch:
     street: Street
     line: np.ndarray
     nodes: tuple[int, int]
-    layout: LaneLayout
+    layout: tags.LaneLayout
 
     @cached_property
     def length(self) -> float:
@@ -310,7 +306,7 @@ class StreetTraffic:
         self.lanes = [
             DirectedLane(
                 _level(lane.points),
-                speed_limit(
+                tags.speed_limit(
                     self.stretches[lane.stretch].street.tags, lane.is_forward
                 ),
                 False,
@@ -447,11 +443,11 @@ def _stretches(
         street
         for street in streets
         if street.tags.get("highway") != "track"
-        and lane_layout(street.tags, street.width).width
+        and tags.lane_layout(street.tags, street.width).width
     ]
     for street, line, ends in cut_at_nodes(used, crossed):
         if shapely.LineString(line).length > SPACING:
-            layout = lane_layout(street.tags, street.width)
+            layout = tags.lane_layout(street.tags, street.width)
             yield Stretch(street, _rounded(line), ends, layout)
 
 
