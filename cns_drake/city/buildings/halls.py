@@ -4,16 +4,9 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs, wings
+from cns_drake.city.facades import bays, details, massing, roofs, walls, wings
 from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import (
-    Band,
-    Facade,
-    Patch,
-    facade_mesh,
-    glass_mesh,
-)
 from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -69,7 +62,7 @@ def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
             _add_doors(p, wing, openings, edge)
     low = wing.wall_top + 0.5
     attic = wings.attic_window(1.0, low, low + 1.3, _RECESS)
-    openings.enclose((_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
+    openings.enclose((_RECESS,), (walls.Band(0.0, 0.3, -0.06),), attic=attic)
     for edge in range(4):
         _add_battens(p, wing, boxes, openings, edge)
 
@@ -101,7 +94,7 @@ def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
     x = wall.length / 2
     openings.clear(edge, x - width - 0.2, x + width + 0.2, 0.0, height + 0.4)
     if p.deck > 0 and edge == 0:
-        gap = Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
+        gap = walls.Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
         openings.put(edge, x, width + 0.4, lambda a, b: [gap])
         spots = (x - width, x + width / 2 + 0.05)
         half = width / 2 - 0.05
@@ -233,7 +226,7 @@ def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
     openings.row(sides, high - 1.0, p.bay, [band], 0.5)
     openings.row(ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9)
     openings.put(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
-    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.5, -0.08),))
+    openings.enclose((_SPORTS_HALL_RECESS,), (walls.Band(0.0, 0.5, -0.08),))
     _add_frames(p, hall, halls)
 
 
@@ -272,7 +265,7 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
         wide - 0.6, 0.05, h - 0.8, _SPORTS_HALL_RECESS, mullions=3
     )
     openings.put(0, middle, wide, glazing)
-    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.3, -0.05),))
+    openings.enclose((_SPORTS_HALL_RECESS,), (walls.Band(0.0, 0.3, -0.05),))
     z, half = h - 0.65, wide / 2 + 1.0
     lid = (middle - half, middle + half, -0.02, 1.5, z, z + 0.25)
     p.add_to("frames", annex.wall(0).box(*lid))
@@ -300,10 +293,10 @@ class WaterfrontHall(Building):
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.dock_depth
         plan = massing.rectangle(x0, front, x1, y1)
-        walls = _walls(self)
+        facade = _walls(self)
         pieces = [
             massing.foundation(plan),
-            facade_mesh(plan, walls),
+            walls.facade_mesh(plan, facade),
             details.piers(
                 plan, self.pitch, self.pier_width, self.pier_reach, 0.0,
                 self.eaves - 0.5, margin=0.5 + self.pier_width / 2,
@@ -311,11 +304,11 @@ class WaterfrontHall(Building):
             *_dock(self, x0, x1, y0, front),
         ]  # fmt: skip
         self.add("walls", *pieces)
-        self.add("glass", glass_mesh(plan, walls), rgb=self.glass_rgb)
+        self.add("glass", walls.glass_mesh(plan, facade), rgb=self.glass_rgb)
         self.add("roof", _roof(self, plan), rgb=self.colours["roof"])
 
 
-def _walls(p: WaterfrontHall) -> Facade:
+def _walls(p: WaterfrontHall) -> walls.Facade:
     """Tall windows between the piers, doors under every few of them."""
     head = p.eaves - 1.0
     window = bays.window(
@@ -328,8 +321,11 @@ def _walls(p: WaterfrontHall) -> Facade:
     rows = bays.rhythm(p.pitch, [window], margin=0.5)
     layouts = {0: bays.rhythm(p.pitch, choices, margin=0.5), 2: rows}
     layout = bays.by_edge(layouts, bays.with_middle(rows, door, p.pitch))
-    bands = (Band(0.0, 0.6, -0.1), Band(p.eaves - 0.5, p.eaves, -0.3))
-    return Facade(p.eaves, bands, layout, (p.window_depth,))
+    bands = (
+        walls.Band(0.0, 0.6, -0.1),
+        walls.Band(p.eaves - 0.5, p.eaves, -0.3),
+    )
+    return walls.Facade(p.eaves, bands, layout, (p.window_depth,))
 
 
 def _dock(

@@ -46,16 +46,12 @@ def start_city(
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
-    """Writes the missing inputs of a city.
+    """Writes the missing inputs of a city in a folder with `roads.yaml`.
 
     `city.yaml` gets a district for each block between the roads, `stages.yaml`
     a stage 01 without the buildings and trees in the east and a whole stage 02.
-    Each stage gets a drive on a route drawn at random.
-
-    Args:
-        world: folder with `roads.yaml`.
-        seed: seed of the draws.
-        progress: takes a line for each file that is written.
+    Each stage gets a drive on a route drawn at random. `progress` takes a line
+    for each file that is written.
 
     Returns:
         The files written; existing files stay as they are.
@@ -112,11 +108,7 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
 
 
 def starter_plan(areas: StreetAreas, seed: int) -> dict:
-    """Returns a plan in which every block has a character of its own.
-
-    Returns:
-        What `CityPlan` validates.
-    """
+    """Returns a plan for `CityPlan`, where each block has its own character."""
     text = resources.files("cns_drake.city.generation").joinpath(
         "characters.yaml"
     )
@@ -162,11 +154,7 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
 
 
 def starter_stages(city: City) -> dict:
-    """Returns two stages; the first one lacks the structures in the east.
-
-    Returns:
-        What `Stages` validates.
-    """
+    """Returns two stages for `Stages`; the first lacks what is in the east."""
     standing = [
         structure
         for structure in city.structures

@@ -20,14 +20,10 @@ from cns_drake.city.geometry.polygons import (
     wall_mesh,
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
+from cns_drake.roads import street_areas
 from cns_drake.roads.centreline import sample_stations
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import ENDS, Direction, End, Road
-from cns_drake.roads.street_areas import (
-    RoadSurface,
-    StreetAreas,
-    SurfaceHeights,
-)
 
 # Marks the structures that are ground: no stage lacks them.
 GROUND_TAG = "ground"
@@ -113,15 +109,15 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
     bays = unary_union(list(network.parking_bays().values()))
     return street_surfaces(
         network,
-        RoadSurface(network),
+        street_areas.RoadSurface(network),
         kerb_height(network),
         [parking_bays(bays)],
     )
 
 
 def street_surfaces(
-    areas: StreetAreas,
-    surface: SurfaceHeights,
+    areas: street_areas.StreetAreas,
+    surface: street_areas.SurfaceHeights,
     kerb: float,
     coverings: Sequence[Covering],
     kerbless: BaseGeometry | None = None,
@@ -165,7 +161,7 @@ def kerb_area(paved: BaseGeometry) -> MultiPolygon:
 
 
 def _heights(
-    surface: SurfaceHeights, kerb: float
+    surface: street_areas.SurfaceHeights, kerb: float
 ) -> tuple[HeightMap | float, HeightMap | float]:
     """Returns the heights of the roads and of the sidewalks beside them."""
     if surface.is_level:

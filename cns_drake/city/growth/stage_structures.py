@@ -235,10 +235,9 @@ def _places(
 class GrowingCity:
     """A city and its stages.
 
-    Attributes:
-        structures: structures of the whole city, then those on lots before they
-            are built on; a structure's instance id is its place in this order,
-            counted from 1, and the same at all stages.
+    Its structures are those of the whole city, then those on lots before they
+    are built on; an instance id is a place in this order, counted from 1, and
+    the same at all stages.
     """
 
     def __init__(

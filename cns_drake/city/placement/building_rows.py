@@ -40,10 +40,8 @@ _RIGHT_EDGE, _LEFT_EDGE = 1, 3
 class _House:
     """A building that is to be built, its frame S at `xy` and `yaw` in W.
 
-    Attributes:
-        height: height of the walls [m].
-        taken: the ground in W that was taken for it.
-        blind_edges: edges of the footprint with a neighbour wall to wall.
+    It has the height of its walls [m], the ground in W that was taken for it,
+    and the edges of the footprint with a neighbour wall to wall.
     """
 
     archetype: str
