@@ -515,11 +515,6 @@ def _ring(r: walls.Relief, width: float, reach: float) -> Mesh:
 def board(x0: float, x1: float, z0: float, z1: float, reach: float) -> Mesh:
     """A board on a wall, without its back, in wall coordinates."""
     v = [(x, y, z) for y in (0.0, reach) for z in (z0, z1) for x in (x0, x1)]
-    faces = (
-        (4, 6, 7, 5),
-        (0, 4, 5, 1),
-        (2, 3, 7, 6),
-        (0, 2, 6, 4),
-        (1, 5, 7, 3),
-    )
+    faces = ((4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6),
+             (0, 2, 6, 4), (1, 5, 7, 3))  # fmt: skip
     return Mesh(np.array(v), faces)

@@ -551,10 +551,8 @@ class Openings:
         count = 4
         step = height / count
         for k in range(count):
-            low, high = (
-                round(k * step + 0.02, 2),
-                round((k + 1) * step - 0.02, 2),
-            )
+            low = round(k * step + 0.02, 2)
+            high = round((k + 1) * step - 0.02, 2)
             panel = details.board(a, b, low, high, 0.06)
             panel = panel.moved((0.0, -DOOR_M, 0.0))
             self._out.add_to("trim", self._wing.wall(edge).place(panel))

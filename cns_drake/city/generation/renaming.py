@@ -88,9 +88,8 @@ def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
         InputError: the file cannot be read.
     """
     text = _text(stages)
-    for node in sorted(
-        _name_nodes(stages), key=lambda node: -node.start_mark.index
-    ):
+    nodes = _name_nodes(stages)
+    for node in sorted(nodes, key=lambda node: -node.start_mark.index):
         if node.value in renamed:
             start, end = node.start_mark.index, node.end_mark.index
             # The scalar may have an anchor in front of it.

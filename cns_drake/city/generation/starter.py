@@ -109,13 +109,11 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
 
 def starter_plan(areas: StreetAreas, seed: int) -> dict:
     """Returns a plan for `CityPlan`, where each block has its own character."""
-    text = resources.files("cns_drake.city.generation").joinpath(
-        "characters.yaml"
-    )
-    templates = yaml.safe_load(text.read_text(encoding="utf-8"))
-    streets = unary_union(
-        [areas.carriageway(), areas.sidewalks(), areas.medians()]
-    )
+    folder = resources.files("cns_drake.city.generation")
+    text = folder.joinpath("characters.yaml").read_text(encoding="utf-8")
+    templates = yaml.safe_load(text)
+    parts = [areas.carriageway(), areas.sidewalks(), areas.medians()]
+    streets = unary_union(parts)
     x0, y0, x1, y1 = streets.bounds
     bounds = (
         int(np.floor(x0 - _MARGIN)),
@@ -133,12 +131,9 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
         if not characters:
             # Every character is used once before one is used again.
             characters = list(rng.permutation(list(templates["blocks"])))
-        is_square = piece.area < _SQUARE
-        district = (
-            templates["square"]
-            if is_square
-            else templates["blocks"][characters.pop()]
-        )
+        district = templates["square"]
+        if piece.area >= _SQUARE:
+            district = templates["blocks"][characters.pop()]
         inside = shapely.point_on_surface(piece)
         place = [round(inside.x, 2), round(inside.y, 2)]
         name = f"block_{len(districts) + 1:02d}"
@@ -155,16 +150,10 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
 
 def starter_stages(city: City) -> dict:
     """Returns two stages for `Stages`; the first lacks what is in the east."""
-    standing = [
-        structure
-        for structure in city.structures
-        if structure.semantic_class in ("building", "vegetation")
-    ]
-    x = [
-        structure.xyz[0]
-        for structure in standing
-        if structure.semantic_class == "building"
-    ] or [structure.xyz[0] for structure in standing]
+    kinds = "building", "vegetation"
+    standing = [s for s in city.structures if s.semantic_class in kinds]
+    buildings = [s for s in standing if s.semantic_class == "building"]
+    x = [structure.xyz[0] for structure in buildings or standing]
     absent = defaultdict(list)
     if x:
         limit = float(np.quantile(x, _STANDING))

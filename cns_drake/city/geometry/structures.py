@@ -107,12 +107,9 @@ class Structure:
     @property
     def p_WFs(self) -> np.ndarray:
         """The feet: (N, 3) lowest points of the model, in the world [m]."""
-        p_SPs = np.concatenate(
-            [
-                part_mesh(part, self.model.meshes).vertices
-                for part in self.model.parts
-            ]
-        )
+        model = self.model
+        meshes = [part_mesh(part, model.meshes) for part in model.parts]
+        p_SPs = np.concatenate([mesh.vertices for mesh in meshes])
         is_low = p_SPs[:, 2] < p_SPs[:, 2].min() + _FEET
         return p_SPs[is_low] @ rotation((0.0, 0.0, self.yaw)).T + self.xyz
 

@@ -191,10 +191,8 @@ def _fitting_house(
     depth = rng.uniform(*row.depth)
     low, high = kind.widths
     for width_part, depth_part in _SIZES:
-        size = np.maximum(
-            (width * width_part, depth * depth_part),
-            (row.width[0], row.depth[0]),
-        )
+        wanted = width * width_part, depth * depth_part
+        size = np.maximum(wanted, (row.width[0], row.depth[0]))
         lot = lot_at(line, start, *np.clip(size, low, high).round(1).tolist())
         # On a curve a lot's front is its chord, a little less than asked for.
         if lot is None or lot.width < low:

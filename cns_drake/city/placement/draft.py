@@ -56,11 +56,8 @@ class Draft:
         source: str,
     ):
         self.areas, self.plan, self.source = areas, plan, source
-        self.streets: BaseGeometry = snap(
-            unary_union(
-                [areas.carriageway(), areas.sidewalks(), areas.medians()]
-            )
-        )
+        parts = [areas.carriageway(), areas.sidewalks(), areas.medians()]
+        self.streets: BaseGeometry = snap(unary_union(parts))
         self.frontage = self.streets
         self.base: Ground = LevelGround(kerb_height)
         self.structures: list[Structure] = []
