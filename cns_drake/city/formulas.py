@@ -15,9 +15,8 @@ FUNCTIONS: Mapping[str, Any] = {
 def value_of(given: Any, names: dict[str, Any]) -> Any:
     """Returns the value of a formula, of each in a list, or a plain value.
 
-    Args:
-        given: a Python expression as text; anything else is its own value.
-        names: the numbers and functions that it may use.
+    Formulas are Python expressions as text, which may use the numbers and
+    functions in `names`.
     """
     if isinstance(given, list):
         return [value_of(one, names) for one in given]

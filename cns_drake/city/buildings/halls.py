@@ -4,16 +4,9 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs, wings
+from cns_drake.city.facades import bays, details, massing, roofs, walls, wings
 from cns_drake.city.facades.assembly import Building
 from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import (
-    Band,
-    Facade,
-    Patch,
-    facade_mesh,
-    glass_mesh,
-)
 from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -32,10 +25,8 @@ class Barn(Building):
         front, back = y0 + _MARGIN + self.deck, y1 - _MARGIN
         a, b, low, high = left, right, front, back
         if along_y:
-            a, b = (
-                a + self.aisle * self.aisle_left,
-                b - self.aisle * (not self.aisle_left),
-            )
+            a += self.aisle * self.aisle_left
+            b -= self.aisle * (not self.aisle_left)
         else:
             high -= self.aisle
         top = self.height - (0.7 if self.ventilators else 0.0)
@@ -61,15 +52,14 @@ def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
     """Adds the barn itself, with its doors, or the lean-to."""
     openings = Openings(p, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
-    openings.row(
-        range(4), 1.0, 3.2, [bays.window(0.9, 1.1, head, _RECESS)], 0.8
-    )
+    window = bays.window(0.9, 1.1, head, _RECESS)
+    openings.row(range(4), 1.0, 3.2, [window], 0.8)
     if wing is boxes[0]:
         for edge in (0,) if wing.roof.along_y else (3, 0):
             _add_doors(p, wing, openings, edge)
     low = wing.wall_top + 0.5
     attic = wings.attic_window(1.0, low, low + 1.3, _RECESS)
-    openings.enclose((_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
+    openings.enclose((_RECESS,), (walls.Band(0.0, 0.3, -0.06),), attic=attic)
     for edge in range(4):
         _add_battens(p, wing, boxes, openings, edge)
 
@@ -101,7 +91,7 @@ def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
     x = wall.length / 2
     openings.clear(edge, x - width - 0.2, x + width + 0.2, 0.0, height + 0.4)
     if p.deck > 0 and edge == 0:
-        gap = Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
+        gap = walls.Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
         openings.put(edge, x, width + 0.4, lambda a, b: [gap])
         spots = (x - width, x + width / 2 + 0.05)
         half = width / 2 - 0.05
@@ -163,8 +153,8 @@ def _add_jetty(p: Barn, xs: bays.Span, y0: float, front: float) -> None:
         p.add_to("doors", massing.standing(*spot, 1.1))
 
 
-_SPORTS_HALL_RECESS = 0.2
-_SPORTS_HALL_MARGIN = 0.6
+_DEEP = 0.2
+_RIM = 0.6
 
 
 class SportsHall(Building):
@@ -174,12 +164,7 @@ class SportsHall(Building):
         """Builds the hall on a rectangle, its entrance in front."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + (self.annex + 1.6 if self.annex else 1.8)
-        area = (
-            x0 + _SPORTS_HALL_MARGIN,
-            front,
-            x1 - _SPORTS_HALL_MARGIN,
-            y1 - _SPORTS_HALL_MARGIN,
-        )
+        area = (x0 + _RIM, front, x1 - _RIM, y1 - _RIM)
         along_y = area[3] - area[1] > area[2] - area[0]
         halls = _halls(self, area, along_y)
         for hall in halls:
@@ -216,24 +201,17 @@ def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
 def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
     openings = Openings(p, hall, halls)
     high, width = hall.wall_top, p.bay - 0.9
-    band = bays.window(
-        width, high - 2.4, high - 0.6, _SPORTS_HALL_RECESS, mullions=1
-    )
+    band = bays.window(width, high - 2.4, high - 0.6, _DEEP, mullions=1)
     low = max(0.5 if p.annex == 0.0 else p.annex_height + 0.4, 0.3 * high)
     tall = bays.window(
-        width,
-        low,
-        high - 0.6,
-        _SPORTS_HALL_RECESS,
-        mullions=1,
-        transom=high - 1.6,
+        width, low, high - 0.6, _DEEP, mullions=1, transom=high - 1.6
     )
     ends = hall.gables
     sides = [k for k in range(4) if k not in ends]
     openings.row(sides, high - 1.0, p.bay, [band], 0.5)
     openings.row(ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9)
     openings.put(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
-    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.5, -0.08),))
+    openings.enclose((_DEEP,), (walls.Band(0.0, 0.5, -0.08),))
     _add_frames(p, hall, halls)
 
 
@@ -265,14 +243,12 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
     area = (x0 + margin, y0 + 1.6, x1 - margin, halls[0].y0 + 0.05)
     annex = Wing.flat(area, h, 0.4)
     openings = Openings(p, annex, halls)
-    small = bays.window(1.6, 1.5, 2.5, _SPORTS_HALL_RECESS)
+    small = bays.window(1.6, 1.5, 2.5, _DEEP)
     openings.row((0, 1, 3), 1.0, 3.6, [small], 0.8)
     middle, wide = annex.width / 2, min(7.0, 0.35 * annex.width)
-    glazing = bays.window(
-        wide - 0.6, 0.05, h - 0.8, _SPORTS_HALL_RECESS, mullions=3
-    )
+    glazing = bays.window(wide - 0.6, 0.05, h - 0.8, _DEEP, mullions=3)
     openings.put(0, middle, wide, glazing)
-    openings.enclose((_SPORTS_HALL_RECESS,), (Band(0.0, 0.3, -0.05),))
+    openings.enclose((_DEEP,), (walls.Band(0.0, 0.3, -0.05),))
     z, half = h - 0.65, wide / 2 + 1.0
     lid = (middle - half, middle + half, -0.02, 1.5, z, z + 0.25)
     p.add_to("frames", annex.wall(0).box(*lid))
@@ -300,10 +276,10 @@ class WaterfrontHall(Building):
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.dock_depth
         plan = massing.rectangle(x0, front, x1, y1)
-        walls = _walls(self)
+        facade = _walls(self)
         pieces = [
             massing.foundation(plan),
-            facade_mesh(plan, walls),
+            walls.facade_mesh(plan, facade),
             details.piers(
                 plan, self.pitch, self.pier_width, self.pier_reach, 0.0,
                 self.eaves - 0.5, margin=0.5 + self.pier_width / 2,
@@ -311,11 +287,11 @@ class WaterfrontHall(Building):
             *_dock(self, x0, x1, y0, front),
         ]  # fmt: skip
         self.add("walls", *pieces)
-        self.add("glass", glass_mesh(plan, walls), rgb=self.glass_rgb)
+        self.add("glass", walls.glass_mesh(plan, facade), rgb=self.glass_rgb)
         self.add("roof", _roof(self, plan), rgb=self.colours["roof"])
 
 
-def _walls(p: WaterfrontHall) -> Facade:
+def _walls(p: WaterfrontHall) -> walls.Facade:
     """Tall windows between the piers, doors under every few of them."""
     head = p.eaves - 1.0
     window = bays.window(
@@ -328,8 +304,11 @@ def _walls(p: WaterfrontHall) -> Facade:
     rows = bays.rhythm(p.pitch, [window], margin=0.5)
     layouts = {0: bays.rhythm(p.pitch, choices, margin=0.5), 2: rows}
     layout = bays.by_edge(layouts, bays.with_middle(rows, door, p.pitch))
-    bands = (Band(0.0, 0.6, -0.1), Band(p.eaves - 0.5, p.eaves, -0.3))
-    return Facade(p.eaves, bands, layout, (p.window_depth,))
+    bands = (
+        walls.Band(0.0, 0.6, -0.1),
+        walls.Band(p.eaves - 0.5, p.eaves, -0.3),
+    )
+    return walls.Facade(p.eaves, bands, layout, (p.window_depth,))
 
 
 def _dock(
@@ -344,10 +323,8 @@ def _dock(
     pieces = [platform]
     pieces += [details.WallFrame(ends, k).place(steps) for k in (1, 3)]
     eaves = min(p.eaves - 0.8, high + 5.2)
-    (ya, za), (yb, zb) = (
-        (front - p.dock_depth + 0.1, eaves - 0.5),
-        (front, eaves),
-    )
+    ya, za = front - p.dock_depth + 0.1, eaves - 0.5
+    yb, zb = front, eaves
     section = [(ya, za), (yb, zb), (yb, zb + 0.2), (ya, za + 0.25)]
     vertices = np.array([(x, y, z) for x in (a, b) for y, z in section])
     faces = [(k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4) for k in range(4)]
@@ -364,8 +341,7 @@ def _roof(p: WaterfrontHall, plan: np.ndarray) -> Mesh:
     rise = p.height - p.eaves
     if p.roof == "sawtooth":
         teeth = massing.extruded(_sawtooth(x0, x1, rise), y0, y1)
-        teeth = massing.swapped(teeth)
-        return teeth.moved((0.0, 0.0, p.eaves))
+        return massing.swapped(teeth).moved((0.0, 0.0, p.eaves))
     pieces = []
     edges = np.linspace(y0, y1, p.spans + 1)
     for a, b in itertools.pairwise(edges):

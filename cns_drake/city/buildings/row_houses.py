@@ -25,14 +25,9 @@ def _add_unit(
     part: str = "",
     door_material: str = "accent",
 ) -> Wing:
-    """Adds a house; returns its box.
+    """Adds a house on an area; its stoop in front stays free. Returns its box.
 
-    Args:
-        p: the house, with the parameters of a `row_unit`.
-        area: x0, y0, x1, y1 of its walls; `p.stoop` in front stays free.
-        blind: edges against a neighbour.
-        part: prefix of its own visuals.
-        door_material: material of the door's leaf.
+    Names of its own visuals start with `part`.
     """
     wing, storeys = _unit_box(p, area, blind)
     openings = Openings(p, wing)

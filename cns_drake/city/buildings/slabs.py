@@ -324,12 +324,9 @@ class GalleryFlats(Building):
         roof = tiers.add_crown(self, slab, crown, top, 0.5, thickness=0.25)
         equip_roof(self, slab, roof, self.roof_items)
         left = x0 if self.stair_left else b - 0.05
-        shaft = massing.rectangle(
-            left,
-            slab[0, 1] + 0.8,
-            left + self.stair_width + 0.05,
-            slab[2, 1] - 0.8,
-        )
+        right = left + self.stair_width + 0.05
+        low, high = slab[0, 1] + 0.8, slab[2, 1] - 0.8
+        shaft = massing.rectangle(left, low, right, high)
         _add_gallery_flats_stair(self, shaft)
 
 

@@ -29,14 +29,12 @@ def pick(rng: np.random.Generator, choices: Sequence[T]) -> T:
 
 @dataclass(frozen=True)
 class Site:
-    """The ground a building gets.
+    """The ground of a building, a simple polygon in the building's frame S [m].
 
-    Attributes:
-        footprint: simple polygon in the building's frame S [m]. Its front is
-            the edge between its first two corners; for a rectangle, the edge of
-            least y. Edges count counter-clockwise from there.
-        name: the structure's name; its own meshes are called `<name>_...`.
-        blind_edges: edges built against a neighbour: plain walls.
+    Its front is the edge between its first two corners; for a rectangle, the
+    edge of least y. Edges count counter-clockwise from there; `blind_edges` are
+    built against a neighbour. The building's own meshes are called
+    `<name>_...`.
     """
 
     footprint: Polygon
@@ -162,13 +160,8 @@ class Assembly:
 
     Meshes become a part of their own (`add`), or are gathered by material
     (`paint`, `add_to`). Each material becomes one part, so that a small
-    building of many small pieces has few visuals.
-
-    Attributes:
-        site: the ground it stands on.
-        rng: the source of all variation that its parameters leave open.
-        rgb: colour of parts without a colour of their own.
-        glass_rgb: colour of its panes.
+    building of many small pieces has few visuals. Parts without a colour of
+    their own have `rgb`.
     """
 
     site: Site
@@ -287,13 +280,8 @@ class Building(Assembly, abc.ABC):
     """A building of an archetype: it draws its parameters, then builds itself.
 
     Functions that add something to a building take it as `p`: they find in it
-    its parameters, and gather in it what they make.
-
-    Attributes:
-        kind: its archetype.
-        height: height of its parapet, ridge or spire; only roof equipment and
-            chimneys may rise above [m].
-        colours: part -> drawn colour.
+    its parameters, and gather in it what they make. Only roof equipment and
+    chimneys may rise above its `height` [m].
     """
 
     def __init__(

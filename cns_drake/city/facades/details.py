@@ -10,15 +10,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.city.facades import bays, massing, roofs
+from cns_drake.city.facades import bays, massing, roofs, walls
 from cns_drake.city.facades.assembly import Assembly, Rgb
-from cns_drake.city.facades.walls import (
-    Band,
-    Facade,
-    Relief,
-    facade_mesh,
-    glass_mesh,
-)
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 
 # Height that the shared flight of fire stairs climbs; parts scale it [m].
@@ -26,11 +19,7 @@ FIRE_STAIRS_STOREY_M = 3.4
 
 
 class WallFrame:
-    """Carries geometry from a wall's own coordinates to the building's.
-
-    Attributes:
-        length: length of the wall [m].
-    """
+    """Carries geometry from a wall's own coordinates to the building's [m]."""
 
     def __init__(self, outline: ArrayLike, edge: int):
         outline = np.asarray(outline, dtype=float)
@@ -110,10 +99,9 @@ def awnings(
 ) -> list[Mesh]:
     """Awnings above a share of the shops along a wall.
 
-    Args:
-        shape: how much narrower than its shop on either side, reach, lower
-            edge and upper edge of an awning [m].
-        door: half the stretch in the middle of the wall without any [m].
+    The shape is how much narrower than its shop an awning is on either side,
+    its reach, lower and upper edge; within `door` of the wall's middle are none
+    [m].
     """
     narrower, reach, z0, z1 = shape
     middle, pieces = wall.length / 2, []
@@ -322,13 +310,9 @@ def add_porch(
 ) -> None:
     """Adds a roofed porch in front of a wall, as `trim` and `roof`.
 
-    Args:
-        reach: of its posts; the roof ends 0.25 m further out [m].
-        deck: height of its floor [m].
-        eaves: underside of the beam on the posts [m].
-        top: top of the roof [m].
-        roof: `shed`, `gable` (a pediment over all of it) or `flat`.
-        posts: how many along the front, at least 2.
+    The roof is `shed`, `gable` (a pediment over all of it) or `flat`, and ends
+    0.25 m further out than the `reach` of the posts, at least 2. `deck` is the
+    height of the floor, `eaves` of the underside of the beam on the posts [m].
     """
     pieces = [massing.box(x0, x1, -0.05, reach, -massing.FOUNDATION_M, deck)]
     y, half = reach - 0.15, _POST_M / 2
@@ -436,8 +420,8 @@ def add_bay_window(
     height = round(z1 - z0, 3)
     step = height / storeys
 
-    def layout(edge: int, length: float) -> list[Relief]:
-        relief: list[Relief] = []
+    def layout(edge: int, length: float) -> list[walls.Relief]:
+        relief: list[walls.Relief] = []
         for k in range(storeys if edge not in flush and length >= 0.7 else 0):
             z = k * step
             pane = bays.window(
@@ -447,14 +431,14 @@ def add_bay_window(
             relief += pane(0.0, length)
         return relief
 
-    bands = (Band(height - 0.2, height, -0.08),)
-    facade = Facade(height, bands, layout, (_RECESS,), flush)
+    bands = (walls.Band(height - 0.2, height, -0.08),)
+    facade = walls.Facade(height, bands, layout, (_RECESS,), flush)
     if z0 == 0.0:
         under = massing.foundation(points)
     else:
         under = massing.flat(points, z0, up=False)
-    out.add_to("walls", facade_mesh(points, facade, z0), under)
-    out.add_to("glass", glass_mesh(points, facade, z0))
+    out.add_to("walls", walls.facade_mesh(points, facade, z0), under)
+    out.add_to("glass", walls.glass_mesh(points, facade, z0))
     reaches = [-0.12 * (k not in flush) for k in range(len(points))]
     outer = massing.inset(points, reaches)
     tip = (outer[0] + outer[-1]) / 2
@@ -486,7 +470,7 @@ def chimney_breast(
 
 
 def casings(
-    reliefs: Sequence[Relief],
+    reliefs: Sequence[walls.Relief],
     glass: Sequence[float],
     style: str,
     reach: float = 0.05,
@@ -512,7 +496,7 @@ def casings(
     return pieces
 
 
-def _ring(r: Relief, width: float, reach: float) -> Mesh:
+def _ring(r: walls.Relief, width: float, reach: float) -> Mesh:
     """Boards around an opening, mitred at its corners."""
     w = width
     outer = [(r.x0 - w, r.z0 - w), (r.x0 - w, r.z1 + w),
@@ -531,11 +515,6 @@ def _ring(r: Relief, width: float, reach: float) -> Mesh:
 def board(x0: float, x1: float, z0: float, z1: float, reach: float) -> Mesh:
     """A board on a wall, without its back, in wall coordinates."""
     v = [(x, y, z) for y in (0.0, reach) for z in (z0, z1) for x in (x0, x1)]
-    faces = (
-        (4, 6, 7, 5),
-        (0, 4, 5, 1),
-        (2, 3, 7, 6),
-        (0, 2, 6, 4),
-        (1, 5, 7, 3),
-    )
+    faces = ((4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6),
+             (0, 2, 6, 4), (1, 5, 7, 3))  # fmt: skip
     return Mesh(np.array(v), faces)

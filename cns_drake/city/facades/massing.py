@@ -275,10 +275,8 @@ def revolved(
 def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
     """Returns a shed: a roof line drawn along x, with its end walls.
 
-    Args:
-        profile: (y, z) points of the roof line, y rising [m]; the ends
-            reach down to the height of its first point.
-        x0, x1: ends of the shed [m].
+    The line is (y, z) points, y rising; the ends reach down to its first point
+    [m].
     """
     base = profile[0][1]
     faces = Faces()
@@ -424,11 +422,9 @@ def _replaced(
 def stadium(
     x0: float, y0: float, x1: float, y1: float, step: float = 3.0
 ) -> np.ndarray:
-    """A rectangle whose short ends, left and right, are half circles.
+    """A rectangle, longer along x, whose short ends are half circles.
 
-    Args:
-        x0, y0, x1, y1: its extent [m], longer along x.
-        step: longest chord of the half circles [m].
+    The longest chord of the half circles is `step` [m].
     """
     radius, middle = (y1 - y0) / 2, (y0 + y1) / 2
     count = max(2, math.ceil(math.pi * radius / step))

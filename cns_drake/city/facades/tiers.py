@@ -122,9 +122,7 @@ def add_grooved(
             the depth of the windows, `pitch`, `pier` and `pier_reach`, of the
             piers, whose width may be 0, and `solid_corner`, the width of
             solid corners, 0 for glass around the corner [m].
-        outline: outline of the walls.
         z0, goal: bottom, and about the top [m].
-        part: name of the visuals.
         rise: how far the piers rise above the storeys [m].
         most: greatest number of visuals that the storeys become.
         plain: edges without any relief.

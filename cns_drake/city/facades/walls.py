@@ -345,16 +345,11 @@ def lifted(item: _Strip, dz: float) -> _Strip:
 
 
 def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
-    """Returns the walls around a polygon, without their glass.
+    """Returns the walls around (N, 2) counter-clockwise corners, without glass.
 
-    Args:
-        points: (N, 2) corners of the zero-depth outline, counter-clockwise.
-        facade: what the walls look like.
-        z0: height of the bottom of the walls [m].
-
-    Returns:
-        Walls open at bottom and top: at both ends every cell is closed back
-        to depth 0, so walls stacked on the same outline join without gaps.
+    Walls start at z0 [m] and are open at bottom and top: at both ends every
+    cell is closed back to depth 0, so walls stacked on the same outline join
+    without gaps.
 
     Raises:
         ValueError: a patch leaves its wall.
@@ -375,14 +370,9 @@ def single_wall(
 ) -> list[Mesh]:
     """Returns a wall that meets no other, in the coordinates of a wall.
 
-    Args:
-        length, height: [m].
-        reliefs: painted in order; they stay clear of both ends.
-        fronts: the depths whose fronts, as glass, are a mesh of their own, for
-            each of these [m].
-
-    Returns:
-        The wall without these fronts, then each of them.
+    Reliefs are painted in order and stay clear of both ends [m]. The wall
+    without its glass comes first, then a mesh for each of `fronts`, the depths
+    of panes.
 
     Raises:
         ValueError: a relief leaves the wall.

@@ -15,21 +15,12 @@ import math
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs
+from cns_drake.city.facades import bays, details, massing, roofs, walls
 from cns_drake.city.facades.assembly import Assembly
-from cns_drake.city.facades.walls import (
-    Arch,
-    Band,
-    Facade,
-    Patch,
-    Relief,
-    facade_mesh,
-    glass_mesh,
-)
 from cns_drake.city.geometry.mesh import Mesh
 
 # The windows of a gable: (from, to) -> holes.
-Attic = Callable[[float, float], list[Patch]]
+Attic = Callable[[float, float], list[walls.Patch]]
 # Overlap of a roof's underside with the top of the walls [m].
 _SEAT = 0.02
 
@@ -63,14 +54,10 @@ class Roof:
 
 @dataclass(frozen=True)
 class Wing:
-    """A box of a house.
+    """A box of a house, with the top of its walls and of its roof [m].
 
-    Attributes:
-        x0, y0, x1, y1: its walls [m].
-        wall_top: top of its walls [m].
-        top: top of its roof [m]; of a flat roof, the parapet.
-        roof: shape of its roof.
-        blind: edges built against a neighbour: flush and plain.
+    The top of a flat roof is the parapet. Edges built against a neighbour are
+    `blind`: flush and plain.
     """
 
     x0: float
@@ -210,7 +197,7 @@ def add_roof(
     for edge in wing.gables:
         wall = wing.wall(edge)
         under = _seen_from(wing, edge, line)
-        holes: list[Patch] = []
+        holes: list[walls.Patch] = []
         if attic is not None and is_free[edge]:
             holes = [
                 hole for hole in attic(0.0, wall.length) if _fits(hole, under)
@@ -240,7 +227,7 @@ def _seen_from(
     return [(end - u, z - thickness) for u, z in reversed(line)]
 
 
-def _fits(hole: Patch, under: list[bays.Span]) -> bool:
+def _fits(hole: walls.Patch, under: list[bays.Span]) -> bool:
     return all(
         hole.z1 < roofs.line_height(under, x) - 0.15 for x in (hole.x0, hole.x1)
     )
@@ -251,11 +238,11 @@ def attic_window(
 ) -> Attic:
     """Returns windows side by side in the middle of a gable."""
 
-    def holes(a: float, b: float) -> list[Patch]:
+    def holes(a: float, b: float) -> list[walls.Patch]:
         step = 1.5 * width
         first = (a + b) / 2 - step * (count - 1) / 2
         return [
-            Patch(
+            walls.Patch(
                 round(x - width / 2, 2), round(x + width / 2, 2), z0, z1, depth
             )
             for x in (first + k * step for k in range(count))
@@ -291,14 +278,10 @@ def add_dormer(
 ) -> None:
     """Adds a dormer on the slope that rises behind a wall, if it fits.
 
-    Args:
-        x, width: its middle and width along the wall [m].
-        base: height of the slope's upper surface above the wall [m].
-        slope: its rise per run.
-        ridge: its upper end, above the dormer [m].
-        setback: of the dormer's front from the wall [m].
-        height: of its front above the slope [m].
-        roof: `gable`, `shed` or `flat`.
+    Its middle x and its width are along the wall. The slope's upper surface is
+    `base` above the wall and rises by `slope` per run up to the `ridge`. The
+    front is `setback` from the wall, its height above the slope [m]. The roof
+    is `gable`, `shed` or `flat`.
     """
     a, b = x - width / 2, x + width / 2
     foot = base + slope * setback
@@ -319,7 +302,7 @@ def add_dormer(
         lid = roofs.shell(fall, a - 0.15, b + 0.15, _THICKNESS)
     under = [(u, z - _THICKNESS) for u, z in line]
     low = foot - _SUNK
-    hole = Patch(
+    hole = walls.Patch(
         round(a + 0.15, 2), round(b - 0.15, 2),
         round(foot + 0.25, 2), round(eaves - 0.15, 2), _DORMER_RECESS,
     )  # fmt: skip
@@ -405,7 +388,7 @@ class Openings:
         self, out: Assembly, wing: Wing, others: Sequence[Wing] = ()
     ) -> None:
         self._out, self._wing, self._others = out, wing, others
-        self._reliefs: dict[int, list[Relief]] = {k: [] for k in range(4)}
+        self._reliefs: dict[int, list[walls.Relief]] = {k: [] for k in range(4)}
 
     def row(
         self,
@@ -443,7 +426,7 @@ class Openings:
             if r.x1 < x0 + 0.01 or r.x0 > x1 - 0.01 or r.z1 < low or r.z0 > high
         ] + new
 
-    def add(self, edge: int, reliefs: Iterable[Relief]) -> None:
+    def add(self, edge: int, reliefs: Iterable[walls.Relief]) -> None:
         """Adds reliefs given in the wall's coordinates."""
         self._reliefs[edge] += reliefs
 
@@ -457,22 +440,22 @@ class Openings:
             if r.x1 < x0 or r.x0 > x1 or r.z1 < z0 or r.z0 > z1
         ]
 
-    def layout(self, edge: int, length: float) -> list[Relief]:
+    def layout(self, edge: int, length: float) -> list[walls.Relief]:
         """Returns all reliefs, for a facade.
 
         Bands end at arches, which need flat wall around them.
         """
-        found: list[Relief] = []
+        found: list[walls.Relief] = []
         for relief in self._reliefs[edge]:
-            if isinstance(relief, Arch):
-                found.append(Patch(*relief[:3], relief.z1, 0.0))
+            if isinstance(relief, walls.Arch):
+                found.append(walls.Patch(*relief[:3], relief.z1, 0.0))
             found.append(relief)
         return found
 
     def add_walls(
         self,
         glass: Sequence[float],
-        bands: Sequence[Band] = (),
+        bands: Sequence[walls.Band] = (),
         material: str = "walls",
     ) -> None:
         """Adds the walls on their foundation, with their panes as `glass`.
@@ -481,17 +464,21 @@ class Openings:
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)
-        facade = Facade(wing.wall_top, bands, self.layout, glass, wing.blind)
+        facade = walls.Facade(
+            wing.wall_top, bands, self.layout, glass, wing.blind
+        )
         outline = wing.outline
         self._out.add_to(
-            material, massing.foundation(outline), facade_mesh(outline, facade)
+            material,
+            massing.foundation(outline),
+            walls.facade_mesh(outline, facade),
         )
-        self._out.add_to("glass", glass_mesh(outline, facade))
+        self._out.add_to("glass", walls.glass_mesh(outline, facade))
 
     def enclose(
         self,
         glass: Sequence[float],
-        bands: Sequence[Band] = (),
+        bands: Sequence[walls.Band] = (),
         material: str = "walls",
         attic: Attic | None = None,
     ) -> None:
@@ -538,13 +525,13 @@ class Openings:
         """Adds a door with its leaf, between windows of `lights` width."""
         half, top = width / 2, round(floor + height, 2)
 
-        def bay(x0: float, x1: float) -> list[Relief]:
+        def bay(x0: float, x1: float) -> list[walls.Relief]:
             a, b = round(x - half, 2), round(x + half, 2)
-            relief: list[Relief] = [Patch(a, b, floor, top, DOOR_M)]
+            relief: list[walls.Relief] = [walls.Patch(a, b, floor, top, DOOR_M)]
             if lights > 0:
                 for u0, u1 in ((a - lights, a - 0.08), (b + 0.08, b + lights)):
                     relief.append(
-                        Patch(u0, u1, round(floor + 0.3, 2), top, GLASS_M)
+                        walls.Patch(u0, u1, round(floor + 0.3, 2), top, GLASS_M)
                     )
             return relief
 
@@ -559,15 +546,13 @@ class Openings:
     ) -> None:
         """Adds a sectional door with ribs, as `trim`."""
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
-        hole: list[Relief] = [Patch(a, b, 0.0, height, DOOR_M)]
+        hole: list[walls.Relief] = [walls.Patch(a, b, 0.0, height, DOOR_M)]
         self.put(edge, x, width + 0.3, lambda x0, x1: hole)
         count = 4
         step = height / count
         for k in range(count):
-            low, high = (
-                round(k * step + 0.02, 2),
-                round((k + 1) * step - 0.02, 2),
-            )
+            low = round(k * step + 0.02, 2)
+            high = round((k + 1) * step - 0.02, 2)
             panel = details.board(a, b, low, high, 0.06)
             panel = panel.moved((0.0, -DOOR_M, 0.0))
             self._out.add_to("trim", self._wing.wall(edge).place(panel))
@@ -655,7 +640,7 @@ SHOP_GLASS_M = (0.35, 0.95)
 def _reversed(bay: bays.Bay) -> bays.Bay:
     """Returns a bay mirrored left to right."""
 
-    def mirrored(x0: float, x1: float) -> list[Relief]:
+    def mirrored(x0: float, x1: float) -> list[walls.Relief]:
         return [
             r._replace(x0=round(x0 + x1 - r.x1, 2), x1=round(x0 + x1 - r.x0, 2))
             for r in bay(x0, x1)

@@ -8,30 +8,16 @@ import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.facades.assembly import Rgb, pick
-from cns_drake.city.geometry.structures import (
-    ROOT_DEPTH,
-    Builder,
-    MeshShape,
-    Model,
-    Part,
-    assemble,
-    block,
-)
+from cns_drake.city.geometry import structures
 
 _LONGEST = 8
 
 
 @dataclass(frozen=True)
 class RunKind:
-    """A kind of fence, from `fences.yaml`.
+    """A kind of fence, from `fences.yaml`; panels have nominal sizes [m].
 
-    Attributes:
-        panel: nominal length of a panel [m].
-        height: nominal height [m].
-        colours: to choose from.
-        end_post: x size, y from, y to, z to of the post that ends the run
-            [m], or None.
-        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+    A post that ends the run has its x size, y from, y to and z to [m].
     """
 
     panel: float
@@ -56,14 +42,10 @@ def run(
     *,
     length: float = 10.0,
     height: float | None = None,
-) -> Model:
-    """Returns a run of panels.
+) -> structures.Model:
+    """Returns a run of panels of one of `RUN_KINDS`, in a drawn colour.
 
-    Args:
-        name: a key of `RUN_KINDS`.
-        rng: draws the colour.
-        length: length of the run [m]; positive.
-        height: [m], positive; the nominal one if not given.
+    The height is the nominal one if not given [m].
 
     Raises:
         ValueError: the length or the height is not positive.
@@ -79,27 +61,31 @@ def run(
     tall = round(height / kind.height, 4)
     total = max(1, round(length / kind.panel))
     stretch = round(length / (total * kind.panel), 4)
-    parts: list[Part] = []
+    parts: list[structures.Part] = []
     done = 0
     while done < total:
         count = _LONGEST
         while count > total - done:
             count //= 2
-        shape = MeshShape(f"{name}_x{count}", (stretch, 1.0, tall))
+        shape = structures.MeshShape(f"{name}_x{count}", (stretch, 1.0, tall))
         x = done * kind.panel * stretch - length / 2
         part = f"run_{len(parts):02d}"
-        parts.append(Part(part, shape, (x, 0.0, 0.0), rgb=rgb))
+        parts.append(structures.Part(part, shape, (x, 0.0, 0.0), rgb=rgb))
         done += count
     if kind.end_post:
         x, y0, y1, top = kind.end_post
         top *= tall
-        size = (x, y1 - y0, top + ROOT_DEPTH)
-        at = (length / 2 - x / 2, (y0 + y1) / 2, (top - ROOT_DEPTH) / 2)
-        parts.append(block("end", size, at, rgb=rgb))
-    return assemble(*parts)
+        size = (x, y1 - y0, top + structures.ROOT_DEPTH)
+        at = (
+            length / 2 - x / 2,
+            (y0 + y1) / 2,
+            (top - structures.ROOT_DEPTH) / 2,
+        )
+        parts.append(structures.block("end", size, at, rgb=rgb))
+    return structures.assemble(*parts)
 
 
 FENCES = {
-    name: Builder(kind.semantic_class, partial(run, name))
+    name: structures.Builder(kind.semantic_class, partial(run, name))
     for name, kind in RUN_KINDS.items()
 }

@@ -8,14 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from cns_drake.city.geometry.structures import (
-    Builder,
-    MeshShape,
-    Model,
-    Part,
-    assemble,
-    triple,
-)
+from cns_drake.city.geometry import structures
 
 # Paint colours, roughly in the shares seen on the road.
 PAINTS = (
@@ -48,27 +41,24 @@ FORMS = {
 }
 
 
-def car(rng: np.random.Generator, *, form: str) -> Model:
-    """Returns a parked vehicle: scaled by a few per cent and painted.
-
-    Args:
-        rng: draws size and paint.
-        form: a key of `FORMS`.
-    """
+def car(rng: np.random.Generator, *, form: str) -> structures.Model:
+    """Returns a vehicle of one of `FORMS`, slightly scaled and painted."""
     size = rng.uniform(0.97, 1.03, 3)
-    scale = triple(round(float(s), 3) for s in size)
+    scale = structures.triple(round(float(s), 3) for s in size)
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     colours = {"body": paint, "trim": TRIM}
     if form == "box_truck":
         colours["box"] = WHITE
     parts = [
-        Part(name, MeshShape(f"{form}_{name}", scale), rgb=rgb)
+        structures.Part(
+            name, structures.MeshShape(f"{form}_{name}", scale), rgb=rgb
+        )
         for name, rgb in colours.items()
     ]
-    return assemble(*parts)
+    return structures.assemble(*parts)
 
 
 PARKED_CARS = {
-    form: Builder(semantic_class, partial(car, form=form))
+    form: structures.Builder(semantic_class, partial(car, form=form))
     for form, semantic_class in FORMS.items()
 }

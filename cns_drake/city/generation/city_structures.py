@@ -29,23 +29,14 @@ from cns_drake.city.ground.terrain import (
     bridge_structures,
     ground_structures,
 )
+from cns_drake.city.placement import sidewalks
 from cns_drake.city.placement.building_rows import place_buildings
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import furnish
-from cns_drake.city.placement.sidewalks import (
-    furnish_junctions,
-    furnish_sidewalks,
-    park_along_streets,
-    plant_medians,
-)
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
+from cns_drake.roads import street_areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.street_areas import (
-    RoadSurface,
-    StreetAreas,
-    SurfaceHeights,
-)
 
 
 class City(NamedTuple):
@@ -61,20 +52,16 @@ class City(NamedTuple):
 class Streets(NamedTuple):
     """Streets that a city is built along.
 
-    Attributes:
-        kerb_height: height of sidewalks above the surface [m].
-        junctions: the area of all junctions in W [m].
-        margins: strips beside them that stay free; buildings stand along them,
-            in W.
-        reserved: other areas where nothing is built or planted, in W [m].
-        structures: their surfaces.
-        furnish: places their furniture, after the buildings and before all
-            else.
-        park: parks cars in them, last of all.
+    Sidewalks are `kerb_height` above the surface [m]; junctions are the area of
+    all of them. Margins are strips beside the streets that stay free, and
+    buildings stand along them; nothing is built or planted in what is
+    `reserved`, either. All areas are in W [m]. `furnish` places the streets'
+    furniture, after the buildings and before all else, and `park` parks cars in
+    them, last of all.
     """
 
-    areas: StreetAreas
-    surface: SurfaceHeights
+    areas: street_areas.StreetAreas
+    surface: street_areas.SurfaceHeights
     kerb_height: float
     junctions: BaseGeometry
     margins: BaseGeometry
@@ -132,7 +119,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     """
     streets = Streets(
         network,
-        RoadSurface(network),
+        street_areas.RoadSurface(network),
         kerb_height(network),
         unary_union(
             [network.junction_area(name) for name in network.junctions]
@@ -140,8 +127,8 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         Polygon(),
         Polygon(),
         (*street_structures(network), marking_structure(network)),
-        lambda draft: furnish_junctions(draft, network),
-        lambda draft: park_along_streets(draft, network),
+        lambda draft: sidewalks.furnish_junctions(draft, network),
+        lambda draft: sidewalks.park_along_streets(draft, network),
     )
     return build_along(streets, plan, source)
 
@@ -188,9 +175,9 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     streets.furnish(draft)
     for district in districts:
         furnish(draft, district)
-    furnish_sidewalks(draft, districts, streets.junctions)
+    sidewalks.furnish_sidewalks(draft, districts, streets.junctions)
     streets.park(draft)
-    plant_medians(draft)
+    sidewalks.plant_medians(draft)
     return City((*ground, *draft.structures), plan.cars)
 
 

@@ -24,11 +24,9 @@ _COLUMNS = ("name", "class", "x", "y", "tags")
 class Renaming(NamedTuple):
     """The new names of the structures that a file of stages names.
 
-    Attributes:
-        renamed: old name -> new name, of structures that have kept their place.
-        lost: names of structures that have not, even if another one has the
-            name now.
-        unclear: patterns that match other structures than before.
+    Structures that have kept their place are `renamed`; others are `lost`, even
+    if another one has the name now. Patterns are `unclear` if they match other
+    structures than before.
     """
 
     renamed: dict[str, str]
@@ -50,12 +48,9 @@ class _Row(NamedTuple):
 def find_renaming(
     stages: Path, table: Path, structures: Sequence[Structure]
 ) -> Renaming:
-    """Finds the new names of the structures that stages name.
+    """Finds new names in a `stages.yaml` for structures of the city of today.
 
-    Args:
-        stages: a `stages.yaml`.
-        table: the `structures.csv` of the city for which it was written.
-        structures: structures of the city of today.
+    The table is the `structures.csv` of the city for which it was written.
 
     Raises:
         InputError: a file cannot be read.
@@ -93,9 +88,8 @@ def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
         InputError: the file cannot be read.
     """
     text = _text(stages)
-    for node in sorted(
-        _name_nodes(stages), key=lambda node: -node.start_mark.index
-    ):
+    nodes = _name_nodes(stages)
+    for node in sorted(nodes, key=lambda node: -node.start_mark.index):
         if node.value in renamed:
             start, end = node.start_mark.index, node.end_mark.index
             # The scalar may have an anchor in front of it.

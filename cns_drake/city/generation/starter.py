@@ -46,16 +46,12 @@ def start_city(
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
-    """Writes the missing inputs of a city.
+    """Writes the missing inputs of a city in a folder with `roads.yaml`.
 
     `city.yaml` gets a district for each block between the roads, `stages.yaml`
     a stage 01 without the buildings and trees in the east and a whole stage 02.
-    Each stage gets a drive on a route drawn at random.
-
-    Args:
-        world: folder with `roads.yaml`.
-        seed: seed of the draws.
-        progress: takes a line for each file that is written.
+    Each stage gets a drive on a route drawn at random. `progress` takes a line
+    for each file that is written.
 
     Returns:
         The files written; existing files stay as they are.
@@ -112,18 +108,12 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
 
 
 def starter_plan(areas: StreetAreas, seed: int) -> dict:
-    """Returns a plan in which every block has a character of its own.
-
-    Returns:
-        What `CityPlan` validates.
-    """
-    text = resources.files("cns_drake.city.generation").joinpath(
-        "characters.yaml"
-    )
-    templates = yaml.safe_load(text.read_text(encoding="utf-8"))
-    streets = unary_union(
-        [areas.carriageway(), areas.sidewalks(), areas.medians()]
-    )
+    """Returns a plan for `CityPlan`, where each block has its own character."""
+    folder = resources.files("cns_drake.city.generation")
+    text = folder.joinpath("characters.yaml").read_text(encoding="utf-8")
+    templates = yaml.safe_load(text)
+    parts = [areas.carriageway(), areas.sidewalks(), areas.medians()]
+    streets = unary_union(parts)
     x0, y0, x1, y1 = streets.bounds
     bounds = (
         int(np.floor(x0 - _MARGIN)),
@@ -141,12 +131,9 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
         if not characters:
             # Every character is used once before one is used again.
             characters = list(rng.permutation(list(templates["blocks"])))
-        is_square = piece.area < _SQUARE
-        district = (
-            templates["square"]
-            if is_square
-            else templates["blocks"][characters.pop()]
-        )
+        district = templates["square"]
+        if piece.area >= _SQUARE:
+            district = templates["blocks"][characters.pop()]
         inside = shapely.point_on_surface(piece)
         place = [round(inside.x, 2), round(inside.y, 2)]
         name = f"block_{len(districts) + 1:02d}"
@@ -162,21 +149,11 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
 
 
 def starter_stages(city: City) -> dict:
-    """Returns two stages; the first one lacks the structures in the east.
-
-    Returns:
-        What `Stages` validates.
-    """
-    standing = [
-        structure
-        for structure in city.structures
-        if structure.semantic_class in ("building", "vegetation")
-    ]
-    x = [
-        structure.xyz[0]
-        for structure in standing
-        if structure.semantic_class == "building"
-    ] or [structure.xyz[0] for structure in standing]
+    """Returns two stages for `Stages`; the first lacks what is in the east."""
+    kinds = "building", "vegetation"
+    standing = [s for s in city.structures if s.semantic_class in kinds]
+    buildings = [s for s in standing if s.semantic_class == "building"]
+    x = [structure.xyz[0] for structure in buildings or standing]
     absent = defaultdict(list)
     if x:
         limit = float(np.quantile(x, _STANDING))

@@ -110,14 +110,8 @@ def box_mesh(size: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
     corners = np.array(
         [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
     )
-    faces = (
-        (0, 2, 3, 1),
-        (4, 5, 7, 6),
-        (0, 1, 5, 4),
-        (2, 6, 7, 3),
-        (0, 4, 6, 2),
-        (1, 3, 7, 5),
-    )
+    faces = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4),
+             (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))  # fmt: skip
     return Mesh(corners * half + np.asarray(center), faces)
 
 

@@ -314,13 +314,10 @@ def _squares(
 def surface_mesh(
     geometry: BaseGeometry, height: HeightMap | float, spacing: float = 0.0
 ) -> Mesh:
-    """Returns the upper side of polygons at a height.
+    """Returns the upper side of polygons in W at a height [m].
 
-    Args:
-        geometry: polygons in W [m].
-        height: one height [m], or a height map.
-        spacing: where positive, the polygons are first cut into squares of
-            this size [m], so that the mesh can follow a height map.
+    With a positive `spacing` they are first cut into squares of this size [m],
+    so that the mesh can follow a height map.
     """
     squares = np.zeros((0, 4, 2))
     pieces: list[BaseGeometry | None] = [geometry]
@@ -381,13 +378,10 @@ def wall_mesh(
     *,
     along: BaseGeometry | None = None,
 ) -> Mesh:
-    """Returns upright walls on the edges of polygons, seen from inside.
+    """Returns upright walls on the edges of polygons in W, seen from inside.
 
-    Args:
-        geometry: polygons in W [m]; the walls face their interior.
-        bottom: height of the lower edge [m].
-        top: height of the upper edge [m].
-        along: where given, only edges whose middle lies in this area.
+    The walls face the interior. Where `along` is given, only edges whose middle
+    lies in this area get one.
     """
     starts, ends = [], []
     for polygon in polygons_of(geometry):
@@ -476,12 +470,10 @@ class Occupancy:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Returns whether a polygon keeps its distance from all taken ones.
+        """Returns whether a polygon in W keeps a distance from all taken ones.
 
-        Args:
-            geometry: the polygon in W [m].
-            clearance: least distance [m]; with 0 polygons may touch.
-            ignore: a taken polygon that may be closer, but not overlapped.
+        With a clearance of 0 polygons may touch [m]; a taken polygon to
+        `ignore` may be closer, but not overlapped.
         """
         x0, y0, x1, y1 = geometry.bounds
         taken = self._bounds[: len(self._geometries)]

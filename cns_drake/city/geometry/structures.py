@@ -48,14 +48,10 @@ Shape = MeshShape | BoxShape | CylinderShape | SphereShape
 
 @dataclass(frozen=True)
 class Part:
-    """One visual of a structure.
+    """One visual, at xyz and rpy in the structure frame S [m, rad].
 
-    Attributes:
-        name: unique within the structure, e.g. `storey_03`.
-        shape: what it looks like.
-        xyz: position in the structure frame S [m].
-        rpy: roll, pitch, yaw in S [rad].
-        rgb: diffuse colour, or None for the colour of the class.
+    Its name is unique within the structure, e.g. `storey_03`. Without `rgb` it
+    has the colour of the class.
     """
 
     name: str
@@ -67,12 +63,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Model:
-    """The result of a builder: parts, the meshes they use, a footprint.
+    """The result of a builder: parts in S, the meshes they refer to by name.
 
-    Attributes:
-        parts: the visuals, in the structure frame S.
-        meshes: mesh name -> mesh, for every mesh that a part refers to.
-        footprint: the ground area that the model needs, in S [m].
+    The footprint is the ground area that the model needs, in S [m].
     """
 
     parts: tuple[Part, ...]
@@ -92,15 +85,11 @@ class Model:
 
 @dataclass(frozen=True)
 class Structure:
-    """A model with a name and a place in the world.
+    """A model with a place of its frame S in the world [m, rad].
 
-    Attributes:
-        name: stable and unique in the city, e.g. `tower_017`.
-        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        model: its geometry, in the structure frame S.
-        xyz: position of S in the world [m].
-        yaw: heading of S in the world [rad].
-        tags: free words for the layout and the stages, e.g. the block.
+    The name is stable and unique in the city, e.g. `tower_017`; tags are free
+    words for the layout and the stages, e.g. the block. Classes are the keys of
+    `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
     name: str
@@ -118,12 +107,9 @@ class Structure:
     @property
     def p_WFs(self) -> np.ndarray:
         """The feet: (N, 3) lowest points of the model, in the world [m]."""
-        p_SPs = np.concatenate(
-            [
-                part_mesh(part, self.model.meshes).vertices
-                for part in self.model.parts
-            ]
-        )
+        model = self.model
+        meshes = [part_mesh(part, model.meshes) for part in model.parts]
+        p_SPs = np.concatenate([mesh.vertices for mesh in meshes])
         is_low = p_SPs[:, 2] < p_SPs[:, 2].min() + _FEET
         return p_SPs[is_low] @ rotation((0.0, 0.0, self.yaw)).T + self.xyz
 
@@ -154,13 +140,10 @@ _ROUND_SIDES = 12
 
 @dataclass(frozen=True)
 class Builder:
-    """How to make objects of one kind.
+    """How to make objects of one kind, by `build(rng, **parameters) -> Model`.
 
-    Attributes:
-        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        build: `build(rng, **parameters) -> Model`; every parameter has a
-            default, most are then drawn from `rng`. The same generator
-            state gives the same model.
+    Every parameter has a default, most are then drawn from `rng`. The same
+    generator state gives the same model.
     """
 
     semantic_class: str

@@ -8,12 +8,9 @@ _UPWARDS = 0.05
 
 
 def long_normals(triangles: np.ndarray) -> np.ndarray:
-    """Returns normals (M, 3) twice as long as the areas of triangles [m^2].
+    """Returns normals (M, 3) twice as long as the areas of triangles (M, 3, 3).
 
     As `np.cross`, which takes far longer for the few triangles of a wall.
-
-    Args:
-        triangles: (M, 3, 3) [m].
     """
     u = triangles[:, 1] - triangles[:, 0]
     v = triangles[:, 2] - triangles[:, 0]
@@ -58,12 +55,7 @@ class UpperSides:
     """The upper sides of solids, with their height at any place."""
 
     def __init__(self, triangles: np.ndarray):
-        """Collects the upper sides.
-
-        Args:
-            triangles: (M, 3, 3) of solids; those that do not look upwards are
-                left out [m].
-        """
+        """Keeps those of solids' triangles (M, 3, 3) that look upwards [m]."""
         self._triangles = triangles[looks_up(triangles)]
         self._normals = unit_normals(self._triangles)
         self._tree = shapely.STRtree(from_above(self._triangles))

@@ -16,9 +16,8 @@ from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
 class District(NamedTuple):
     """A district with all of its ground in W [m].
 
-    Attributes:
-        grounds: kind of ground -> area; together they are `area`.
-        terraces: patches that are held level.
+    Kinds of ground have areas that together are `area`; terraces are patches
+    that are held level.
     """
 
     plan: DistrictPlan

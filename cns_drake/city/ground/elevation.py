@@ -194,12 +194,7 @@ def make_ground(
 
 
 def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
-    """Returns the level ground around buildings.
-
-    Args:
-        buildings: at the heights of their floors.
-        streets: their area in W [m].
-    """
+    """Returns ground around buildings, level with their floors, in W [m]."""
     kerbside = streets.buffer(_APRON)
     pads = []
     for building in buildings:
@@ -211,13 +206,10 @@ def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
 
 
 def relaxed(z: np.ndarray) -> np.ndarray:
-    """Fills the gaps of a grid by a harmonic field.
+    """Fills the gaps (NaN) of a grid of heights by a harmonic field.
 
-    Args:
-        z: (rows, columns) heights, NaN in the gaps; at least one is given.
-
-    Returns:
-        The grid with every gap at the mean of its two to four neighbours.
+    Every gap is at the mean of its two to four neighbours; at least one height
+    is given.
     """
     rows, columns = z.shape
     free = np.isnan(z)

@@ -20,14 +20,10 @@ from cns_drake.city.geometry.polygons import (
     wall_mesh,
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
+from cns_drake.roads import street_areas
 from cns_drake.roads.centreline import sample_stations
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import ENDS, Direction, End, Road
-from cns_drake.roads.street_areas import (
-    RoadSurface,
-    StreetAreas,
-    SurfaceHeights,
-)
 
 # Marks the structures that are ground: no stage lacks them.
 GROUND_TAG = "ground"
@@ -113,15 +109,15 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
     bays = unary_union(list(network.parking_bays().values()))
     return street_surfaces(
         network,
-        RoadSurface(network),
+        street_areas.RoadSurface(network),
         kerb_height(network),
         [parking_bays(bays)],
     )
 
 
 def street_surfaces(
-    areas: StreetAreas,
-    surface: SurfaceHeights,
+    areas: street_areas.StreetAreas,
+    surface: street_areas.SurfaceHeights,
     kerb: float,
     coverings: Sequence[Covering],
     kerbless: BaseGeometry | None = None,
@@ -141,19 +137,14 @@ def street_surfaces(
         kerbs = MultiPolygon(polygons_of(snap(kerbs.difference(kerbless))))
     sidewalks = snap(areas.sidewalks()).difference(kerbs)
     outer = unary_union([paved, kerbs, sidewalks, medians]).boundary
-    road_part = paved.difference(covered)
+    road_part, green = paved.difference(covered), medians.difference(kerbs)
     walks = Covering("sidewalks", "sidewalk", sidewalks, _SIDEWALK_RGB)
     structures = [
         _surface(Covering("carriageway", "road", road_part, _ROAD_RGB), road),
         *(_surface(one, road) for one in coverings),
         _kerb_structure(kerbs, paved, road, walk),
         _surface(walks, walk, outer),
-        _surface(
-            Covering(
-                "medians", "terrain", medians.difference(kerbs), _MEDIAN_RGB
-            ),
-            walk,
-        ),
+        _surface(Covering("medians", "terrain", green, _MEDIAN_RGB), walk),
     ]
     return [structure for structure in structures if structure.model.parts]
 
@@ -165,7 +156,7 @@ def kerb_area(paved: BaseGeometry) -> MultiPolygon:
 
 
 def _heights(
-    surface: SurfaceHeights, kerb: float
+    surface: street_areas.SurfaceHeights, kerb: float
 ) -> tuple[HeightMap | float, HeightMap | float]:
     """Returns the heights of the roads and of the sidewalks beside them."""
     if surface.is_level:
@@ -287,15 +278,10 @@ def marking_structure(network: RoadNetwork) -> Structure:
     """Returns the paint of all roads, one part a road."""
     pieces = {}
     for name, road in network.roads.items():
-        strips = [
-            *_lane_lines(road),
-            *(
-                strip
-                for end in ENDS
-                if _is_junction(network, road, end)
-                for strip in _end_marks(road, end)
-            ),
-        ]
+        strips = list(_lane_lines(road))
+        for end in ENDS:
+            if _is_junction(network, road, end):
+                strips += _end_marks(road, end)
         if road.length > _LEAST_LENGTH and strips:
             pieces[name] = merge_meshes(*(_strip(road, *s) for s in strips))
     ground = Covering("markings", "road", network.lane_area(), _RGB)
@@ -340,9 +326,8 @@ def _end_marks(
     incoming: Direction = "forward" if end == "end" else "backward"
     count = road.lanes[incoming]
     if count:
-        offsets = [
-            road.lane_offset(incoming, lane) for lane in range(1, count + 1)
-        ]
+        lanes = range(1, count + 1)
+        offsets = [road.lane_offset(incoming, lane) for lane in lanes]
         half = road.lane_width / 2
         yield (
             *_from_end(road, end, _STOP_LINE),
@@ -370,12 +355,9 @@ def _strip(
     """Returns the area between two stations and two offsets."""
     if np.ptp(road.height([first, (first + last) / 2, last])) > 0:
         ends = sample_stations(first, last, _SLOPE_PIECE)
-        return merge_meshes(
-            *(
-                _quadrilateral(road, a, b, right, left)
-                for a, b in itertools.pairwise(ends)
-            )
-        )
+        pairs = itertools.pairwise(ends)
+        faces = (_quadrilateral(road, *pair, right, left) for pair in pairs)
+        return merge_meshes(*faces)
     return _quadrilateral(road, first, last, right, left)
 
 

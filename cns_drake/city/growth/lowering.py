@@ -90,15 +90,10 @@ def top_of(model: Model) -> float:
 
 
 def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
-    """Returns the part of a mesh below a height, and the cut.
+    """Returns the part of a mesh below a height [m], open there, and the cut.
 
-    Args:
-        mesh: with plane convex faces.
-        height: height of the cut [m].
-
-    Returns:
-        The lower part, open at the cut; (N, 2, 2) starts and ends of the
-        edges in which the cut meets faces, whose backs are on the left [m].
+    The mesh has plane convex faces. The cut is (N, 2, 2), the starts and ends
+    of the edges in which it meets faces, whose backs are on the left [m].
     """
     corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []
@@ -154,15 +149,10 @@ def _clipped(
 
 
 def enclosed(edges: np.ndarray) -> MultiPolygon:
-    """Returns the ground within walls that are cut.
+    """Returns the ground on the left of the cut edges (N, 2, 2) of walls [m].
 
-    Args:
-        edges: (N, 2, 2) starts and ends of the walls' edges, what they
-            enclose on their left [m].
-
-    Returns:
-        Polygons with their courtyards, in whole millimetres. Reveals and the
-        gaps between walls and what stands before them belong to it.
+    Polygons have their courtyards, in whole millimetres. Reveals and the gaps
+    between walls and what stands before them belong to them.
     """
     edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
     lines = shapely.linestrings(edges)

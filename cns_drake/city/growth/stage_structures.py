@@ -5,6 +5,7 @@ another use."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 import math
 from pathlib import Path
 from typing import Any, get_args
@@ -37,10 +38,8 @@ def younger(model: Model, height: float) -> Model:
 
     The plant stands on z = 0. If it is lower it is returned itself.
     """
-    top = max(
-        part_mesh(part, model.meshes).vertices[:, 2].max()
-        for part in model.parts
-    )
+    meshes = (part_mesh(part, model.meshes) for part in model.parts)
+    top = max(mesh.vertices[:, 2].max() for mesh in meshes)
     if top <= height:
         return model
     return scaled(model, round(height / float(top), 4))
@@ -59,10 +58,8 @@ def scaled(model: Model, share: float) -> Model:
         elif isinstance(shape, BoxShape):
             shape = BoxShape(triple(times(shape.size, 5)))
         else:
-            shape = replace(
-                shape,
-                **{k: round(v * share, 4) for k, v in vars(shape).items()},
-            )
+            sizes = {k: round(v * share, 4) for k, v in vars(shape).items()}
+            shape = replace(shape, **sizes)
         return replace(part, shape=shape, xyz=triple(times(part.xyz, 4)))
 
     return replace(model, parts=tuple(map(smaller, model.parts)))
@@ -133,9 +130,8 @@ def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     xs, ys = (_spread(np.unique(np.round(c, 3))) for c in corners.T)
     x0, x1 = (xs[k] for k in np.triu_indices(len(xs), 1))
     y0, y1 = (ys[k] for k in np.triu_indices(len(ys), 1))
-    boxes = shapely.box(x0[:, None], y0[None], x1[:, None], y1[None]).reshape(
-        -1
-    )
+    sides = x0[:, None], y0[None], x1[:, None], y1[None]
+    boxes = shapely.box(*sides).reshape(-1)
     room = footprint.buffer(0.01)
     shapely.prepare(room)
     inside = boxes[shapely.covers(room, boxes)]
@@ -235,10 +231,9 @@ def _places(
 class GrowingCity:
     """A city and its stages.
 
-    Attributes:
-        structures: structures of the whole city, then those on lots before they
-            are built on; a structure's instance id is its place in this order,
-            counted from 1, and the same at all stages.
+    Its structures are those of the whole city, then those on lots before they
+    are built on; an instance id is a place in this order, counted from 1, and
+    the same at all stages.
     """
 
     def __init__(
@@ -255,22 +250,13 @@ class GrowingCity:
         self._permanent = list(structures)
         uses = {name: u for u, names in stages.lots.items() for name in names}
         absent = set[str]().union(*map(stages.absent, stages.stages))
-        self._lots = {
-            s.name: list(
-                lot_objects(
-                    s,
-                    uses.get(s.name) or use_by_size(s),
-                    cars,
-                    np.random.default_rng(_seed(s.name)),
-                )
-            )
-            for s in structures
-            if s.name in absent and s.semantic_class == "building"
-        }
-        self.structures = [
-            *structures,
-            *(thing for lot in self._lots.values() for thing in lot),
-        ]
+        self._lots: dict[str, list[Structure]] = {}
+        for s in structures:
+            if s.name in absent and s.semantic_class == "building":
+                use = uses.get(s.name) or use_by_size(s)
+                rng = np.random.default_rng(_seed(s.name))
+                self._lots[s.name] = list(lot_objects(s, use, cars, rng))
+        self.structures = [*structures, *chain(*self._lots.values())]
 
     def at(self, stage: str) -> list[Structure]:
         """Returns the structures of a stage, in the order of instance ids.

@@ -40,10 +40,8 @@ _RIGHT_EDGE, _LEFT_EDGE = 1, 3
 class _House:
     """A building that is to be built, its frame S at `xy` and `yaw` in W.
 
-    Attributes:
-        height: height of the walls [m].
-        taken: the ground in W that was taken for it.
-        blind_edges: edges of the footprint with a neighbour wall to wall.
+    It has the height of its walls [m], the ground in W that was taken for it,
+    and the edges of the footprint with a neighbour wall to wall.
     """
 
     archetype: str
@@ -193,10 +191,8 @@ def _fitting_house(
     depth = rng.uniform(*row.depth)
     low, high = kind.widths
     for width_part, depth_part in _SIZES:
-        size = np.maximum(
-            (width * width_part, depth * depth_part),
-            (row.width[0], row.depth[0]),
-        )
+        wanted = width * width_part, depth * depth_part
+        size = np.maximum(wanted, (row.width[0], row.depth[0]))
         lot = lot_at(line, start, *np.clip(size, low, high).round(1).tolist())
         # On a curve a lot's front is its chord, a little less than asked for.
         if lot is None or lot.width < low:

@@ -41,17 +41,11 @@ _RANGE = 50
 class Draft:
     """Collects structures, gives them names and keeps them apart.
 
-    Attributes:
-        areas: areas of the streets.
-        plan: the plan of the city.
-        source: the name of the plan's file, for messages.
-        streets: all ground of the streets, sidewalks included, in W.
-        frontage: line along which buildings stand; the streets by default.
-        base: height of sidewalks and of the ground between them in W,
-            without what buildings and relief change about it.
-        structures: what has been placed, in the order of placement.
-        ground: upper sides of the finished ground in W; set once the
-            buildings stand and the ground has been shaped around them.
+    Streets are all their ground, sidewalks included, and buildings stand along
+    the `frontage`; `base` is the height of sidewalks and of the ground between
+    them, without what buildings and relief change about it, and `ground` the
+    upper sides of the finished ground, set once the buildings stand. All are in
+    W. `source` is the name of the plan's file, for messages.
     """
 
     def __init__(
@@ -62,11 +56,8 @@ class Draft:
         source: str,
     ):
         self.areas, self.plan, self.source = areas, plan, source
-        self.streets: BaseGeometry = snap(
-            unary_union(
-                [areas.carriageway(), areas.sidewalks(), areas.medians()]
-            )
-        )
+        parts = [areas.carriageway(), areas.sidewalks(), areas.medians()]
+        self.streets: BaseGeometry = snap(unary_union(parts))
         self.frontage = self.streets
         self.base: Ground = LevelGround(kerb_height)
         self.structures: list[Structure] = []
@@ -109,10 +100,8 @@ class Draft:
     ) -> bool:
         """Returns whether an area in W is free of lanes and not taken.
 
-        Args:
-            area: in W [m].
-            clearance: least distance to what is taken, not to lanes [m].
-            ignore: taken area that may be closer, but not overlapped.
+        The clearance is to what is taken, not to lanes [m]; a taken area to
+        `ignore` may be closer, but not overlapped.
         """
         return self._lanes.is_free(area) and self._occupancy.is_free(
             area, clearance, ignore
@@ -140,25 +129,18 @@ class Draft:
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
-        """Places an object on the finished ground if there is room for it.
+        """Places one of `OBJECTS` on the finished ground if there is room.
 
-        A model without room uses up a name as well, so that the names of
-        others do not depend on whether it fits.
+        A model without room uses up a name as well, so that the names of others
+        do not depend on whether it fits.
 
         Args:
-            name: name of the object, a key of `OBJECTS`.
-            model: its geometry.
-            xy: position in W [m].
-            yaw: heading in W [rad].
-            tags: free words.
+            xy, yaw: position and heading in W [m, rad].
             kind: stem of the structure's name; the object's by default.
             clearance: to all objects placed before [m].
             crown_part: how much of the reach of a tree's crown must be
                 clear of buildings, from 0 to 1.
             within: where given, the footprint must lie in this area.
-
-        Returns:
-            The structure, or None where there is no room.
         """
         x, y = (round(float(value), 3) for value in xy)
         structure = Structure(
@@ -189,12 +171,7 @@ class Draft:
         return structure
 
     def _foot(self, structure: Structure, fall: float) -> float:
-        """Returns the height at which an object stands on the ground [m].
-
-        Args:
-            structure: at height 0.
-            fall: how far the ground falls below it [m].
-        """
+        """Returns the height of an object on ground that falls below it [m]."""
         p_WFs = structure.p_WFs
         assert self.ground is not None, "the ground has no shape yet"
         z = self.ground.heights(np.vstack([structure.xyz, p_WFs])[:, :2])

@@ -54,9 +54,8 @@ def furnish(draft: Draft, district: District) -> None:
         _place_cars(draft, plan.name, parking, rng)
     for index, scatter in enumerate(plan.scatter):
         draft.open_range()
-        _scatter(
-            draft, district, scatter, draft.rng(plan.name, "scatter", index)
-        )
+        rng = draft.rng(plan.name, "scatter", index)
+        _scatter(draft, district, scatter, rng)
 
 
 def _place_object(

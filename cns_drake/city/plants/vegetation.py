@@ -19,15 +19,9 @@ from cns_drake.city.geometry.structures import (
 
 @dataclass(frozen=True)
 class Species:
-    """A kind of tree.
+    """A kind of tree, with the range of heights of planted ones [m].
 
-    Attributes:
-        variants: how many different meshes there are.
-        height_range: heights that a planted tree may have [m].
-        leaf_rgb: mean colour of the leaves.
-        bark_rgb: colour of the wood.
-        street: whether people walk under the crown: it starts at 2.5 m or
-            higher.
+    People walk under the crown of `street` trees: it starts at 2.5 m or higher.
     """
 
     variants: int
