@@ -71,7 +71,7 @@ def _variants(
     """Builds the required stages; returns the drives through them."""
     source = map_folder(earlier)
     first, last = earlier.stage, later.stage
-    if first is None or last is None or map_folder(later) != source:
+    if first is None or last is None or map_folder(later).path != source.path:
         raise InputError(f"{later.name}: map: it is not that of {earlier.name}")
     city = make_city(source.path)
     names = [structure.name for structure in city.structures]
