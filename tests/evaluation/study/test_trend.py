@@ -17,7 +17,7 @@ from evaluation.methods import known_methods, make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.study import trend, trend_databases
+from evaluation.study import surveys, trend, trend_databases
 from evaluation.study.trend import smooth, smooth_band, write_trend
 from evaluation.study.trend_databases import measure_trend
 
@@ -96,7 +96,7 @@ def test_processes_change_nothing_and_are_not_needed_twice(
         trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
     )
     monkeypatch.setattr(
-        trend_databases, "survey_recording", lambda *_: pytest.fail("again")
+        surveys, "survey_recording", lambda *_: pytest.fail("again")
     )
     assert measure_trend(*arguments, Cluster()) == points
 
