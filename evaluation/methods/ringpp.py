@@ -23,6 +23,7 @@ import scipy.sparse
 import scipy.special
 import small_gicp
 
+from cns_drake.base.compiled import compiled
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
 # See `local_features`.
@@ -411,12 +412,7 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
         (N, 6) float64, in the order above; all are at least 0. Eigenvalues
         are exact to about 1e-8 of the greatest.
     """
-    # One coordinate at a time: NumPy reduces slowly along a short axis.
-    around = [column[neighbours] for column in points.T]
-    height = np.ptp(around[2], axis=1)
-    x, y, z = (one - one.mean(axis=1, keepdims=True) for one in around)
-    pairs = (x, x), (y, y), (z, z), (x, y), (x, z), (y, z)
-    xx, yy, zz, xy, xz, yz = (np.einsum("nk,nk->n", *pair) for pair in pairs)
+    xx, yy, zz, xy, xz, yz, height = _moments(points, neighbours)
     half_sum = 0.5 * (xx + yy)
     root = np.hypot(0.5 * (xx - yy), xy)
     # A vertical line has no horizontal part.
@@ -447,6 +443,44 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
         [l3, np.cbrt(l1 * l2 * l3), entropy, roundness, height, variance],
         axis=1,
     )
+
+
+@compiled
+def _moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Returns the second moments of each point's K neighbours about their mean.
+
+    They are (7, N): sums of products xx, yy, zz, xy, xz and yz, and the range
+    of z.
+    """
+    num_points, num_neighbours = neighbours.shape
+    result = np.empty((7, num_points))
+    for point in range(num_points):
+        mean_x, mean_y, mean_z = 0.0, 0.0, 0.0
+        least, most = np.inf, -np.inf
+        for other in neighbours[point]:
+            mean_x += points[other, 0]
+            mean_y += points[other, 1]
+            mean_z += points[other, 2]
+            least = min(least, points[other, 2])
+            most = max(most, points[other, 2])
+        mean_x /= num_neighbours
+        mean_y /= num_neighbours
+        mean_z /= num_neighbours
+        xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for other in neighbours[point]:
+            dx = points[other, 0] - mean_x
+            dy = points[other, 1] - mean_y
+            dz = points[other, 2] - mean_z
+            xx += dx * dx
+            yy += dy * dy
+            zz += dz * dz
+            xy += dx * dy
+            xz += dx * dz
+            yz += dy * dz
+        found = xx, yy, zz, xy, xz, yz, most - least
+        for row in range(7):
+            result[row, point] = found[row]
+    return result
 
 
 def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
