@@ -29,7 +29,6 @@ from cns_drake.base.progress import Track, silent
 from evaluation.drives.sampling import sample_frames
 from evaluation.map_update.scores import Labels, nearest
 from evaluation.map_update.sessions import SIDES, Pair, Session
-from evaluation.maps.voxel_maps import row_numbers
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 
 # Distance of the baseline of that name [m].
@@ -96,19 +95,23 @@ def by_free_space(
     points = mine.points[far]
     cells = np.floor(points / _CELL).astype(np.int64)
     _, first, cell_of = np.unique(
-        row_numbers(cells), return_index=True, return_inverse=True
+        cells, axis=0, return_index=True, return_inverse=True
     )
     past, shown, hidden = _count_views(points[first], theirs, track)
     needed = np.minimum(_SHOWN * hidden, _ENOUGH)
     is_shown = (shown > 0) & (shown >= needed)
     found = np.where(is_shown, kept, unobserved)
     found = np.where(past > 0, changed, found)
-    labels[far] = found[cell_of]
+    labels[far] = found[cell_of.ravel()]
     # What stands there now passes near to what stood there.
     is_changed = labels == changed
     known = is_changed | (labels == kept)
     blocks = np.floor(mine.points[known] / _BLOCK).astype(np.int64)
-    _, block_of = np.unique(row_numbers(blocks), return_inverse=True)
+    blocks -= blocks.min(axis=0, initial=0)
+    sizes = blocks.max(axis=0, initial=0) + 1
+    _, block_of = np.unique(
+        np.ravel_multi_index(tuple(blocks.T), tuple(sizes)), return_inverse=True
+    )
     part = np.bincount(block_of, is_changed[known]) / np.bincount(block_of)
     is_beside = (part[block_of] > _PART) & (distances[known] > _AT)
     labels[np.flatnonzero(known)[is_beside]] = changed

@@ -380,13 +380,6 @@ def _corners(indices: np.ndarray, voxel_size: float) -> np.ndarray:
     return np.array([0.0, 0.0, Z_ORIGIN]) + indices * voxel_size
 
 
-def row_numbers(cells: np.ndarray) -> np.ndarray:
-    """Returns a number (N,) for each of cells (N, 3) int64, in their order."""
-    offsets = cells - cells.min(axis=0, initial=np.iinfo(np.int64).max)
-    sizes = offsets.max(axis=0, initial=0) + 1
-    return np.ravel_multi_index(tuple(offsets.T), tuple(sizes))
-
-
 def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
     """Returns the voxel centroids of a cloud in the frame of a sensor.
 

@@ -181,6 +181,8 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
     def describe(self, points: np.ndarray) -> BtcDescription:
         config = self.config
+        # Arrays in another memory order would be compiled for anew.
+        points = np.ascontiguousarray(points)
         planes = voxel_planes(
             points, config.voxel_size, config.max_sparse_points, config.flatness
         )

@@ -10,12 +10,10 @@ part of the method, but it is a definite one, and only with it scores agree.
 from __future__ import annotations
 
 from dataclasses import dataclass
-import itertools
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from evaluation.maps.voxel_maps import row_numbers
 
 # The hash of a voxel's index, in the public program.
 _FACTOR = 116101
@@ -201,6 +199,7 @@ def group_alike(
     return labels
 
 
+@compiled
 def _moments(
     points: np.ndarray, voxel_size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -210,25 +209,62 @@ def _moments(
         (V, 3) int64 indices along x, y and z; (V,) number of points; (V, 3)
         their mean; (V, 3, 3) their covariance, times their number.
     """
-    scaled = points / voxel_size
-    # As in the public program: truncated, and one less below zero, so that a
-    # negative multiple belongs to the voxel below it.
-    cells = np.where(scaled < 0.0, scaled - 1.0, scaled).astype(np.int64)
-    _, first, voxel = np.unique(
-        row_numbers(cells), return_index=True, return_inverse=True
-    )
-    met = np.argsort(first)
-    voxel = np.argsort(met)[voxel]
-    counts = np.bincount(voxel)
-    means = [np.bincount(voxel, column) / counts for column in points.T]
-    offsets = [
-        column - mean[voxel]
-        for column, mean in zip(points.T, means, strict=True)
-    ]
-    covariances = np.empty((len(counts), 3, 3))
-    for i, j in itertools.product(range(3), repeat=2):
-        covariances[:, i, j] = np.bincount(voxel, offsets[i] * offsets[j])
-    return cells[first[met]], counts, np.stack(means, axis=1), covariances
+    num_points = len(points)
+    places = np.empty(3 * num_points, dtype=np.int64)
+    for i, coordinate in enumerate(points.ravel()):
+        scaled = coordinate / voxel_size
+        # As in the public program: truncated, and one less below zero,
+        # so that a negative multiple belongs to the voxel below it.
+        places[i] = int(scaled - 1.0 if scaled < 0.0 else scaled)
+    members = np.empty(num_points, dtype=np.int32)
+    index = np.empty((num_points, 3), dtype=np.int64)
+    counts = np.empty(num_points, dtype=np.int64)
+    means = np.empty((num_points, 3))
+    num_voxels = 0
+    # A hash table of voxels, at most half full; -1 is a free slot.
+    size = 1
+    while size < 2 * num_points:
+        size *= 2
+    table = np.full(size, -1, dtype=np.int32)
+    for i in range(num_points):
+        x, y, z = places[3 * i], places[3 * i + 1], places[3 * i + 2]
+        # Large odd factors spread neighbouring voxels; products wrap around.
+        slot = (x * 73856093 ^ y * 19349669 ^ z * 83492791) & (size - 1)
+        voxel = table[slot]
+        while voxel >= 0 and not (
+            index[voxel, 0] == x
+            and index[voxel, 1] == y
+            and index[voxel, 2] == z
+        ):
+            slot = (slot + 1) & (size - 1)
+            voxel = table[slot]
+        if voxel < 0:
+            voxel = num_voxels
+            num_voxels += 1
+            table[slot] = voxel
+            index[voxel, 0], index[voxel, 1], index[voxel, 2] = x, y, z
+            counts[voxel] = 0
+            for axis in range(3):
+                means[voxel, axis] = 0.0
+        members[i] = voxel
+        counts[voxel] += 1
+        for axis in range(3):
+            means[voxel, axis] += points[i, axis]
+    for voxel in range(num_voxels):
+        for axis in range(3):
+            means[voxel, axis] /= counts[voxel]
+    covariances = np.zeros((num_voxels, 3, 3))
+    for i in range(num_points):
+        voxel = members[i]
+        dx = points[i, 0] - means[voxel, 0]
+        dy = points[i, 1] - means[voxel, 1]
+        dz = points[i, 2] - means[voxel, 2]
+        for axis, offset in enumerate((dx, dy, dz)):
+            covariances[voxel, axis, 0] += offset * dx
+            covariances[voxel, axis, 1] += offset * dy
+            covariances[voxel, axis, 2] += offset * dz
+    found = slice(num_voxels)
+    return index[found], counts[found], means[found], covariances
 
 
 def _fit(

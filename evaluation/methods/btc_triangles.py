@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.compiled import compiled
+
 # Cells along the side of a square in which one keypoint may lie, the least
 # number of points of an image, and by how many heights a cell may have less
 # than its neighbour and still continue a line: fixed in the public program.
@@ -101,6 +103,7 @@ def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
     return np.stack([across / np.linalg.norm(across), along, normal])
 
 
+@compiled
 def height_image(
     points: np.ndarray,
     center: np.ndarray,
@@ -124,41 +127,51 @@ def height_image(
         num_layers: how many layers; points above them only count for the
             means.
     """
-    x, y, z = (points - center).T
-    height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
-    near = (height_range[0] <= height) & (height <= height_range[1])
-    if np.count_nonzero(near) < _MIN_POINTS:
-        shape = _SEGMENT, _SEGMENT
-        return HeightImage(np.zeros(shape, int), np.full((*shape, 2), np.nan))
-    height = height[near]
-    # On the plane: the other axes need not be orthogonal to it.
-    x, y, z = (
-        one[near] - height * up
-        for one, up in zip((x, y, z), axes[2], strict=True)
-    )
-    places = [axis[0] * x + axis[1] * y + axis[2] * z for axis in axes[:2]]
-    row, column = (
-        ((place - place.min()) / resolution).astype(np.int64)
-        for place in places
-    )
-    rows, columns = (
-        (int(cells.max()) // _SEGMENT + 2) * _SEGMENT for cells in (row, column)
-    )
-    cell = row * columns + column
-    layer = ((height - height_range[0]) / height_step).astype(np.int64)
-    drawn = layer < num_layers
-    heights = np.zeros(rows * columns, np.int64)
-    np.bitwise_or.at(heights, cell[drawn], 1 << layer[drawn])
-    counts = np.bincount(cell, minlength=rows * columns)
-    with np.errstate(invalid="ignore"):
-        means = [
-            np.bincount(cell, place, minlength=rows * columns) / counts
-            for place in places
-        ]
-    return HeightImage(
-        heights.reshape(rows, columns),
-        np.stack(means, axis=1).reshape(rows, columns, 2),
-    )
+    # Rows, columns and heights of the points between the limits.
+    near = np.empty((len(points), 3))
+    num_near = 0
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for i in range(len(points)):
+        x = points[i, 0] - center[0]
+        y = points[i, 1] - center[1]
+        z = points[i, 2] - center[2]
+        height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+        if height_range[0] <= height <= height_range[1]:
+            # On the plane: the other axes need not be orthogonal to it.
+            x -= height * axes[2, 0]
+            y -= height * axes[2, 1]
+            z -= height * axes[2, 2]
+            for axis in range(2):
+                place = (
+                    axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
+                )
+                near[num_near, axis] = place
+                low[axis] = min(low[axis], place)
+                high[axis] = max(high[axis], place)
+            near[num_near, 2] = height
+            num_near += 1
+    shape = (_SEGMENT, _SEGMENT)
+    if num_near < _MIN_POINTS:
+        num_near = 0
+    else:
+        rows = int((high[0] - low[0]) / resolution) // _SEGMENT + 2
+        columns = int((high[1] - low[1]) / resolution) // _SEGMENT + 2
+        shape = (rows * _SEGMENT, columns * _SEGMENT)
+    heights = np.zeros(shape, dtype=np.int64)
+    counts = np.zeros(shape)
+    means = np.zeros((shape[0], shape[1], 2))
+    for i in range(num_near):
+        row = int((near[i, 0] - low[0]) / resolution)
+        column = int((near[i, 1] - low[1]) / resolution)
+        layer = int((near[i, 2] - height_range[0]) / height_step)
+        if layer < num_layers:
+            heights[row, column] |= 1 << layer
+        counts[row, column] += 1.0
+        means[row, column, 0] += near[i, 0]
+        means[row, column, 1] += near[i, 1]
+    # Without points, 0 / 0 is NaN.
+    means /= counts.reshape(shape[0], shape[1], 1)
+    return HeightImage(heights, means)
 
 
 def peaks(
@@ -246,6 +259,7 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
     return Keypoints(keypoints.positions[chosen], keypoints.heights[chosen])
 
 
+@compiled
 def count_bits(words: np.ndarray) -> np.ndarray:
     """Returns the number of set bits in int64 numbers from 0 to 2^62 - 1.
 
