@@ -108,10 +108,12 @@ def choose_methods(
         if choice.name in {one.name for one in chosen}:
             raise InputError(f"{path}: another method is named {choice.name!r}")
         chosen.append(choice)
-    wanted = set(only) or {one.name for one in chosen}
-    for name in wanted - {one.name for one in chosen}:
-        known = ", ".join(one.name for one in chosen)
-        raise InputError(f"--only: no method {name!r} (known: {known})")
+    names = [one.name for one in chosen]
+    wanted = list(only) or names
+    for name in wanted:
+        if name not in names:
+            known = ", ".join(names)
+            raise InputError(f"--only: no method {name!r} (known: {known})")
     chosen = [one for one in chosen if one.name in wanted]
     named: dict[str, dict[str, Setting]] = {one.name: {} for one in chosen}
     for text in settings:
