@@ -28,6 +28,8 @@ from cns_drake.base.elementary import arctan2, product, rotated
 from cns_drake.motion.path_geometry import PathIntegral, PathJet
 from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
 
+# States computed at a time.
+_BLOCK = 64
 # Two directions are equal if the cosine of their angle is at least this.
 _PARALLEL = 1 - 1e-9
 
@@ -121,7 +123,10 @@ class WheelMotion:
 
 
 class _State(NamedTuple):
-    """Positions, velocities and accelerations of the whole plant."""
+    """Positions, velocities and accelerations of the whole plant.
+
+    Arrays of one more dimension are those of many times.
+    """
 
     q: np.ndarray
     v: np.ndarray
@@ -161,6 +166,8 @@ class VehicleMotion(LeafSystem):
         plant: MultibodyPlant,
         vehicle: ModelInstanceIndex,
         trajectory: Trajectory,
+        *,
+        period: float | None = None,
     ):
         """Prepares the motion.
 
@@ -168,6 +175,8 @@ class VehicleMotion(LeafSystem):
             plant: a finalized plant; only its model is used.
             vehicle: the model instance that moves.
             trajectory: motion of its base.
+            period: distance of the times at which states are mostly wanted;
+                many are computed at once, which takes a tenth of the time [s].
 
         Raises:
             ValueError: a joint of the vehicle is of another kind.
@@ -175,6 +184,9 @@ class VehicleMotion(LeafSystem):
         super().__init__()
         self._plant = plant
         self._trajectory = trajectory
+        self._period = period
+        # The last block of states, and its number.
+        self._block: tuple[int, _State] | None = None
         self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
         # Scratch to compute the motion of bodies from q and v; every use sets
         # all values that it reads.
@@ -236,23 +248,39 @@ class VehicleMotion(LeafSystem):
         )
 
     def _calc_state(self, context: Context, value: AbstractValue) -> None:
-        plant, scratch, base = self._plant, self._plant_context, self._base
-        moments = self._trajectory.at(context.get_time())
-        (X_WB,), motion = poses_and_motion(moments)
-        plant.SetPositions(scratch, self._default_q)
-        plant.SetFreeBodyPose(scratch, base, X_WB)
-        q = plant.GetPositions(scratch).copy()
-        v, vdot = np.zeros((2, plant.num_velocities()))
+        time, period = context.get_time(), self._period
+        tick = round(time / period) if period else 0
+        if period is None or tick * period != time:
+            states, row = self._states(np.array([time])), 0
+        else:
+            number, row = divmod(tick, _BLOCK)
+            if self._block is None or self._block[0] != number:
+                ticks = number * _BLOCK + np.arange(_BLOCK)
+                self._block = number, self._states(ticks * period)
+            states = self._block[1]
+        value.set_value(_State(*(values[row] for values in states)))
+
+    def _states(self, times: np.ndarray) -> _State:
+        """Returns the states at (N,) times; each depends on its time alone."""
+        plant, base = self._plant, self._base
+        moments = self._trajectory.at(times)
+        X_WBs, motion = poses_and_motion(moments)
+        q = np.empty((len(times), plant.num_positions()))
+        plant.SetPositions(self._plant_context, self._default_q)
+        for k, X_WB in enumerate(X_WBs):
+            plant.SetFreeBodyPose(self._plant_context, base, X_WB)
+            q[k] = plant.GetPositions(self._plant_context)
+        v, vdot = np.zeros((2, len(times), plant.num_velocities()))
         # A floating base's velocities are V_WB, expressed in the world.
         start = base.floating_velocities_start_in_v()
-        v[start : start + 6] = *motion.w[0], *motion.v[0]
-        vdot[start : start + 6] = *motion.alpha[0], *motion.a[0]
+        v[:, start : start + 6] = np.hstack([motion.w, motion.v])
+        vdot[:, start : start + 6] = np.hstack([motion.alpha, motion.a])
         for joint, move, sign in self._joints:
             wheel = move(moments)
-            q[joint.position_start()] = sign * wheel.position[0]
-            v[joint.velocity_start()] = sign * wheel.rate[0]
-            vdot[joint.velocity_start()] = sign * wheel.acceleration[0]
-        value.set_value(_State(q, v, vdot))
+            q[:, joint.position_start()] = sign * wheel.position
+            v[:, joint.velocity_start()] = sign * wheel.rate
+            vdot[:, joint.velocity_start()] = sign * wheel.acceleration
+        return _State(q, v, vdot)
 
     def _calc_position(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._state.Eval(context).q)

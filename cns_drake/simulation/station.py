@@ -97,7 +97,9 @@ def make_station(
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
     motion = builder.AddNamedSystem(
         "vehicle_motion",
-        VehicleMotion(plant, world.vehicle, trajectory),
+        VehicleMotion(
+            plant, world.vehicle, trajectory, period=scenario.frame_period
+        ),
     )
     to_pose = builder.AddNamedSystem(
         "geometry_pose", MultibodyPositionToGeometryPose(plant)
