@@ -12,7 +12,6 @@ from cns_drake.sensors.returns.light import Light, join, select
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
     HOPELESS_SNR,
-    THRESHOLD_SNR,
     LinkBudget,
     detection_probability,
     echo_energy,
@@ -362,12 +361,11 @@ def _intensity(
     rest, draw = _FULL_INTENSITY - retro_from, _first_draw(pulses)
     energy = pulses.energy
     intensity, is_above = retro_from * energy, energy > 1.0
-    if unit.exponent != 1.0:
+    if unit.slope:
         root = np.sqrt(np.minimum(energy, 1.0))
+        root *= np.minimum(unit.far / pulses.distance, 1.0)
         step = (root * (len(unit.table) - 1) + 0.5).astype(np.int64)
-        intensity = retro_from * unit.table[step]
-    if unit.fades:
-        intensity *= np.maximum(1.0 - THRESHOLD_SNR / pulses.snr, 0.0)
+        intensity = unit.table[step]
     part = log(energy[is_above]) / math.log(_FULL_RETRO)
     intensity[is_above] = retro_from + rest * part
     intensity *= gain[pulses.beam]
@@ -376,8 +374,5 @@ def _intensity(
         speckle *= unit.speckle
         speckle += 1.0
         intensity *= speckle
-    is_zero = intensity < unit.floor
-    if unit.zeros:
-        is_zero |= uniform(key, pulses.beam, draw + 3) < unit.zeros
-    intensity[is_zero] = 0.0
+    intensity[intensity < unit.floor] = 0.0
     return np.rint(np.clip(intensity, 0.0, _FULL_INTENSITY))

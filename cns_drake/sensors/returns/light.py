@@ -153,9 +153,14 @@ _PATCH, _GRAIN = 0.35, 0.06
 # Contrast of patches in units of that of grains.
 _PATCHES = 2.5
 # Height of courses of a wall, width and height of what hangs on it [m], and
-# the part of the wall that it covers; the farthest that tufts end a beam [m].
-_COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.15
+# the part of the wall that it covers; the farthest that ground ends a beam
+# aside [m].
+_COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.2
 _FARTHEST = 1.0
+# Lengths of the waves of the ground [m].
+_WAVES = 8.1, 5.7, 12.3
+# The part of the patches that are stained, and by how much darker they are.
+_STAINED, _STAIN = 0.08, 0.3
 
 
 @compiled
@@ -186,7 +191,8 @@ def texture(
     # As names of their own, fields are fast.
     beam, geometry = light.beam, light.geometry
     contrast, relief = materials.contrast, materials.relief
-    tufts, fittings = materials.tufts, materials.fittings
+    tufts, swell = materials.tufts, materials.swell
+    fittings = materials.fittings
     for k in range(len(energy)):
         part = contrast[geometry[k]]
         if part == 0.0:
@@ -206,14 +212,17 @@ def texture(
         grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
         patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
         share = 0.5 * part * (_PATCHES * patch + grain)
+        if patch < 2.0 * _STAINED - 1.0:
+            share -= _STAIN
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
-        if tufts[geometry[k]] > 0.0:
-            # They stand up: a flat beam ends far in front of their foot.
+        if tufts[geometry[k]] + swell[geometry[k]] > 0.0:
+            # What stands up ends a flat beam far in front of its foot.
             down = max(-d_Wset[ray, 2], 0.01)
             height = 0.5 + 0.35 * patch + 0.15 * grain
             height *= tufts[geometry[k]]
-            distance[k] -= min(height / down, _FARTHEST)
+            height += swell[geometry[k]] * _swell(a, b)
+            distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]
         if out > 0.0:
             distance[k] -= 0.2 * out * _albedo(0.0, 0.0, z / _COURSE)
@@ -221,6 +230,21 @@ def texture(
             if thing > 1.0 - 2.0 * _COVERED:
                 distance[k] -= out * (0.5 + 0.5 * patch)
     return Light(light.beam, distance, energy, light.geometry)
+
+
+@compiled
+def _swell(a: float, b: float) -> float:
+    """Returns a smooth number from -1 to 1 at a place of the ground [m]."""
+    first, second, third = _WAVES
+    crossed = _wave(a / first) * _wave(b / second)
+    return 0.5 * crossed + 0.5 * _wave((a + b) / third)
+
+
+@compiled
+def _wave(turns: float) -> float:
+    """Returns nearly the sine of a number of turns, by parabolas."""
+    part = turns - np.floor(turns) - 0.5
+    return -16.0 * part * (0.5 - abs(part))
 
 
 @compiled

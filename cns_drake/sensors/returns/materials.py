@@ -55,6 +55,7 @@ class Materials(NamedTuple):
         contrast: (G,) float32, how far albedo differs within a surface.
         relief: (G,) float32, how far beams end off the surface [m].
         tufts: (G,) float32 height of what grows on it [m].
+        swell: (G,) float32, how far it rises and falls over some metres [m].
         fittings: (G,) float32, how far what hangs on it stands out [m].
     """
 
@@ -65,6 +66,7 @@ class Materials(NamedTuple):
     contrast: np.ndarray
     relief: np.ndarray
     tufts: np.ndarray
+    swell: np.ndarray
     fittings: np.ndarray
 
 
@@ -102,7 +104,7 @@ def _material(
         reflectivity = _wet(reflectivity)
     given = geometry.reflectivity, entry.reflectivity
     if kind not in (LAMBERT, LEAVES, SPRAYS) or given != (None, None):
-        return kind, reflectivity, density, 0.0, 0.0, 0.0, 0.0, 0.0
+        return kind, reflectivity, density, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return (
         kind,
         reflectivity,
@@ -112,6 +114,7 @@ def _material(
         # A volume of leaves has depth in any case.
         0.0 if kind == LEAVES else fields["relief"],
         fields.get("tufts", 0.0),
+        fields.get("swell", 0.0),
         fields.get("fittings", 0.0),
     )
 

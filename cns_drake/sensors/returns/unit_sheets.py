@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.elementary import exp, log
+from cns_drake.base.elementary import log
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.sensors.returns import link_budget
 
@@ -21,20 +21,19 @@ class Response:
     """How a unit makes intensities of energy; no sheet states it.
 
     Attributes:
-        scale, exponent: a diffuse target has the intensity `scale` times the
-            energy to the power of `exponent`, of what it has by the sheet.
-        fades: whether only what exceeds the threshold of detection counts.
+        slope: a diffuse target has `full` and this times the logarithm of its
+            energy; 0 for an intensity proportional to energy, by the sheet.
+        full: that of an energy of 1.
+        far: range beyond which the unit does not make up for distance [m].
         floor: lower intensities are reported as 0.
-        zeros: part of all shots that report 0 without a cause.
         gain: standard deviation of a laser's gain.
         speckle: that of single shots, as a part of the intensity.
     """
 
-    scale: float = 1.0
-    exponent: float = 1.0
-    fades: bool = False
+    slope: float = 0.0
+    full: float = 0.0
+    far: float = math.inf
     floor: float = 0.0
-    zeros: float = 0.0
     gain: float = 0.05
     speckle: float = 0.1
 
@@ -45,8 +44,8 @@ class Response:
         Logarithms of all points would take half a frame.
         """
         root = np.linspace(0.0, 1.0, 4097)
-        power = 2.0 * self.exponent * log(np.maximum(root, 1e-6))
-        return self.scale * exp(power)
+        energy = np.maximum(root, 1e-6) ** 2
+        return np.maximum(self.full + self.slope * log(energy), 0.0)
 
 
 @dataclass(frozen=True)

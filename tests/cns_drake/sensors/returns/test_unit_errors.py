@@ -12,6 +12,7 @@ from cns_drake.ray_casting.ray_casting_scene import RayHits
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
+from cns_drake.sensors.returns.light import Light, texture
 from cns_drake.sensors.returns.materials import LAMBERT, Materials
 from cns_drake.sensors.returns.unit_sheets import Response
 
@@ -114,7 +115,7 @@ def test_lasers_have_their_places_however_poses_are_given():
     turn = returns.turn(pattern.beams(0))
     zero, half = np.zeros(1, np.float32), np.full(1, 0.5, np.float32)
     materials = Materials(
-        np.array([LAMBERT], np.uint8), half, zero, zero, half, zero, zero, zero
+        np.array([LAMBERT], np.uint8), half, zero, zero, half, *[zero] * 4
     )
     found = [
         returns.measure(
@@ -136,19 +137,50 @@ def test_lasers_have_their_places_however_poses_are_given():
         np.testing.assert_array_equal(other.intensity, found[0].intensity)
 
 
-def test_tufts_stand_on_rough_grass():
-    grass = StructureTable([StructureEntry(1, "grass", "terrain")])
-    X_WG = RigidTransform([0.0, 0.0, -1.75])
-    pattern = make_beam_pattern("os1-128").within((-60, 60))
-    ground = plate("grass", None, X_WG, (400.0, 400.0, 0.1))
-    points = scan([ground], pattern, unit(), structures=grass)
-    near = points[np.hypot(points["x"], points["y"]) < 8.0]
-    height = near["z"] + 1.7
-    assert height.mean() == pytest.approx(0.075, abs=0.01)
-    # Patches and grains are uniform.
-    assert height.std() == pytest.approx(
-        0.15 * np.hypot(0.7, 0.3) / 12**0.5, abs=0.01
+def ground_heights(tufts, swell, p_WGset):
+    """Returns the heights at which beams from above end [m]."""
+    count = len(p_WGset)
+    zero = np.zeros(1, np.float32)
+    materials = Materials(
+        np.array([LAMBERT], np.uint8),
+        *(np.full(1, 0.5, np.float32), zero, zero),
+        *(np.full(1, 0.1, np.float32), zero),
+        *(np.full(1, tufts, np.float32), np.full(1, swell, np.float32), zero),
     )
+    every, geometry = np.arange(count), np.zeros(count, np.int32)
+    light = texture(
+        Light(every, np.full(count, 2.0), np.ones(count), geometry),
+        every,
+        p_WGset + np.array([0.0, 0.0, 2.0]),
+        np.tile([0.0, 0.0, -1.0], (count, 1)),
+        materials,
+        np.zeros(1, int),
+        np.eye(3)[None],
+        np.zeros((1, 3)),
+    )
+    return 2.0 - light.distance
+
+
+def test_tufts_stand_on_rough_grass_that_swells():
+    rng = np.random.default_rng(4)
+    p_WGset = rng.uniform(-2e3, 2e3, (40_000, 3)) * (1.0, 1.0, 0.0)
+    tufts = ground_heights(0.12, 0.0, p_WGset)
+    assert tufts.mean() == pytest.approx(0.06, abs=0.002)
+    # Patches and grains are uniform.
+    spread = 0.12 * np.hypot(0.7, 0.3) / 12**0.5
+    assert tufts.std() == pytest.approx(spread, abs=0.002)
+    swell = ground_heights(0.0, 0.1, p_WGset)
+    assert abs(swell.mean()) < 0.001
+    assert np.abs(swell).max() < 0.1
+    # The mean square of a wave of parabolas is 8 / 15.
+    square = 0.25 * (8 / 15) ** 2 + 0.25 * (8 / 15)
+    assert swell.std() == pytest.approx(0.1 * square**0.5, rel=0.02)
+    both = ground_heights(0.12, 0.1, p_WGset)
+    np.testing.assert_allclose(both, tufts + swell, atol=1e-7)
+    # It is smooth, and steeper than no road.
+    p_WGset = p_WGset + np.array([0.01, 0.0, 0.0])
+    step = ground_heights(0.0, 0.1, p_WGset) - swell
+    assert np.abs(step).max() < 0.2 * 0.01
 
 
 def test_things_hang_on_fronts():
@@ -197,15 +229,15 @@ def test_texture_belongs_to_the_surface():
 
 
 @pytest.mark.parametrize("speckle", [0.0, 0.2])
-def test_speckle_gain_floor_and_zeros(speckle):
+def test_speckle_gain_and_floor(speckle):
     base = unit()
-    response = Response(gain=0.0, speckle=speckle, floor=50.0, zeros=0.1)
+    response = Response(gain=0.0, speckle=speckle, floor=50.0)
     returns = replace(base, sheet=replace(base.sheet, response=response))
     pattern = make_beam_pattern("os1-128").within((-10, 10), (-10, 10))
     bright = scan([plate("wall", 0.6, facing(8.0))], pattern, returns)
     bright = bright["intensity"]
     assert np.mean(bright == 0.0) == pytest.approx(
-        0.1 if speckle == 0.0 else 0.1 + 0.9 * 0.19, abs=0.04
+        0.0 if speckle == 0.0 else 0.19, abs=0.04
     )
     assert bright[bright > 0.0].min() >= 50.0
     if speckle == 0.0:
@@ -214,16 +246,31 @@ def test_speckle_gain_floor_and_zeros(speckle):
         assert bright.max() > 75.0
 
 
-def test_what_fades_is_dark_near_the_threshold():
+@pytest.mark.parametrize(
+    ("reflectivity", "distance", "expected"),
+    [
+        (0.5, 5.0, 60.0 + 15.0 * np.log(0.5)),
+        (0.5, 9.9, 60.0 + 15.0 * np.log(0.5)),
+        # It does not make up for what is lost beyond.
+        (0.5, 20.0, 60.0 + 15.0 * np.log(0.5 / 4.0)),
+        (0.5, 40.0, 0.0),
+        (0.04, 5.0, 60.0 + 15.0 * np.log(0.04)),
+        (0.03, 5.0, 0.0),
+    ],
+)
+def test_intensity_by_the_logarithm(reflectivity, distance, expected):
     base = unit()
-    response = Response(1.0, 0.5, True, gain=0.0, speckle=0.0)
+    response = Response(15.0, 60.0, 10.0, 10.0, gain=0.0, speckle=0.0)
     returns = replace(base, sheet=replace(base.sheet, response=response))
     pattern = make_beam_pattern("os1-128").within((-5, 5), (-5, 5))
-    near, far = (
-        np.median(
-            scan([plate("wall", 0.2, facing(x))], pattern, returns)["intensity"]
-        )
-        for x in (3.0, 50.0)
-    )
-    assert near == pytest.approx(100.0 * 0.2**0.5, abs=1.5)
-    assert far < 0.7 * near
+    wall = plate("wall", reflectivity, facing(distance))
+    points = scan([wall], pattern, returns)
+    assert np.median(points["intensity"]) == pytest.approx(expected, abs=0.7)
+
+
+def test_some_patches_are_stained():
+    points = road(0.0, 9.0, unit())["intensity"]
+    bright = np.median(points)
+    # Without stains the darkest place has 0.39 of the mean.
+    share = np.mean(points < 0.37 * bright)
+    assert share == pytest.approx(0.08, abs=0.05)
