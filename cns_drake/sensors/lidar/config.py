@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -10,7 +11,7 @@ from pydantic import Field, PlainSerializer, field_validator, model_validator
 from cns_drake.base.drives.point_layouts import LayoutName
 from cns_drake.base.errors import validated
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.lidar.patterns import BeamPattern
+from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
 from cns_drake.sensors.sensor_config import (
     Mount,
@@ -150,14 +151,26 @@ def make_lidar_config(preset: str) -> LidarSection:
 
 
 def make_pattern(config: LidarSection) -> BeamPattern:
-    """Returns the beams of one turn."""
-    return make_beam_pattern(
+    """Returns the beams of one turn.
+
+    Calibrated returns have the elevations of a real unit, if they are known.
+    """
+    pattern = make_beam_pattern(
         config.preset,
         1.0 / config.rate,
         num_columns=config.columns,
         min_range=config.min_range,
         max_range=config.max_range,
     )
+    if config.returns == "ideal" or not isinstance(pattern, SpinningPattern):
+        return pattern
+    # Slow to import, and ideal returns do without.
+    from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
+
+    own = UNIT_SHEETS[config.preset].head.elevations_deg
+    if not own:
+        return pattern
+    return replace(pattern, elevations_rad=tuple(map(math.radians, own)))
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:

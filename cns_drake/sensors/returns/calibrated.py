@@ -219,6 +219,8 @@ class CalibratedReturns:
             size * np.clip(normal(key, laser, draw), -3.0, 3.0)
             for draw, size in enumerate(sizes)
         ]
+        lowest = -sheet.response.gain
+        errors[3] += sheet.response.dim * np.minimum(errors[3] - lowest, 0.0)
         range_error, elevation, azimuth, gain = (
             one[beams.ring] for one in errors
         )
@@ -238,7 +240,7 @@ class CalibratedReturns:
             _turned(beams.d_Sset, own + shift, 0.0),
             heights[block],
             range_error,
-            1.0 + gain,
+            np.maximum(1.0 + gain, 0.0),
         )
 
 

@@ -371,7 +371,8 @@ def _intensity(
     intensity *= gain[pulses.beam]
     if unit.speckle:
         speckle = normal(key, pulses.beam, draw + 2)
-        speckle *= unit.speckle
+        # Most shots differ little, and a few much.
+        speckle *= np.abs(speckle) * (unit.speckle / math.sqrt(3.0))
         speckle += 1.0
         intensity *= speckle
     intensity[intensity < unit.floor] = 0.0

@@ -151,12 +151,14 @@ def reflected(
 # Edges of the cells of equal albedo [m]: patches, and grains.
 _PATCH, _GRAIN = 0.35, 0.06
 # Contrast of patches in units of that of grains.
-_PATCHES = 2.5
+_PATCHES = 2.0
 # Height of courses of a wall, width and height of what hangs on it [m], and
 # the part of the wall that it covers; the farthest that ground ends a beam
 # aside [m].
 _COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.2
 _FARTHEST = 1.0
+# How far the mean of a spot on rough ground is off, as a part of the distance.
+_ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
 _WAVES = 8.1, 5.7, 12.3
 # The part of the patches that are stained, and by how much darker they are.
@@ -211,7 +213,8 @@ def texture(
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z
         grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
         patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
-        share = 0.5 * part * (_PATCHES * patch + grain)
+        dull = 0.5 - 0.375 * (1.0 - patch) ** 2
+        share = 0.5 * part * (_PATCHES * dull + 2.0 * grain * grain * grain)
         if patch < 2.0 * _STAINED - 1.0:
             share -= _STAIN
         energy[k] *= (1.0 + share) / (1.0 - share)
@@ -222,10 +225,11 @@ def texture(
             height = 0.5 + 0.35 * patch + 0.15 * grain
             height *= tufts[geometry[k]]
             height += swell[geometry[k]] * _swell(a, b)
+            height += _ROUGH * distance[k] * grain
             distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]
         if out > 0.0:
-            distance[k] -= 0.2 * out * _albedo(0.0, 0.0, z / _COURSE)
+            distance[k] -= 0.1 * out * _albedo(0.0, 0.0, z / _COURSE)
             thing = _albedo(a / _WIDE, b / _WIDE, z / _HIGH)
             if thing > 1.0 - 2.0 * _COVERED:
                 distance[k] -= out * (0.5 + 0.5 * patch)

@@ -27,6 +27,7 @@ class Response:
         far: range beyond which the unit does not make up for distance [m].
         floor: lower intensities are reported as 0.
         gain: standard deviation of a laser's gain.
+        dim: how much faster gains fall more than that below the mean.
         speckle: that of single shots, as a part of the intensity.
     """
 
@@ -35,6 +36,7 @@ class Response:
     far: float = math.inf
     floor: float = 0.0
     gain: float = 0.05
+    dim: float = 0.0
     speckle: float = 0.1
 
     @cached_property
@@ -58,10 +60,13 @@ class Head:
         tick_deg: azimuths are reported in steps of this; 0 for exact ones.
             Then each laser has an azimuth of its own, up to one step aside
             [deg].
+        elevations_deg: that of each laser of one real unit, from the top;
+            empty if only the nominal ones are known.
     """
 
     heights: tuple[tuple[float, float], ...] = ((-90.0, 0.0),)
     tick_deg: float = 0.0
+    elevations_deg: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,8 +134,10 @@ def _sheet(
     if "response" in fields:
         fields["response"] = Response(**fields["response"])
     if "head" in fields:
-        heights = tuple(map(tuple, fields["head"]["heights"]))
-        fields["head"] = Head(heights, fields["head"]["tick_deg"])
+        head = fields["head"]
+        heights = tuple(map(tuple, head.pop("heights")))
+        elevations_deg = tuple(head.pop("elevations_deg"))
+        fields["head"] = Head(heights, elevations_deg=elevations_deg, **head)
     return UnitSheet(
         rows=tuple(link_budget.SheetRow(*row) for row in rows),
         unknown=tuple(unknown),
