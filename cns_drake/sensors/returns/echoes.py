@@ -372,7 +372,7 @@ def _intensity(
     if unit.speckle:
         speckle = normal(key, pulses.beam, draw + 2)
         # Most shots differ little, and a few much.
-        speckle *= np.abs(speckle) * (unit.speckle / math.sqrt(3.0))
+        speckle *= speckle * speckle * (unit.speckle / math.sqrt(15.0))
         speckle += 1.0
         intensity *= speckle
     intensity[intensity < unit.floor] = 0.0

@@ -162,7 +162,7 @@ _ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
 _WAVES = 8.1, 5.7, 12.3
 # The part of the patches that are stained, and by how much darker they are.
-_STAINED, _STAIN = 0.08, 0.3
+_STAINED, _STAIN = 0.06, 0.3
 
 
 @compiled
@@ -213,7 +213,7 @@ def texture(
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z
         grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
         patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
-        dull = 0.5 - 0.375 * (1.0 - patch) ** 2
+        dull = 0.4 - 0.125 * (1.0 - patch) ** 4
         share = 0.5 * part * (_PATCHES * dull + 2.0 * grain * grain * grain)
         if patch < 2.0 * _STAINED - 1.0:
             share -= _STAIN
