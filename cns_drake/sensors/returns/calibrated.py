@@ -232,14 +232,14 @@ class CalibratedReturns:
             own = (uniform(key, laser, len(sizes)) - 0.5) * 2.0 * tick
             own = own[beams.ring]
         across = np.maximum(np.sqrt(x * x + y * y), 1e-9)
-        lowest, heights = np.transpose(head.heights)
+        lowest, heights, parts = np.transpose(head.blocks)
         block = (np.degrees(np.arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
         return CalibratedTurn(
             beams,
             _turned(beams.d_Sset, own + azimuth, elevation / across),
             _turned(beams.d_Sset, own + shift, 0.0),
             heights[block],
-            range_error,
+            range_error * parts[block],
             np.maximum(1.0 + gain, 0.0),
         )
 

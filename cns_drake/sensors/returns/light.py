@@ -160,9 +160,11 @@ _FARTHEST = 1.0
 # How far the mean of a spot on rough ground is off, as a part of the distance.
 _ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
-_WAVES = 8.1, 5.7, 12.3
+_WAVES = 11.3, 7.9, 17.1
 # The part of the patches that are stained, and by how much darker they are.
-_STAINED, _STAIN = 0.06, 0.3
+_STAINED, _STAIN = 0.04, 0.3
+# Where no light is left to differ, by the same measure.
+_DARKEST = -0.8
 
 
 @compiled
@@ -217,6 +219,7 @@ def texture(
         share = 0.5 * part * (_PATCHES * dull + 2.0 * grain * grain * grain)
         if patch < 2.0 * _STAINED - 1.0:
             share -= _STAIN
+        share = max(share, _DARKEST)
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
         if tufts[geometry[k]] + swell[geometry[k]] > 0.0:
@@ -229,7 +232,7 @@ def texture(
             distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]
         if out > 0.0:
-            distance[k] -= 0.1 * out * _albedo(0.0, 0.0, z / _COURSE)
+            distance[k] -= 0.06 * out * _albedo(0.0, 0.0, z / _COURSE)
             thing = _albedo(a / _WIDE, b / _WIDE, z / _HIGH)
             if thing > 1.0 - 2.0 * _COVERED:
                 distance[k] -= out * (0.5 + 0.5 * patch)

@@ -55,8 +55,9 @@ class Head:
     """Where the lasers of a unit sit, and how it reports its turn.
 
     Attributes:
-        heights: the lowest elevation of each block of lasers [deg], and its
-            height above the origin [m], from the top.
+        blocks: the lowest elevation of each block of lasers [deg], its height
+            above the origin [m], and the part that its errors of range are of
+            the stated ones, from the top.
         tick_deg: azimuths are reported in steps of this; 0 for exact ones.
             Then each laser has an azimuth of its own, up to one step aside
             [deg].
@@ -64,7 +65,7 @@ class Head:
             empty if only the nominal ones are known.
     """
 
-    heights: tuple[tuple[float, float], ...] = ((-90.0, 0.0),)
+    blocks: tuple[tuple[float, float, float], ...] = ((-90.0, 0.0, 1.0),)
     tick_deg: float = 0.0
     elevations_deg: tuple[float, ...] = ()
 
@@ -135,9 +136,9 @@ def _sheet(
         fields["response"] = Response(**fields["response"])
     if "head" in fields:
         head = fields["head"]
-        heights = tuple(map(tuple, head.pop("heights")))
+        blocks = tuple(map(tuple, head.pop("blocks")))
         elevations_deg = tuple(head.pop("elevations_deg"))
-        fields["head"] = Head(heights, elevations_deg=elevations_deg, **head)
+        fields["head"] = Head(blocks, elevations_deg=elevations_deg, **head)
     return UnitSheet(
         rows=tuple(link_budget.SheetRow(*row) for row in rows),
         unknown=tuple(unknown),
