@@ -162,7 +162,7 @@ _ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
 _WAVES = 11.3, 7.9, 17.1
 # The part of the patches that are stained, and by how much darker they are.
-_STAINED, _STAIN = 0.04, 0.3
+_STAINED, _STAIN = 0.035, 0.3
 # Where no light is left to differ, by the same measure.
 _DARKEST = -0.8
 
@@ -217,7 +217,9 @@ def texture(
         patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
         dull = 0.4 - 0.125 * (1.0 - patch) ** 4
         share = 0.5 * part * (_PATCHES * dull + 2.0 * grain * grain * grain)
-        if patch < 2.0 * _STAINED - 1.0:
+        # Hollows are stained, and not what stands out.
+        rise = _swell(a, b) if swell[geometry[k]] > 0.0 else 0.0
+        if patch < 2.0 * _STAINED * (1.0 - rise) - 1.0:
             share -= _STAIN
         share = max(share, _DARKEST)
         energy[k] *= (1.0 + share) / (1.0 - share)
@@ -227,7 +229,7 @@ def texture(
             down = max(-d_Wset[ray, 2], 0.01)
             height = 0.5 + 0.35 * patch + 0.15 * grain
             height *= tufts[geometry[k]]
-            height += swell[geometry[k]] * _swell(a, b)
+            height += swell[geometry[k]] * rise
             height += _ROUGH * distance[k] * grain
             distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]
