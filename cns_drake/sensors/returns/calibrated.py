@@ -156,8 +156,11 @@ class CalibratedReturns:
                 times=when,
                 with_normals=True,
             )
-            found.append(list(vars(hits).values()))
-        joined = RayHits(*map(np.concatenate, zip(*found, strict=True)))
+            found.append(hits)
+        joined = found[0]
+        if len(found) > 1:
+            fields = zip(*(vars(hits).values() for hits in found), strict=True)
+            joined = RayHits(*map(np.concatenate, fields))
         met = BeamHits.of(rotate(R_WSset, turn.d_Sset), joined)
         if turn.height.any():
             every = np.arange(len(turn.height))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.sensors.returns.light import BeamHits, Shots, dot
+from cns_drake.sensors.returns.light import BeamHits, Shots
 from cns_drake.sensors.returns.random_numbers import uniform
 
 # Numbers of a beam's draws for the rays at its sides, two each.
@@ -61,10 +61,7 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     number = np.concatenate(
         [np.tile([2 * k, 2 * k + 1], len(edges[k])) for k in range(len(edges))]
     )
-    # Unit vectors across the beams, to the neighbours.
-    d, d_j = hits.d_Wset[row], hits.d_Wset[neighbour]
-    toward = d_j - dot(d, d_j)[:, None] * d
-    toward /= np.sqrt(dot(toward, toward))[:, None]
+    toward = _find_directions(hits.d_Wset, row, neighbour)
     share = _share(len(shots.beam), row, number, toward)
     kept = share > 0.0
     row, neighbour, number = row[kept], neighbour[kept], number[kept]
@@ -79,6 +76,25 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     sides = Sides(row, neighbour, number, share, d_Wset, reach)
     _aim(sides, toward, rest, angle, hits, shots.divergence, shots.max_range)
     return sides
+
+
+@compiled
+def _find_directions(
+    d_Wset: np.ndarray, row: np.ndarray, neighbour: np.ndarray
+) -> np.ndarray:
+    """Returns unit vectors across beams, (P, 3), to their neighbours."""
+    toward = np.empty((len(row), 3))
+    for side in range(len(row)):
+        d, d_j = d_Wset[row[side]], d_Wset[neighbour[side]]
+        along = d[0] * d_j[0] + d[1] * d_j[1] + d[2] * d_j[2]
+        x = d_j[0] - along * d[0]
+        y = d_j[1] - along * d[1]
+        z = d_j[2] - along * d[2]
+        length = np.sqrt(x * x + y * y + z * z)
+        toward[side, 0] = x / length
+        toward[side, 1] = y / length
+        toward[side, 2] = z / length
+    return toward
 
 
 @compiled

@@ -31,8 +31,8 @@ from cns_drake.sensors.returns.random_numbers import uniform
 _GLASS_INDEX = 1.52
 # G of leaves of all directions.
 _LEAF_PROJECTION = 0.5
-# Leaf area that a ray passes through a spray: two of five go on.
-_SPRAY = 0.9
+# Leaf area that a ray passes through a spray: one of four goes on.
+_SPRAY = 1.4
 # Greatest number of continuations of a ray.
 _MOST_STEPS = 6
 # A continued ray begins this far behind the surface [m].

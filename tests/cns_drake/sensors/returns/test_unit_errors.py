@@ -241,14 +241,14 @@ def test_things_hang_on_fronts():
     assert out.max() < 0.55
 
 
-def test_two_of_five_rays_pass_a_spray():
+def test_one_of_four_rays_passes_a_spray():
     tree = StructureTable([StructureEntry(1, "tree", "vegetation")])
     X_WG = RigidTransform(RollPitchYaw(0.0, -np.pi / 2, 0.0), [9.0, 0.0, 0.0])
     spray = plate("tree/leaves", None, X_WG, shape=HalfSpace())
     wall = plate("behind", 0.5, facing(20.0))
     points = scan([spray, wall], ahead(8_000), unit(), structures=tree)
     passed = np.mean(points["x"] > 19.0)
-    assert passed == pytest.approx(np.exp(-0.9), abs=0.02)
+    assert passed == pytest.approx(np.exp(-1.4), abs=0.02)
 
 
 def road(x, distance, returns, seed=5):
