@@ -216,12 +216,14 @@ class CalibratedReturns:
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
         angle = np.radians(sheet.angle_error_deg)
-        sizes = (sheet.range_bias, angle, angle, sheet.response.gain)
+        own = np.sqrt(sheet.range_bias**2 - head.alternate**2)
+        sizes = (own, angle, angle, sheet.response.gain)
         # None is farther off than three deviations.
         errors = [
             size * np.clip(normal(key, laser, draw), -3.0, 3.0)
             for draw, size in enumerate(sizes)
         ]
+        errors[0] += np.where(laser % 2, -head.alternate, head.alternate)
         lowest = -sheet.response.gain
         errors[3] += sheet.response.dim * np.minimum(errors[3] - lowest, 0.0)
         range_error, elevation, azimuth, gain = (

@@ -169,7 +169,7 @@ _PATCHES = 2.0
 # Height of courses of a wall, width and height of what hangs on it [m], and
 # the part of the wall that it covers; the farthest that ground ends a beam
 # aside [m].
-_COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.2
+_COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.16
 _FARTHEST = 1.0
 # How far the mean of a spot on rough ground is off, as a part of the distance.
 _ROUGH = 1.5e-4
@@ -248,7 +248,7 @@ def texture(
             distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]
         if out > 0.0:
-            distance[k] -= 0.06 * out * _albedo(0.0, 0.0, z / _COURSE)
+            distance[k] -= 0.04 * out * _albedo(0.0, 0.0, z / _COURSE)
             thing = _albedo(a / _WIDE, b / _WIDE, z / _HIGH)
             if thing > 1.0 - 2.0 * _COVERED:
                 distance[k] -= out * (0.5 + 0.5 * patch)

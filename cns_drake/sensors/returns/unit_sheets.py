@@ -58,6 +58,8 @@ class Head:
         blocks: the lowest elevation of each block of lasers [deg], its height
             above the origin [m], and the part that its errors of range are of
             the stated ones, from the top.
+        alternate: how much farther every second laser from the first measures,
+            and the others nearer, as a part of their errors of range [m].
         tick_deg: azimuths are reported in steps of this; 0 for exact ones.
             Then each laser has an azimuth of its own, up to one step aside
             [deg].
@@ -66,6 +68,7 @@ class Head:
     """
 
     blocks: tuple[tuple[float, float, float], ...] = ((-90.0, 0.0, 1.0),)
+    alternate: float = 0.0
     tick_deg: float = 0.0
     elevations_deg: tuple[float, ...] = ()
 
