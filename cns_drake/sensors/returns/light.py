@@ -171,13 +171,14 @@ _PATCHES = 2.0
 # aside [m].
 _COURSE, _WIDE, _HIGH, _COVERED = 0.3, 0.25, 1.2, 0.16
 _FARTHEST = 1.0
-# How far the mean of a spot on rough ground is off, as a part of the distance.
+# By what height the mean of a spot on rough ground is off, as a part of the
+# distance.
 _ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
 _WAVES = 11.3, 7.9, 17.1
 # The part of the patches that are stained, and by how much darker they are.
 _STAINED, _STAIN = 0.035, 0.3
-# Where no light is left to differ, by the same measure.
+# The darkest place has a ninth of the mean albedo.
 _DARKEST = -0.8
 
 
@@ -229,6 +230,7 @@ def texture(
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z
         grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
         patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
+        # Most patches are a little brighter than the mean, few much darker.
         dull = 0.4 - 0.125 * (1.0 - patch) ** 4
         share = 0.5 * part * (_PATCHES * dull + 2.0 * grain * grain * grain)
         # Hollows are stained, and not what stands out.
