@@ -216,18 +216,18 @@ class CalibratedReturns:
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
         sheet, head = self.sheet, self.sheet.head
         angle = np.radians(sheet.angle_error_deg)
-        own = np.sqrt(sheet.range_bias**2 - head.alternate**2)
-        sizes = (own, angle, angle, sheet.response.gain)
+        # What alternates is a part of the errors of range.
+        rest = np.sqrt(sheet.range_bias**2 - head.alternate**2)
+        sizes = (rest, angle, angle, sheet.response.gain)
         # None is farther off than three deviations.
-        errors = [
+        range_error, elevation, azimuth, gain = (
             size * np.clip(normal(key, laser, draw), -3.0, 3.0)
             for draw, size in enumerate(sizes)
-        ]
-        errors[0] += np.where(laser % 2, -head.alternate, head.alternate)
-        lowest = -sheet.response.gain
-        errors[3] += sheet.response.dim * np.minimum(errors[3] - lowest, 0.0)
+        )
+        range_error += np.where(laser % 2, -head.alternate, head.alternate)
+        gain += sheet.response.dim * np.minimum(gain + sheet.response.gain, 0.0)
         range_error, elevation, azimuth, gain = (
-            one[beams.ring] for one in errors
+            one[beams.ring] for one in (range_error, elevation, azimuth, gain)
         )
         x, y, z = beams.d_Sset.T
         shift, own = 0.0, 0.0
