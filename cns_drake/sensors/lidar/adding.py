@@ -117,6 +117,8 @@ def add_lidar(
                 pattern, seed=seed, sensor_name=name
             )
         pattern = make_beam_pattern(pattern)
+        if isinstance(returns, CalibratedReturns):
+            pattern = returns.sheet.aimed(pattern)
     elif not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "

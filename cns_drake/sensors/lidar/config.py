@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -11,7 +10,7 @@ from pydantic import Field, PlainSerializer, field_validator, model_validator
 from cns_drake.base.drives.point_layouts import LayoutName
 from cns_drake.base.errors import validated
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
+from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
 from cns_drake.sensors.sensor_config import (
     Mount,
@@ -162,15 +161,12 @@ def make_pattern(config: LidarSection) -> BeamPattern:
         min_range=config.min_range,
         max_range=config.max_range,
     )
-    if config.returns == "ideal" or not isinstance(pattern, SpinningPattern):
+    if config.returns == "ideal":
         return pattern
     # Slow to import, and ideal returns do without.
     from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 
-    own = UNIT_SHEETS[config.preset].head.elevations_deg
-    if not own:
-        return pattern
-    return replace(pattern, elevations_rad=tuple(map(math.radians, own)))
+    return UNIT_SHEETS[config.preset].aimed(pattern)
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:

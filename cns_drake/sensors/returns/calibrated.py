@@ -14,7 +14,7 @@ from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides
-from cns_drake.sensors.returns.light import BeamHits, Shots, dot, join, texture
+from cns_drake.sensors.returns.light import BeamHits, Shots, join, texture
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
@@ -264,10 +264,8 @@ def _turned(
     x, y, z = d_Sset.T
     c, s = cos(left), sin(left)
     x, y = c * x - s * y, s * x + c * y
-    d = np.stack(
-        [x - up * x * z, y - up * y * z, z + up * (x * x + y * y)], axis=1
-    )
-    return d / np.sqrt(dot(d, d))[:, None]
+    x, y, z = x - up * x * z, y - up * y * z, z + up * (x * x + y * y)
+    return np.stack([x, y, z], axis=1) / np.sqrt(x * x + y * y + z * z)[:, None]
 
 
 class CalibratedTurn:

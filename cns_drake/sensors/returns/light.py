@@ -30,15 +30,6 @@ def join(tables: Sequence[_Table]) -> _Table:
     return tables[0]._make(map(np.concatenate, zip(*tables, strict=True)))
 
 
-def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Returns the scalar products of vectors, (N, 3) each.
-
-    They are added in a fixed order: the result of a matrix library depends on
-    the processor.
-    """
-    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
-
-
 class BeamHits(NamedTuple):
     """The hits of N rays.
 

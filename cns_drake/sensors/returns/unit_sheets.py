@@ -1,6 +1,6 @@
 """Values from the data sheets of the presets' units: unit_sheets.yaml."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 from pathlib import Path
@@ -10,6 +10,7 @@ import numpy as np
 
 from cns_drake.base.elementary import log
 from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
 from cns_drake.sensors.returns import link_budget
 
 # Speed of light [m/s].
@@ -129,6 +130,17 @@ class UnitSheet:
     def resolution(self) -> float:
         """Distance below which two echoes are one [m]."""
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
+
+    def aimed(self, pattern: BeamPattern) -> BeamPattern:
+        """Returns a pattern with the elevations of the unit, if known.
+
+        A pattern of another number of rings is left.
+        """
+        own = tuple(map(math.radians, self.head.elevations_deg))
+        if not isinstance(pattern, SpinningPattern):
+            return pattern
+        is_own = len(own) == pattern.num_rings
+        return replace(pattern, elevations_rad=own) if is_own else pattern
 
 
 def _sheet(

@@ -21,7 +21,10 @@ from pydrake.systems.primitives import ConstantValueSource
 import pytest
 
 from cns_drake.sensors.lidar.adding import add_lidar
+from cns_drake.sensors.lidar.config import LidarSection, make_pattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
+from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 
 INERTIA = SpatialInertia.SolidBoxWithDensity(1000.0, 1.0, 1.0, 1.0)
 
@@ -237,6 +240,30 @@ def test_returns_that_cannot_be(pattern, options, fault):
     place = scene_graph.world_frame_id()
     with pytest.raises(ValueError, match=fault):
         add_lidar(builder, scene_graph, place, X_PS, pattern, **options)
+
+
+@pytest.mark.parametrize(
+    "returns", ["calibrated", CalibratedReturns.of_preset("hdl-64e")]
+)
+def test_calibrated_unit_has_its_own_elevations(returns):
+    builder = DiagramBuilder()
+    scene_graph = builder.AddSystem(SceneGraph())
+    lidar = add_lidar(
+        builder,
+        scene_graph,
+        scene_graph.world_frame_id(),
+        RigidTransform(),
+        "hdl-64e",
+        returns=returns,
+    )
+    config = LidarSection(preset="hdl-64e", returns="calibrated")
+    own = make_pattern(config).elevations_rad
+    assert lidar.pattern.elevations_rad == own
+    ideal = make_beam_pattern("hdl-64e")
+    assert own != ideal.elevations_rad
+    # Other units, and other numbers of rings, are not touched.
+    for preset, other in (("vlp-16", ideal), ("hdl-64e", FORWARD)):
+        assert UNIT_SHEETS[preset].aimed(other) is other
 
 
 def test_calibrated_returns_of_a_preset():
