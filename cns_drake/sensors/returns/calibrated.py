@@ -218,16 +218,18 @@ class CalibratedReturns:
         angle = np.radians(sheet.angle_error_deg)
         # What alternates is a part of the errors of range.
         rest = np.sqrt(sheet.range_bias**2 - head.alternate**2)
-        sizes = (rest, angle, angle, sheet.response.gain)
+        unit = sheet.response
+        sizes = (rest, angle, angle, unit.gain, unit.flicker)
         # None is farther off than three deviations.
-        range_error, elevation, azimuth, gain = (
+        range_error, elevation, azimuth, gain, flicker = (
             size * np.clip(normal(key, laser, draw), -3.0, 3.0)
             for draw, size in enumerate(sizes)
         )
         range_error += np.where(laser % 2, -head.alternate, head.alternate)
-        gain += sheet.response.dim * np.minimum(gain + sheet.response.gain, 0.0)
-        range_error, elevation, azimuth, gain = (
-            one[beams.ring] for one in (range_error, elevation, azimuth, gain)
+        gain += unit.dim * np.minimum(gain + unit.gain, 0.0)
+        errors = range_error, elevation, azimuth, gain, flicker
+        range_error, elevation, azimuth, gain, flicker = (
+            one[beams.ring] for one in errors
         )
         x, y, z = beams.d_Sset.T
         shift, own = 0.0, 0.0
@@ -245,7 +247,8 @@ class CalibratedReturns:
             _turned(beams.d_Sset, own + shift, 0.0),
             heights[block],
             range_error * parts[block],
-            np.maximum(1.0 + gain, 0.0),
+            np.maximum(1.0 + gain, 0.0)
+            * np.where(beams.column % 2, 1.0 + flicker, 1.0 - flicker),
         )
 
 

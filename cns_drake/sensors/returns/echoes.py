@@ -368,7 +368,6 @@ def _intensity(
         intensity = unit.table[step]
     part = log(energy[is_above]) / math.log(_FULL_RETRO)
     intensity[is_above] = retro_from + rest * part
-    intensity *= gain[pulses.beam]
     if unit.speckle:
         speckle = normal(key, pulses.beam, draw + 2)
         # Most shots differ little, and a few much.
@@ -376,4 +375,5 @@ def _intensity(
         speckle += 1.0
         intensity *= speckle
     intensity[intensity < unit.floor] = 0.0
+    intensity *= gain[pulses.beam]
     return np.rint(np.clip(intensity, 0.0, _FULL_INTENSITY))

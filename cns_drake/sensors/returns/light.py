@@ -153,10 +153,10 @@ def reflected(
     )
 
 
-# Edges of the cells of equal albedo [m]: patches, and grains.
-_PATCH, _GRAIN = 0.35, 0.06
-# Contrast of patches in units of that of grains.
-_PATCHES = 2.0
+# Edges of the cells of equal albedo [m]: areas, as of repairs, patches, grains.
+_AREA, _PATCH, _GRAIN = 5.0, 0.35, 0.06
+# How far areas differ, and by how much the darkest stain is darker.
+_AREAS, _DEEPEST = 0.15, 1.15
 # Height of courses of a wall, width and height of what hangs on it [m], and
 # the part of the wall that it covers; the farthest that ground ends a beam
 # aside [m].
@@ -167,8 +167,6 @@ _FARTHEST = 1.0
 _ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
 _WAVES = 11.3, 7.9, 17.1
-# The part of the patches that are stained, and by how much darker they are.
-_STAINED, _STAIN = 0.035, 0.3
 # The darkest place has a ninth of the mean albedo.
 _DARKEST = -0.8
 
@@ -202,7 +200,7 @@ def texture(
     beam, geometry = light.beam, light.geometry
     contrast, relief = materials.contrast, materials.relief
     tufts, swell = materials.tufts, materials.swell
-    fittings = materials.fittings
+    fittings, stains = materials.fittings, materials.stains
     for k in range(len(energy)):
         part = contrast[geometry[k]]
         if part == 0.0:
@@ -221,13 +219,14 @@ def texture(
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z
         grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
         patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
+        area = _albedo(a / _AREA, b / _AREA, c / _AREA)
         # Most patches are a little brighter than the mean, few much darker.
-        dull = 0.4 - 0.125 * (1.0 - patch) ** 4
-        share = 0.5 * part * (_PATCHES * dull + 2.0 * grain * grain * grain)
-        # Hollows are stained, and not what stands out.
-        rise = _swell(a, b) if swell[geometry[k]] > 0.0 else 0.0
-        if patch < 2.0 * _STAINED * (1.0 - rise) - 1.0:
-            share -= _STAIN
+        dull = 0.4 - 0.085 * (1.0 - patch) ** 4
+        share = part * (dull + grain * grain * grain) + _AREAS * area
+        # Stains lie in dark areas, most of all; the square has a mean of 4 / 3.
+        stain = 1.5 * stains[geometry[k]] * (1.0 - area) ** 2
+        if patch + 1.0 < stain:
+            share -= _DEEPEST * (1.0 - (patch + 1.0) / stain)
         share = max(share, _DARKEST)
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
@@ -236,7 +235,8 @@ def texture(
             down = max(-d_Wset[ray, 2], 0.01)
             height = 0.5 + 0.35 * patch + 0.15 * grain
             height *= tufts[geometry[k]]
-            height += swell[geometry[k]] * rise
+            if swell[geometry[k]] > 0.0:
+                height += swell[geometry[k]] * _swell(a, b)
             height += _ROUGH * distance[k] * grain
             distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]

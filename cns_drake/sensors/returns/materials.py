@@ -57,6 +57,7 @@ class Materials(NamedTuple):
         tufts: (G,) float32 height of what grows on it [m].
         swell: (G,) float32, how far it rises and falls over some metres [m].
         fittings: (G,) float32, how far what hangs on it stands out [m].
+        stains: (G,) float32, the part of it that is stained.
     """
 
     kind: np.ndarray
@@ -68,6 +69,7 @@ class Materials(NamedTuple):
     tufts: np.ndarray
     swell: np.ndarray
     fittings: np.ndarray
+    stains: np.ndarray
 
 
 def find_materials(
@@ -104,7 +106,7 @@ def _material(
         reflectivity = _wet(reflectivity)
     given = geometry.reflectivity, entry.reflectivity
     if kind not in (LAMBERT, LEAVES, SPRAYS) or given != (None, None):
-        return kind, reflectivity, density, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return kind, reflectivity, density, *[0.0] * 7
     return (
         kind,
         reflectivity,
@@ -116,6 +118,7 @@ def _material(
         fields.get("tufts", 0.0),
         fields.get("swell", 0.0),
         fields.get("fittings", 0.0),
+        fields.get("stains", 0.0),
     )
 
 

@@ -26,9 +26,11 @@ class Response:
             energy; 0 for an intensity proportional to energy, by the sheet.
         full: that of an energy of 1.
         far: range beyond which the unit does not make up for distance [m].
-        floor: lower intensities are reported as 0.
+        floor: lower intensities are reported as 0, whatever the gain.
         gain: standard deviation of a laser's gain.
         dim: how much faster gains fall more than that below the mean.
+        flicker: by which part every second shot of a laser is brighter, and the
+            others darker, as the standard deviation over lasers.
         speckle: that of single shots, as a part of the intensity.
     """
 
@@ -38,6 +40,7 @@ class Response:
     floor: float = 0.0
     gain: float = 0.05
     dim: float = 0.0
+    flicker: float = 0.0
     speckle: float = 0.1
 
     @cached_property

@@ -248,6 +248,10 @@ def test_returns_that_cannot_be(pattern, options, fault):
 def test_calibrated_unit_has_its_own_elevations(returns):
     builder = DiagramBuilder()
     scene_graph = builder.AddSystem(SceneGraph())
+    source = scene_graph.RegisterSource("wall")
+    scene_graph.RegisterAnchoredGeometry(
+        source, plate("wall", 0.5, facing(9.0))
+    )
     lidar = add_lidar(
         builder,
         scene_graph,

@@ -122,6 +122,21 @@ def test_some_lasers_are_dim():
     assert 5 < np.sum(dim < 0.85) < 30
 
 
+def test_every_second_shot_of_a_laser_is_brighter():
+    base = unit()
+    pattern = make_beam_pattern("os1-128")
+    response = Response(gain=0.0, flicker=0.1)
+    returns = replace(base, sheet=replace(base.sheet, response=response))
+    beams = pattern.beams(0)
+    brighter = returns.turn(beams).gain - 1.0
+    is_odd = beams.column % 2 == 1
+    of_laser = brighter[is_odd][:128]
+    np.testing.assert_allclose(
+        brighter, np.where(is_odd, 1.0, -1.0) * of_laser[beams.ring], atol=1e-12
+    )
+    assert 0.07 < of_laser.std() < 0.13
+
+
 def test_beams_start_at_their_lasers():
     whole = make_beam_pattern("hdl-64e")
     pattern = whole.within((-8, 8))
@@ -162,7 +177,7 @@ def test_lasers_have_their_places_however_poses_are_given():
     turn = returns.turn(pattern.beams(0))
     zero, half = np.zeros(1, np.float32), np.full(1, 0.5, np.float32)
     materials = Materials(
-        np.array([LAMBERT], np.uint8), half, zero, zero, half, *[zero] * 4
+        np.array([LAMBERT], np.uint8), half, zero, zero, half, *[zero] * 5
     )
     found = [
         returns.measure(
@@ -184,18 +199,19 @@ def test_lasers_have_their_places_however_poses_are_given():
         np.testing.assert_array_equal(other.intensity, found[0].intensity)
 
 
-def ground_heights(tufts, swell, p_WGset):
-    """Returns the heights at which beams from above end [m]."""
+def textured(p_WGset, contrast=0.5, **fields):
+    """Returns the light of beams from 2 m above to places of a surface."""
     count = len(p_WGset)
-    zero = np.zeros(1, np.float32)
+    fields |= {"contrast": contrast}
     materials = Materials(
         np.array([LAMBERT], np.uint8),
-        *(np.full(1, 0.5, np.float32), zero, zero),
-        *(np.full(1, 0.1, np.float32), zero),
-        *(np.full(1, tufts, np.float32), np.full(1, swell, np.float32), zero),
+        *(
+            np.full(1, fields.get(name, 0.0), np.float32)
+            for name in Materials._fields[1:]
+        ),
     )
     every, geometry = np.arange(count), np.zeros(count, np.int32)
-    light = texture(
+    return texture(
         Light(every, np.full(count, 2.0), np.ones(count), geometry),
         every,
         p_WGset + np.array([0.0, 0.0, 2.0]),
@@ -205,7 +221,11 @@ def ground_heights(tufts, swell, p_WGset):
         np.eye(3)[None],
         np.zeros((1, 3)),
     )
-    return 2.0 - light.distance
+
+
+def ground_heights(tufts, swell, p_WGset):
+    """Returns the heights at which beams from above end [m]."""
+    return 2.0 - textured(p_WGset, tufts=tufts, swell=swell).distance
 
 
 def test_tufts_stand_on_rough_grass_that_swells():
@@ -321,9 +341,22 @@ def test_intensity_by_the_logarithm(reflectivity, distance, expected):
     assert np.median(points["intensity"]) == pytest.approx(expected, abs=0.7)
 
 
-def test_some_patches_are_stained():
-    points = road(0.0, 9.0, unit())["intensity"]
-    bright = np.median(points)
-    # Without stains the darkest place has 0.39 of the mean.
-    share = np.mean(points < 0.37 * bright)
-    assert share == pytest.approx(0.08, abs=0.05)
+def test_a_part_of_a_surface_is_stained():
+    p_WGset = np.random.default_rng(8).uniform(-2e3, 2e3, (200_000, 3))
+    shares = []
+    for stains in (0.0, 0.2):
+        energy = textured(p_WGset, 1e-9, stains=stains).energy
+        # The energy is (1 + share) / (1 - share).
+        shares.append((energy - 1.0) / (energy + 1.0))
+    clean, stained = shares
+    # Areas alone are uniform.
+    assert np.abs(clean).max() == pytest.approx(0.15, rel=1e-3)
+    assert clean.std() == pytest.approx(0.15 / 3**0.5, rel=0.02)
+    depth = clean - stained
+    assert np.mean(depth > 0.0) == pytest.approx(0.2, abs=0.01)
+    # So are depths, up to 1.15.
+    assert np.mean(depth > 0.3) == pytest.approx(0.2 * 0.85 / 1.15, abs=0.01)
+    assert stained.min() == pytest.approx(-0.8)
+    # The means of (1 - a)^2 over dark and bright areas are 7 / 3 and 1 / 3.
+    of_dark = np.mean(clean[depth > 0.0] < 0.0)
+    assert of_dark == pytest.approx(7.0 / 8.0, abs=0.01)
