@@ -46,6 +46,7 @@ BY_HAND = {
     "peers.py",
     "real_or_simulated.py",
     "real_scans.py",
+    "scans_to_judge.py",
     "source_rays.py",
 }
 SHARED = {"processes.py", "stages.py"}
