@@ -242,24 +242,26 @@ def test_returns_that_cannot_be(pattern, options, fault):
         add_lidar(builder, scene_graph, place, X_PS, pattern, **options)
 
 
-@pytest.mark.parametrize(
-    "returns", ["calibrated", CalibratedReturns.of_preset("hdl-64e")]
-)
-def test_calibrated_unit_has_its_own_elevations(returns):
+def facing_wall(preset, **options):
+    """Returns a builder, and a LiDAR in it, 9 m from a wall."""
     builder = DiagramBuilder()
     scene_graph = builder.AddSystem(SceneGraph())
     source = scene_graph.RegisterSource("wall")
     scene_graph.RegisterAnchoredGeometry(
         source, plate("wall", 0.5, facing(9.0))
     )
-    lidar = add_lidar(
-        builder,
-        scene_graph,
-        scene_graph.world_frame_id(),
-        RigidTransform(),
-        "hdl-64e",
-        returns=returns,
+    frame = scene_graph.world_frame_id()
+    X_WS = RigidTransform()
+    return builder, add_lidar(
+        builder, scene_graph, frame, X_WS, preset, **options
     )
+
+
+@pytest.mark.parametrize(
+    "returns", ["calibrated", CalibratedReturns.of_preset("hdl-64e")]
+)
+def test_calibrated_unit_has_its_own_elevations(returns):
+    _, lidar = facing_wall("hdl-64e", returns=returns)
     config = LidarSection(preset="hdl-64e", returns="calibrated")
     own = make_pattern(config).elevations_rad
     assert lidar.pattern.elevations_rad == own
@@ -273,21 +275,7 @@ def test_calibrated_unit_has_its_own_elevations(returns):
 def test_calibrated_returns_of_a_preset():
     measured = {}
     for seed in (1, 2):
-        builder = DiagramBuilder()
-        scene_graph = builder.AddSystem(SceneGraph())
-        source = scene_graph.RegisterSource("wall")
-        scene_graph.RegisterAnchoredGeometry(
-            source, plate("wall", 0.5, facing(9.0))
-        )
-        lidar = add_lidar(
-            builder,
-            scene_graph,
-            scene_graph.world_frame_id(),
-            RigidTransform(),
-            "vlp-16",
-            returns="calibrated",
-            seed=seed,
-        )
+        builder, lidar = facing_wall("vlp-16", returns="calibrated", seed=seed)
         context = builder.Build().CreateDefaultContext()
         measured[seed] = lidar.GetOutputPort("scan").Eval(
             lidar.GetMyContextFromRoot(context)
