@@ -95,6 +95,25 @@ def test_it_finds_the_difference(
     assert first["auc"] > 0.95
 
 
+def test_a_result_is_the_mean_of_draws(judge, tmp_path):
+    sets = []
+    for seed in (1, 2):
+        for place in range(PLACES):
+            folder = tmp_path / str(seed) / str(place)
+            make_place(folder, 100 * seed + place)
+        sets.append(judge.read_places(tmp_path / str(seed)))
+    single = [
+        judge.judge(*(judge.Features(places, seed) for places in sets))
+        for seed in (0, 1)
+    ]
+    mean = judge.judge_draws(*sets, 2)
+    for key in ("auc", "control"):
+        assert mean[key]["all"] == pytest.approx(
+            (single[0][key]["all"] + single[1][key]["all"]) / 2
+        )
+    assert single[0]["auc"]["all"] != single[1]["auc"]["all"]
+
+
 def test_rings_follow_from_the_order_of_a_file(judge, tmp_path):
     make_place(tmp_path / "one", 0)
     [[scan]] = judge.read_places(tmp_path)
