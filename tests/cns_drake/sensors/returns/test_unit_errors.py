@@ -354,7 +354,7 @@ def test_a_part_of_a_surface_is_stained():
     assert clean.std() == pytest.approx(0.15 / 3**0.5, rel=0.02)
     depth = clean - stained
     assert np.mean(depth > 0.0) == pytest.approx(0.2, abs=0.01)
-    # So are depths, up to 1.15.
+    # Depths are uniform, too, up to 1.15.
     assert np.mean(depth > 0.3) == pytest.approx(0.2 * 0.85 / 1.15, abs=0.01)
     assert stained.min() == pytest.approx(-0.8)
     # The means of (1 - a)^2 over dark and bright areas are 7 / 3 and 1 / 3.
