@@ -7,9 +7,9 @@ Writes N scans of each drive, evenly over its time, into folders of their own:
 `hdl-64e` with calibrated returns, 1.73 m above the ground, among 60 vehicles on
 ride A. The motion of the car during a turn is undone, as in KITTI's scans.
 
-Streets are filled with cars along the kerb and with hedges, fences and shrubs
-behind them, wherever there is room. It shows how much of what a classifier
-sees is what stands in a city, and not how it is measured.
+With --full-streets, streets are filled with cars along the kerb and with
+hedges, walls and shrubs behind them, wherever there is room. It shows how much
+of what a classifier sees is what stands in a city, and not how it is measured.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.points import encode_bin
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
+from cns_drake.city.geometry.polygons import placed
 from cns_drake.city.geometry.structures import Builder, Model, part_triangles
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.motion.trajectory import Trajectory
@@ -122,25 +123,26 @@ class _Filling:
         row: str,
         builder: Builder,
         model: Model,
-        at: np.ndarray,
+        places: np.ndarray,
         yaw: float,
-    ) -> bool:
-        """Puts a thing at a place (2,) [m] if it has room."""
+    ) -> None:
+        """Puts a thing at the first of (N, 2) places with room for it [m]."""
         corners = np.concatenate(
             [part_triangles(part, model.meshes)[0] for part in model.parts]
         )[:, :2]
-        c, s = math.cos(yaw), math.sin(yaw)
-        area = shapely.affinity.affine_transform(
-            shapely.box(*corners.min(axis=0), *corners.max(axis=0)),
-            (c, -s, s, c, *at),
-        )
-        z = self._around.ground.heights(at[None])[0]
-        if (
-            not np.isfinite(z)
-            or not self._standing.is_free(area)
-            or shapely.intersects(self._areas, area).any()
+        box = shapely.box(*corners.min(axis=0), *corners.max(axis=0))
+        for at, z in zip(
+            places, self._around.ground.heights(places), strict=True
         ):
-            return False
+            area = placed(box, at, yaw)
+            if (
+                np.isfinite(z)
+                and self._standing.is_free(area)
+                and not shapely.intersects(self._areas, area).any()
+            ):
+                break
+        else:
+            return
         self.editing.add(
             f"{row}_beside_{len(self._areas):05d}",
             builder.semantic_class,
@@ -149,7 +151,6 @@ class _Filling:
             "full-streets",
         )
         self._areas.append(area)
-        return True
 
 
 def fill_streets(world: World, drive: shapely.LineString) -> World:
@@ -175,10 +176,8 @@ def fill_streets(world: World, drive: shapely.LineString) -> World:
                 model = builder.build(rng, **size)
                 aside = side * np.array([-math.sin(yaw), math.cos(yaw)])
                 first = near + more * rng.uniform()
-                for away in np.arange(first, far, _ROW_STEP):
-                    at = start + away * aside
-                    if filling.put(row, builder, model, at, yaw):
-                        break
+                away = np.arange(first, far, _ROW_STEP)[:, None]
+                filling.put(row, builder, model, start + away * aside, yaw)
     return filling.editing.finish()
 
 
