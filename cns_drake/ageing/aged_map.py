@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, replace
-import os
 from pathlib import Path
 import re
 import shutil
@@ -87,16 +86,7 @@ def age_map(
     wanted = check_years(years)
     if not 0 <= seed < _MAX_SEED:
         raise InputError(f"--seed: {seed}: not from 0 to {_MAX_SEED - 1}")
-    if os.path.lexists(output):
-        raise InputError(
-            f"{output}: the folder is there already; give another one"
-        )
-    name = output.resolve().name
-    if not re.fullmatch(r"\w+", name, re.ASCII):
-        raise InputError(
-            f"--output: {name!r}: the folder's name may have letters, digits "
-            "and underscores only"
-        )
+    map_folder.check_new_map(output)
     folder = MapFolder(source.resolve())
     drives = folder.recordable_drives()
     if not drives:

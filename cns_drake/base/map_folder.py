@@ -1,6 +1,10 @@
 """The files in the folder of a map."""
 
+import os
 from pathlib import Path
+import re
+
+from cns_drake.base.errors import InputError
 
 ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"
@@ -85,3 +89,21 @@ def drive_name(path: Path) -> str:
         number = path.stem.removeprefix("sequence_")
         return f"{path.resolve().parent.name}_{number}"
     return path.stem
+
+
+def check_new_map(output: Path) -> None:
+    """Checks the folder of a map that will be written.
+
+    Raises:
+        InputError: it is there already, or its name is no name of a map.
+    """
+    if os.path.lexists(output):
+        raise InputError(
+            f"{output}: the folder is there already; give another one"
+        )
+    name = output.resolve().name
+    if not re.fullmatch(r"\w+", name, re.ASCII):
+        raise InputError(
+            f"--output: {name!r}: the folder's name may have letters, digits "
+            "and underscores only"
+        )

@@ -129,7 +129,7 @@ def simulate(
         scenario: A shipped drive, or a scenario file of your own.
         traffic: Numbers of vehicles and of walkers, in place of the scenario's.
         transient: A passing change and its strength: parked_cars, leaves, snow,
-            scaffolds, works, furniture, seed; may be repeated.
+            scaffolds, works, furniture, roadsides, seed; may be repeated.
         driver: A driver like those of published drives, who wanders and changes
             lanes, or one who keeps to the middle of his lane.
         ride: Put the car on springs, on a road of a class of ISO 8608 from A

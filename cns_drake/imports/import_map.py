@@ -3,9 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-import os
 from pathlib import Path
-import re
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
+from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, check_new_map
 from cns_drake.imports import map_files
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
@@ -159,16 +157,7 @@ def _check(source: Path, output: Path, options: ImportOptions) -> None:
         raise InputError(
             "--grow: --years define the stages already; give one of them"
         )
-    if os.path.lexists(output):
-        raise InputError(
-            f"{output}: the folder is there already; give another one"
-        )
-    name = output.resolve().name
-    if not re.fullmatch(r"\w+", name, re.ASCII):
-        raise InputError(
-            f"--output: {name!r}: the folder's name may have letters, digits "
-            "and underscores only"
-        )
+    check_new_map(output)
 
 
 def _import_roads(

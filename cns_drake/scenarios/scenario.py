@@ -202,10 +202,10 @@ class TransientConfig(Section):
     """Changes of a city that no building plan lists.
 
     The effect of each switch depends on the seed and on the names of
-    structures, not on the other switches.
+    structures, not on the other switches but for `roadsides`.
 
     Attributes:
-        seed: seed of all draws.
+        seed: seed of the draws.
         parked_cars: part of the parked cars that have left (three in ten of
             them), stand elsewhere in their bay (two), or have another in their
             place.
@@ -219,6 +219,9 @@ class TransientConfig(Section):
             fences, skips or diggers beside the road, and a new kerb stone 0.3 m
             into it.
         furniture: part of poles, lamps and signs that were replaced within 2 m.
+        roadsides: part of the hedges, garden walls, bushes, young trees,
+            garages and parked cars that stand beside kerbs within 30 m of the
+            drive where there is room; the seed draws the cars alone.
     """
 
     seed: int = Field(default=1, ge=0)
@@ -228,6 +231,7 @@ class TransientConfig(Section):
     scaffolds: float = Field(default=0.0, ge=0.0, le=1.0)
     works: float = Field(default=0.0, ge=0.0, le=1.0)
     furniture: float = Field(default=0.0, ge=0.0, le=1.0)
+    roadsides: float = Field(default=0.0, ge=0.0, le=1.0)
 
     @property
     def is_off(self) -> bool:

@@ -11,8 +11,8 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
+from cns_drake.transient import putting_up
 from cns_drake.transient.parked_cars import change_parked_cars
-from cns_drake.transient.putting_up import put_up_scaffolds, put_up_works
 from cns_drake.transient.scene_editing import SceneEditing, Surroundings
 from cns_drake.transient.snow_cover import lay_snow
 from cns_drake.transient.world_structures import (
@@ -61,6 +61,10 @@ def change_world(
         kept_free,
         config.seed,
     )
+    if config.roadsides > 0.0:
+        # They come first, so that what stands there changes as well.
+        putting_up.fill_roadsides(around, config.roadsides)
+        around = _afresh(around)
     if config.parked_cars > 0.0:
         change_parked_cars(around, config.parked_cars)
     if config.leaves < 1.0:
@@ -68,17 +72,23 @@ def change_world(
     if config.furniture > 0.0:
         _move_furniture(around, config.furniture)
     if config.scaffolds > 0.0:
-        put_up_scaffolds(around, config.scaffolds)
+        putting_up.put_up_scaffolds(around, config.scaffolds)
     if config.works > 0.0:
-        put_up_works(around, config.works)
+        putting_up.put_up_works(around, config.works)
     if config.snow > 0.0:
         # Snow comes last, so that it covers new things as well.
-        ground, world = around.ground, around.editing.finish()
-        around = replace(
-            around, editing=SceneEditing(world), things=read_structures(world)
-        )
+        ground = around.ground
+        around = _afresh(around)
         lay_snow(around, ground, config.snow)
     return around.editing.finish()
+
+
+def _afresh(around: Surroundings) -> Surroundings:
+    """Returns surroundings in which new things are as others."""
+    world = around.editing.finish()
+    return replace(
+        around, editing=SceneEditing(world), things=read_structures(world)
+    )
 
 
 def _move_furniture(around: Surroundings, share: float) -> None:

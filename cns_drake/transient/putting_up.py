@@ -1,16 +1,19 @@
-"""Puts up scaffolds and roadworks along a drive."""
+"""Puts up scaffolds, roadworks, and hedges and the like, along a drive."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
 import math
+from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.geometry.polygons import placed
 from cns_drake.city.geometry.structures import (
-    Builder,
     Model,
     Part,
     assemble,
@@ -18,13 +21,13 @@ from cns_drake.city.geometry.structures import (
     block,
     post,
 )
-from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.transient.scene_editing import Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
-    GroundSurface,
     Obstacles,
     Structure,
+    draws,
 )
 
 # Greatest distance of fronts from the drive [m].
@@ -151,33 +154,21 @@ def scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
     return assemble(*parts)
 
 
-# Cell size of the world's grid of kerb stretches [m].
-_CELL = 20.0
+# Distance of points along a kerb [m].
 _SPACING = 1.0
 # Greatest ratio of a stretch's length to its chord: a bent one is not used.
 _MOST_BENT = 1.05
-_LENGTHS = (6.0, 14.0)
-_TRIES = 6
-# Sites reach from this distance from the kerb to one of these [m].
-_SITE_INNER = 0.4
-_WIDTHS = (4.6, 2.7)
-# New kerb stones narrow the carriageway by this [m].
-_KERB_WIDTH, _KERB_HEIGHT = 0.3, 0.13
-_KERB_RGB = (0.8, 0.8, 0.78)
-# Things on a site, with the room they need [m] and relative shares.
-_WIDE = {"excavator": 3, "skip": 2, "soil_heap": 1, "brick_pallets": 1}
-_NARROW = {"skip": 3, "brick_pallets": 2, "portable_toilet": 1}
-_OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
 
 
 class _Stretch:
-    """A straight piece of kerb, with the name of its cell.
+    """A straight piece of kerb, named by the switch that uses it and its cell.
 
     At its middle (2,) [m] is a frame at `yaw` [rad], whose x axis runs along it
     and whose y axis points away from the carriageway.
     """
 
     def __init__(self, name: str, points: np.ndarray, outward: np.ndarray):
+        """Takes (N, 2) points along the kerb [m] and the direction of y."""
         self.name = name
         chord = points[-1] - points[0]
         self.middle = (points[0] + points[-1]) / 2
@@ -198,19 +189,114 @@ class _Stretch:
             [self.place(*at) for at in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
         )
 
+    def footprint(
+        self, model: Model, x: float, y: float, turn: float = 0.0
+    ) -> BaseGeometry:
+        """Returns the footprint of a model at a place, turned [m, rad]."""
+        at = self.place(x, y).tolist()
+        return placed(model.footprint, at, turn + self.yaw)
+
+    def put(
+        self,
+        around: Surroundings,
+        suffix: str,
+        semantic_class: str,
+        model: Model,
+        x: float,
+        y: float,
+        turn: float = 0.0,
+        length: float = 0.0,
+    ) -> None:
+        """Adds a thing at a place, turned, both ends on the ground [m, rad].
+
+        Without a length it stands upright. Without ground it is left out.
+        """
+        ground, yaw = around.ground, self.yaw + turn
+        middle = self.place(x, y)
+        along = np.array([math.cos(yaw), math.sin(yaw)]) * length / 2
+        ends = np.array([middle, middle - along, middle + along])
+        z = ground.heights(ends, of_road=y < 0.0)
+        at = float(z[0])
+        if length == 0.0:
+            at = ground.lowest(self.footprint(model, x, y, turn), at)
+        if not np.isfinite(at):  # No ground beside the road.
+            edge = self.place(x, -0.1)[None]
+            at = float(ground.heights(edge, of_road=True)[0])
+        if not np.isfinite(at):  # Both are in slits of the ground.
+            return
+        pitch = 0.0
+        if length > 0.0 and np.isfinite(z).all():
+            pitch = -math.atan2(z[2] - z[1], length)
+        around.editing.add(
+            f"{self.name}_{suffix}",
+            semantic_class,
+            model,
+            RigidTransform(RollPitchYaw(0.0, pitch, yaw), [*middle, at]),
+            self.name.partition("_")[0],
+        )
+
+
+def _stretches(
+    around: Surroundings, cause: str, cell: float, shortest: float
+) -> list[_Stretch]:
+    """Returns the longest straight piece of kerb in each cell near a drive.
+
+    They are within 30 m of it, and at least that long; a cell has a size [m].
+    A note is kept if there is none.
+    """
+    best: dict[tuple[int, int], _Stretch] = {}
+    for kerb in around.ground.kerbs(_SPACING):
+        cells = np.floor(kerb.points / cell).astype(int)
+        cuts = np.flatnonzero(np.diff(cells, axis=0).any(axis=1)) + 1
+        for run in np.split(np.arange(len(cells)), cuts):
+            points = kerb.points[run]
+            walked = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+            if len(run) < 2:
+                continue
+            x, y = (int(value) for value in cells[run[0]])
+            outward = kerb.outwards[run].mean(axis=0)
+            stretch = _Stretch(f"{cause}_{x:+d}_{y:+d}", points, outward)
+            longest = best[x, y].length if (x, y) in best else 0.0
+            if (
+                stretch.length >= shortest
+                and stretch.length > longest
+                and walked <= _MOST_BENT * stretch.length
+            ):
+                best[x, y] = stretch
+    found = [
+        stretch
+        for _, stretch in sorted(best.items())
+        if around.drive.distance(shapely.Point(stretch.middle)) < _FARTHEST
+    ]
+    if not found:
+        around.editing.note(
+            f"{cause}: no structure of class road along the drive"
+        )
+    return found
+
+
+# Cell size of the world's grid of kerb stretches [m].
+_WORKS_CELL = 20.0
+_LENGTHS = (6.0, 14.0)
+_TRIES = 6
+# Sites reach from this distance from the kerb to one of these [m].
+_SITE_INNER = 0.4
+_WIDTHS = (4.6, 2.7)
+# New kerb stones narrow the carriageway by this [m].
+_KERB_WIDTH, _KERB_HEIGHT = 0.3, 0.13
+_KERB_RGB = (0.8, 0.8, 0.78)
+# Things on a site, with the room they need [m] and relative shares.
+_WIDE = {"excavator": 3, "skip": 2, "soil_heap": 1, "brick_pallets": 1}
+_NARROW = {"skip": 3, "brick_pallets": 2, "portable_toilet": 1}
+_OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
+
 
 def put_up_works(around: Surroundings, share: float) -> None:
     """Puts roadworks along a share of the kerbs near a drive.
 
     Kerbs without room beside them get none.
     """
-    stretches = [
-        stretch
-        for stretch in _stretches(around.ground)
-        if around.drive.distance(shapely.Point(stretch.middle)) < _FARTHEST
-    ]
-    if not stretches:
-        around.editing.note("works: no structure of class road along the drive")
+    stretches = _stretches(around, "works", _WORKS_CELL, _LENGTHS[0])
     solid, every = (
         around.obstacles(ignored=ignored) for ignored in (_OPEN, GROUND_CLASSES)
     )
@@ -254,30 +340,30 @@ class _Site:
         )
         for k, (at, y, turn, run) in enumerate(sides):
             model = OBJECTS["site_fence"].build(self.rng, length=run)
-            self._add(f"fence_{k}", "fence", model, at, y, turn, run)
+            self.stretch.put(
+                self.around, f"fence_{k}", "fence", model, at, y, turn, run
+            )
         self._add_machines(every, middle)
         stones = self.stretch.rectangle(x, length, -_KERB_WIDTH, 0.0)
         if not stones.intersects(self.around.drive.buffer(1.3)):
             size = (length, _KERB_WIDTH, 2 * _KERB_HEIGHT)
             model = assemble(block("stones", size, (0, 0, 0), rgb=_KERB_RGB))
             y = -_KERB_WIDTH / 2
-            self._add("kerb", "sidewalk", model, x, y, 0.0, length)
+            self.stretch.put(
+                self.around, "kerb", "sidewalk", model, x, y, 0.0, length
+            )
 
     def _add_machines(self, every: Obstacles, y: float) -> None:
         shares = _WIDE if self.width > 4.0 else _NARROW
-        names = list(shares)
-        weights = np.array(list(shares.values()), float)
         taken: list[BaseGeometry] = []
         for _ in range(_TRIES):
-            chances = weights / weights.sum()
-            name = names[int(self.rng.choice(len(names), p=chances))]
+            name = pick(shares, self.rng)
             x = self.x + float(self.rng.uniform(-0.4, 0.4)) * self.length
             turn = float(self.rng.uniform(-0.15, 0.15))
-            builder: Builder = OBJECTS[name]
-            model = builder.build(self.rng)
+            model = OBJECTS[name].build(self.rng)
             if name == "brick_pallets":
                 turn += np.pi / 2  # Its row runs along y.
-            area = self._placed(model, x, y, turn)
+            area = self.stretch.footprint(model, x, y, turn)
             inside = self.stretch.rectangle(
                 self.x, self.length, _SITE_INNER, self.width
             )
@@ -286,75 +372,72 @@ class _Site:
                 and every.is_free(area)
                 and not any(area.intersects(other) for other in taken)
             ):
-                suffix = f"{name}_{len(taken)}"
-                kind = builder.semantic_class
-                self._add(suffix, kind, model, x, y, turn, 0.0)
+                kind = OBJECTS[name].semantic_class
+                self.stretch.put(
+                    self.around, f"{name}_{len(taken)}", kind, model, x, y, turn
+                )
                 taken.append(area)
 
-    def _placed(
-        self, model: Model, x: float, y: float, turn: float
-    ) -> BaseGeometry:
-        """Returns the footprint of a model on the site, in the world [m]."""
-        at = self.stretch.place(x, y).tolist()
-        return placed(model.footprint, at, turn + self.stretch.yaw)
 
-    def _add(
-        self,
-        suffix: str,
-        semantic_class: str,
-        model: Model,
-        x: float,
-        y: float,
-        turn: float,
-        length: float,
-    ) -> None:
-        """Adds a thing whose two ends are on the ground.
-
-        Without ground the thing is left out.
-        """
-        ground, yaw = self.around.ground, self.stretch.yaw + turn
-        middle = self.stretch.place(x, y)
-        along = np.array([math.cos(yaw), math.sin(yaw)]) * length / 2
-        ends = np.array([middle, middle - along, middle + along])
-        z = ground.heights(ends, of_road=y < 0.0)
-        at = float(z[0])
-        if length == 0.0:  # It stands upright.
-            at = ground.lowest(self._placed(model, x, y, turn), at)
-        if not np.isfinite(at):  # No ground beside the road.
-            edge = self.stretch.place(x, -0.1)[None]
-            at = float(ground.heights(edge, of_road=True)[0])
-        if not np.isfinite(at):  # Both are in slits of the ground.
-            return
-        pitch = 0.0
-        if length > 0.0 and np.isfinite(z).all():
-            pitch = -math.atan2(z[2] - z[1], length)
-        self.around.editing.add(
-            f"{self.stretch.name}_{suffix}",
-            semantic_class,
-            model,
-            RigidTransform(RollPitchYaw(0.0, pitch, yaw), [*middle, at]),
-            "works",
-        )
+# Size of the cells of the world's grid of kerb stretches, and least length of a
+# stretch [m].
+_CELL, _SHORTEST = 6.5, 3.0
+# Distance of the places that are tried, away from the kerb [m].
+_STEP = 0.4
 
 
-def _stretches(ground: GroundSurface) -> list[_Stretch]:
-    """Returns the longest straight piece of kerb in each cell."""
-    best: dict[tuple[int, int], _Stretch] = {}
-    for kerb in ground.kerbs(_SPACING):
-        cells = np.floor(kerb.points / _CELL).astype(int)
-        cuts = np.flatnonzero(np.diff(cells, axis=0).any(axis=1)) + 1
-        for run in np.split(np.arange(len(cells)), cuts):
-            points = kerb.points[run]
-            walked = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-            if len(run) < 2:
+@dataclass(frozen=True)
+class _Row:
+    """Things of a row along kerbs, from `roadsides.yaml`."""
+
+    kinds: list[str]
+    share: float
+    nearest: tuple[float, float]
+    farthest: float
+    sizes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    along: Sequence[float] = (0.0,)
+    turns: Sequence[float] = (0.0,)
+    moves: bool = False
+
+
+_ROWS = {
+    name: _Row(**values)
+    for name, values in parse_yaml(
+        Path(__file__).with_name("roadsides.yaml").read_bytes()
+    ).items()
+}
+
+
+def fill_roadsides(around: Surroundings, share: float) -> None:
+    """Puts up a share of the things that have room beside kerbs near a drive.
+
+    All but cars stand at the same places with every seed.
+    """
+    stretches = _stretches(around, "roadsides", _CELL, _SHORTEST)
+    standing = around.obstacles(ignored=GROUND_CLASSES)
+    areas: list[BaseGeometry] = []
+    for name, row in _ROWS.items():
+        seed = around.seed if row.moves else 0
+        for stretch in stretches:
+            rng = draws(seed, f"roadsides {name}", stretch.name)
+            is_put_up = rng.uniform() < share
+            if rng.uniform() >= row.share:
                 continue
-            x, y = (int(value) for value in cells[run[0]])
-            outward = kerb.outwards[run].mean(axis=0)
-            stretch = _Stretch(f"works_{x:+d}_{y:+d}", points, outward)
-            if stretch.length < _LENGTHS[0]:
-                continue
-            if walked > _MOST_BENT * stretch.length:
-                continue
-            if (x, y) not in best or stretch.length > best[x, y].length:
-                best[x, y] = stretch
-    return [best[cell] for cell in sorted(best)]
+            builder = OBJECTS[str(rng.choice(row.kinds))]
+            sizes = {k: float(rng.uniform(*v)) for k, v in row.sizes.items()}
+            model, length = builder.build(rng, **sizes), sizes.get("length", 0)
+            turn = float(rng.choice(row.turns))
+            first = float(rng.uniform(*row.nearest))
+            places = product(np.arange(first, row.farthest, _STEP), row.along)
+            for y, x in places:
+                area = stretch.footprint(model, x, y, turn)
+                if not standing.is_free(area) or (
+                    shapely.intersects(areas, area).any()
+                ):
+                    continue
+                # What a smaller share leaves out takes its room as well.
+                areas.append(area)
+                if is_put_up:
+                    kind = builder.semantic_class
+                    stretch.put(around, name, kind, model, x, y, turn, length)
+                break

@@ -167,7 +167,7 @@ _FARTHEST = 1.0
 _ROUGH = 1.5e-4
 # Lengths of the waves of the ground [m].
 _WAVES = 11.3, 7.9, 17.1
-# The darkest place has a ninth of the mean albedo.
+# The darkest place has a ninth of the mean albedo, the brightest nine times it.
 _DARKEST = -0.8
 
 
@@ -227,7 +227,7 @@ def texture(
         stain = 1.5 * stains[geometry[k]] * (1.0 - area) ** 2
         if patch + 1.0 < stain:
             share -= _DEEPEST * (1.0 - (patch + 1.0) / stain)
-        share = max(share, _DARKEST)
+        share = min(max(share, _DARKEST), -_DARKEST)
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
         if tufts[geometry[k]] + swell[geometry[k]] > 0.0:

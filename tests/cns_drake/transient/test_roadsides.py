@@ -1,0 +1,166 @@
+"""What fills the room beside kerbs."""
+
+from helpers.transient_town import (
+    ORIGIN,
+    change_maker,
+    slope_height,
+    write_transient_town,
+)
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import pytest
+import shapely
+
+from cns_drake.city.geometry.structures import ROOT_DEPTH
+
+X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
+# The road is 6 m wide, and its lanes leave 0.3 m at the kerbs.
+LANES = shapely.Polygon(
+    [
+        (X_WT @ [x, y, 0])[:2]
+        for x, y in ((-99, -2.7), (99, -2.7), (99, 2.7), (-99, 2.7))
+    ]
+)
+
+
+def drive(x_from, x_to):
+    """The way of a vehicle along the street [m]."""
+    return shapely.LineString(
+        [(X_WT @ [x, -0.5, 0])[:2] for x in (x_from, x_to)]
+    )
+
+
+@pytest.fixture(scope="module")
+def sdf(tmp_path_factory):
+    return write_transient_town(tmp_path_factory.mktemp("town"))
+
+
+@pytest.fixture(scope="module")
+def changed(sdf):
+    """Returns the world after changes and its structures, cached."""
+    return change_maker(sdf, drive(-60, 80), LANES)
+
+
+def new_things(changed, **switches):
+    """New structures by name."""
+    _, before = changed()
+    _, after = changed(**switches)
+    return {name: thing for name, thing in after.items() if name not in before}
+
+
+def kind_of(name):
+    """The row of a thing, of names such as roadsides_+3_-2_hedge."""
+    return name.split("_")[3]
+
+
+def test_all_rows_stand_in_free_room_beside_the_kerb(changed):
+    _, before = changed()
+    world, after = changed(roadsides=1.0)
+    fresh = new_things(changed, roadsides=1.0)
+    kinds = {kind_of(name) for name in fresh}
+    assert kinds == {"garage", "hedge", "wall", "shrub", "bush", "tree", "car"}
+    others = [
+        thing.footprint
+        for thing in before.values()
+        if thing.semantic_class not in ("road", "terrain")
+    ]
+    feet = [thing.footprint for thing in fresh.values()]
+    for k, foot in enumerate(feet):
+        assert not shapely.intersects(LANES, foot)
+        assert not shapely.intersects(others, foot).any()
+        assert not shapely.intersects(feet[:k] + feet[k + 1 :], foot).any()
+    for name, thing in before.items():
+        assert np.array_equal(thing.p_WPs, after[name].p_WPs)
+    for entry in world.structures:
+        expected = ("roadsides",) if entry.name in fresh else ()
+        assert entry.causes == expected
+
+
+def test_cars_stand_nearest_to_the_kerb_and_along_it(changed):
+    cars = {
+        name: thing
+        for name, thing in new_things(changed, roadsides=1.0).items()
+        if kind_of(name) == "car"
+    }
+    assert len(cars) > 10
+    for car in cars.values():
+        p_TPs = (X_WT.inverse() @ car.p_WPs.T).T
+        size = np.ptp(p_TPs, axis=0)
+        assert size[0] > 1.5 * size[1]
+        # The kerb is at 3.0; mirrors reach farthest.
+        assert 3.0 < abs(p_TPs[:, 1]).min() < 4.0
+
+
+def test_the_seed_draws_cars_alone(changed):
+    one, other = (
+        new_things(changed, roadsides=1.0, seed=seed) for seed in (1, 2)
+    )
+    differ = {
+        kind_of(name)
+        for name in one.keys() | other.keys()
+        if name not in one
+        or name not in other
+        or not np.array_equal(one[name].p_WPs, other[name].p_WPs)
+    }
+    assert differ == {"car"}
+
+
+def test_a_part_has_some_of_the_things_of_the_whole(changed):
+    whole = new_things(changed, roadsides=1.0)
+    some = new_things(changed, roadsides=0.4)
+    for name, thing in some.items():
+        assert np.array_equal(thing.p_WPs, whole[name].p_WPs)
+    # Each stands by a draw of its own: five standard deviations.
+    expected, spread = 0.4 * len(whole), np.sqrt(0.24 * len(whole))
+    assert abs(len(some) - expected) < 5 * spread
+
+
+def test_two_drives_along_a_road_have_the_same_things(sdf, changed):
+    """Things that only one of them has are far from the other."""
+    mine = new_things(changed, roadsides=1.0)
+    elsewhere = drive(-20, 20)
+    theirs = new_things(change_maker(sdf, elsewhere, LANES), roadsides=1.0)
+    assert 20 < len(theirs) < len(mine)
+    for name, thing in theirs.items():
+        assert np.allclose(thing.p_WPs, mine[name].p_WPs, atol=1e-9)
+    for name in mine.keys() - theirs.keys():
+        # Stretches end 30 m from a drive, and things up to 14 m behind them.
+        assert mine[name].footprint.distance(elsewhere) > 30.0 - 14.0
+
+
+def test_other_switches_change_what_stands_there(changed):
+    world, _ = changed(roadsides=1.0, parked_cars=1.0)
+    causes = {
+        entry.causes
+        for entry in world.structures
+        if entry.name.startswith("roadsides") and kind_of(entry.name) == "car"
+    }
+    assert causes == {("roadsides", "parked_cars")}
+
+
+def test_things_stand_on_a_slope(tmp_path):
+    sdf = write_transient_town(tmp_path, slopes=True)
+    fresh = new_things(change_maker(sdf, drive(-60, 80), LANES), roadsides=1.0)
+    checked = 0
+    for name, thing in fresh.items():
+        p_TPs = (X_WT.inverse() @ thing.p_WPs.T).T
+        if kind_of(name) == "tree" and p_TPs[:, 1].min() > 4.5:
+            trunk = p_TPs[p_TPs[:, 2] < p_TPs[:, 2].min() + 0.1]
+            foot = slope_height(trunk[:, 1].mean())
+            assert foot - 2 * ROOT_DEPTH < trunk[:, 2].min() < foot
+            checked += 1
+    assert checked
+
+
+def test_without_roads_there_is_a_note(tmp_path, sdf):
+    table = (sdf.parent / "structures.csv").read_text()
+    (tmp_path / "structures.csv").write_text(
+        table.replace(",road,road", ",road,terrain")
+    )
+    (tmp_path / "street.sdf").write_text(sdf.read_text())
+    world, _ = change_maker(tmp_path / "street.sdf", drive(-60, 80), LANES)(
+        roadsides=1.0
+    )
+    assert [note.split(":")[:2] for note in world.notes] == [
+        ["transient", " roadsides"]
+    ]
