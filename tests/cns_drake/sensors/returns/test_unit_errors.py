@@ -223,6 +223,18 @@ def textured(p_WGset, contrast=0.5, **fields):
     )
 
 
+def test_albedo_is_within_nine_times_the_mean_either_way():
+    rng = np.random.default_rng(3)
+    p_WGset = rng.uniform(-500.0, 500.0, (40_000, 3)) * (1.0, 1.0, 0.0)
+    energy = textured(p_WGset, 1.0).energy
+    assert energy.min() == pytest.approx(1 / 9)
+    assert energy.max() == pytest.approx(9.0)
+    # Less contrast stays within: parts are at most 0.3 * 1.4 + 0.15 brighter.
+    brightest = textured(p_WGset, 0.3).energy.max()
+    assert brightest == pytest.approx(1.57 / 0.43, rel=0.1)
+    assert brightest < 1.57 / 0.43
+
+
 def ground_heights(tufts, swell, p_WGset):
     """Returns the heights at which beams from above end [m]."""
     return 2.0 - textured(p_WGset, tufts=tufts, swell=swell).distance
