@@ -415,7 +415,8 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
     """
     stretches = _stretches(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles(ignored=GROUND_CLASSES)
-    areas: list[BaseGeometry] = []
+    areas = [around.ground.carriageway]
+    shapely.prepare(areas[0])
     for name, row in _ROWS.items():
         seed = around.seed if row.moves else 0
         for stretch in stretches:

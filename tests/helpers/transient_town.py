@@ -138,7 +138,12 @@ def write_transient_town(folder, *, slopes=False):
             shape = box_shape(15, 8, 9)
             visuals.append(visual(f"{name}/body", shape, 5 * k, 24, 4))
             rows[name] = "building"
-    text = _WORLD.format(origin=_numbers(ORIGIN), visuals="".join(visuals))
+    return write_world(folder, visuals, rows)
+
+
+def write_world(folder, visuals, rows, origin=ORIGIN):
+    """Writes a world of visuals, and the classes of its structures."""
+    text = _WORLD.format(origin=_numbers(origin), visuals="".join(visuals))
     (folder / "street.sdf").write_text(text)
     lines = ["instance,name,class"]
     lines += [f"{k},{n},{c}" for k, (n, c) in enumerate(rows.items(), 1)]

@@ -2,9 +2,12 @@
 
 from helpers.transient_town import (
     ORIGIN,
+    box_shape,
     change_maker,
     slope_height,
+    visual,
     write_transient_town,
+    write_world,
 )
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -150,6 +153,29 @@ def test_things_stand_on_a_slope(tmp_path):
             assert foot - 2 * ROOT_DEPTH < trunk[:, 2].min() < foot
             checked += 1
     assert checked
+
+
+def test_nothing_stands_on_the_carriageway_beyond_a_strip(tmp_path):
+    """Cars beside the inner kerbs would reach over the strip of 1.2 m."""
+    visuals = [
+        visual(f"{side}/plate", box_shape(200, 5, 1), 0, y, -0.5)
+        for side, y in (("north", 3.1), ("south", -3.1))
+    ]
+    visuals.append(visual("lawn/plate", box_shape(200, 60, 1), 0, 0, -0.6))
+    folder = write_world(
+        tmp_path,
+        visuals,
+        {"north": "road", "south": "road", "lawn": "terrain"},
+        (0.0,) * 6,
+    )
+    line = shapely.LineString([(-60, -4.5), (60, -4.5)])
+    fresh = new_things(
+        change_maker(folder, line, shapely.Polygon()), roadsides=1.0
+    )
+    assert len(fresh) > 30
+    for thing in fresh.values():
+        y = np.abs(shapely.get_coordinates(thing.footprint)[:, 1])
+        assert y.min() > 5.6 or y.max() < 0.6
 
 
 def test_without_roads_there_is_a_note(tmp_path, sdf):
