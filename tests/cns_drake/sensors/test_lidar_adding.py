@@ -220,7 +220,9 @@ def test_it_is_added_to_a_body_or_a_frame():
         lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
         for lidar in lidars
     ]
-    assert [scan["x"].tolist() for scan in scans[:2]] == [[6.5], [5.5]]
+    # Embree's last bit is not the same on all processors.
+    x = [float(scan["x"].item()) for scan in scans[:2]]
+    assert x == pytest.approx([6.5, 5.5], abs=1e-6)
     assert lidars[2].pattern == make_beam_pattern("vlp-16", 0.05)
     np.testing.assert_allclose(scans[2]["x"], 6.5, rtol=1e-6)
 
