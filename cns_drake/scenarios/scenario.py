@@ -231,7 +231,7 @@ class TransientConfig(Section):
     scaffolds: float = Field(default=0.0, ge=0.0, le=1.0)
     works: float = Field(default=0.0, ge=0.0, le=1.0)
     furniture: float = Field(default=0.0, ge=0.0, le=1.0)
-    roadsides: float = Field(default=0.0, ge=0.0, le=1.0)
+    roadsides: float = field_off_by_default(0.0, ge=0.0, le=1.0)
 
     @property
     def is_off(self) -> bool:

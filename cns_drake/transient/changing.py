@@ -62,9 +62,10 @@ def change_world(
         config.seed,
     )
     if config.roadsides > 0.0:
-        # They come first, so that what stands there changes as well.
+        # What stands there changes as all else does.
         putting_up.fill_roadsides(around, config.roadsides)
-        around = _afresh(around)
+        rest = config.replaced(roadsides=0.0)
+        return change_world(around.editing.finish(), rest, drive, kept_free)
     if config.parked_cars > 0.0:
         change_parked_cars(around, config.parked_cars)
     if config.leaves < 1.0:
@@ -77,18 +78,12 @@ def change_world(
         putting_up.put_up_works(around, config.works)
     if config.snow > 0.0:
         # Snow comes last, so that it covers new things as well.
-        ground = around.ground
-        around = _afresh(around)
+        ground, world = around.ground, around.editing.finish()
+        around = replace(
+            around, editing=SceneEditing(world), things=read_structures(world)
+        )
         lay_snow(around, ground, config.snow)
     return around.editing.finish()
-
-
-def _afresh(around: Surroundings) -> Surroundings:
-    """Returns surroundings in which new things are as others."""
-    world = around.editing.finish()
-    return replace(
-        around, editing=SceneEditing(world), things=read_structures(world)
-    )
 
 
 def _move_furniture(around: Surroundings, share: float) -> None:

@@ -3,6 +3,8 @@
 import functools
 
 import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import shapely
 
 from cns_drake.city.geometry.mesh import FOLDER
 from cns_drake.scenarios.scenario import TransientConfig
@@ -28,6 +30,14 @@ _VISUAL = """
         </visual>"""
 # The street lies turned, away from the origin of the world.
 ORIGIN = (30.0, -12.0, 0.4, 0.0, 0.0, 0.35)
+X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
+# The road is 6 m wide, and its lanes leave 0.3 m at the kerbs.
+LANES = shapely.Polygon(
+    [
+        (X_WT @ [x, y, 0])[:2]
+        for x, y in ((-99, -2.7), (99, -2.7), (99, 2.7), (-99, 2.7))
+    ]
+)
 COLUMNS = 20
 # The lawn of a sloping town rises along y, from a line.
 SLOPE, SLOPE_FROM = 0.08, 4.5
@@ -164,3 +174,16 @@ def change_maker(sdf, drive, lanes):
         return world, read_structures(world)
 
     return make
+
+
+def new_things(changed, **switches):
+    """New structures by name; all others must be unchanged."""
+    _, before = changed()
+    world, after = changed(**switches)
+    for name, thing in before.items():
+        assert np.array_equal(thing.p_WPs, after[name].p_WPs)
+    fresh = {n: t for n, t in after.items() if n not in before}
+    for entry in world.structures:
+        expected = tuple(switches)[:1] if entry.name in fresh else ()
+        assert entry.causes == expected
+    return fresh

@@ -3,6 +3,7 @@
 from helpers.transient_town import (
     ORIGIN,
     SLOPE_FROM,
+    X_WT,
     change_maker,
     slope_height,
     write_transient_town,
@@ -21,7 +22,6 @@ from cns_drake.transient.parked_cars import make_bays
 from cns_drake.transient.scene_editing import Surroundings
 from cns_drake.transient.world_structures import read_structures
 
-X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
 # The drive leads through cars and roads, below z = 2.2 m or so.
 _CORNERS = [
     X_WT @ [x, y, 0] for x, y in ((-90, -3), (90, -3), (90, 2), (-90, 2))

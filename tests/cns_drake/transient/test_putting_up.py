@@ -1,8 +1,10 @@
 """Objects added between drives: scaffolds, roadworks, snow."""
 
 from helpers.transient_town import (
-    ORIGIN,
+    LANES,
+    X_WT,
     change_maker,
+    new_things,
     slope_height,
     write_transient_town,
 )
@@ -23,15 +25,7 @@ from cns_drake.transient.world_structures import (
     read_structures,
 )
 
-X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
-# The road is 6 m wide, and its lanes leave 0.3 m at the kerbs.
 DRIVE = shapely.LineString([(X_WT @ [x, -0.5, 0])[:2] for x in (-60, 80)])
-LANES = shapely.Polygon(
-    [
-        (X_WT @ [x, y, 0])[:2]
-        for x, y in ((-99, -2.7), (99, -2.7), (99, 2.7), (-99, 2.7))
-    ]
-)
 
 
 @pytest.fixture(scope="module")
@@ -43,19 +37,6 @@ def sdf(tmp_path_factory):
 def changed(sdf):
     """Returns the world after changes and its structures, cached."""
     return change_maker(sdf, DRIVE, LANES)
-
-
-def new_things(changed, **switches):
-    """New structures by name; all others must be unchanged."""
-    _, before = changed()
-    world, after = changed(**switches)
-    for name, thing in before.items():
-        assert np.array_equal(thing.p_WPs, after[name].p_WPs)
-    fresh = {n: t for n, t in after.items() if n not in before}
-    for entry in world.structures:
-        expected = tuple(switches)[:1] if entry.name in fresh else ()
-        assert entry.causes == expected
-    return fresh
 
 
 def in_town(points):
