@@ -148,18 +148,10 @@ def in_one_world(
     hold_first: bool = False,
     across_maps: bool = False,
 ) -> Alignment | None:
-    """Aligns two drives if that is wanted.
+    """Aligns two drives, see `align`, or returns None if they stay as they are.
 
-    Args:
-        first: a drive.
-        second: another one.
-        when: "auto" aligns drives whose world frames differ by name.
-        track: reports progress.
-        hold_first: see `align`.
-        across_maps: they may be of maps of different names.
-
-    Returns:
-        None if the two stay as they are.
+    "auto" aligns drives whose world frames differ by name. With `across_maps`
+    they may be of maps of different names.
 
     Raises:
         InputError: if they should be aligned and cannot be.

@@ -203,10 +203,7 @@ class LoopSearch:
 def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
     """Registers keyframes of a drive to earlier ones at the same place.
 
-    Args:
-        drive: a drive.
-        most: greatest number of tries, evenly along the drive.
-        track: reports progress.
+    At most that many are tried, evenly along the drive.
     """
     pairs = []
     for k in range(len(drive)):

@@ -130,19 +130,10 @@ def run(
 ) -> PlaceRecognition:
     """Runs a method on a pair of drives.
 
-    Args:
-        database: the drive of the places.
-        query: the drive of the queries.
-        method: the method.
-        mode: which queries count.
-        protocol: protocol of the comparison.
-        track: reports progress.
-        across_maps: the two may be of maps of different names.
-        overlaps: (Q, D) for matches by overlap; by default those of the scans.
+    All but the mode, which says which queries count, is as for `retrieve`.
 
     Raises:
-        InputError: if a drive cannot be read, the two are not of the same
-            world, the method fails, or no query has a match.
+        InputError: as `retrieve` does, or if no query has a match.
     """
     retrieval = retrieve(
         database,

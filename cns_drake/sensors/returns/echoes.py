@@ -258,7 +258,9 @@ def _detect(
 ) -> _Pulses:
     """Returns the echoes that are detected, with errors of their ranges."""
     # Where a surface lies decides; an error of its range does not.
-    is_seen = pulses.is_sure | (pulses.snr >= HOPELESS_SNR)
+    is_seen = pulses.snr >= HOPELESS_SNR
+    is_seen &= pulses.energy >= receiver.sheet.response.least
+    is_seen |= pulses.is_sure
     is_seen &= receiver.min_range <= pulses.distance
     is_seen &= pulses.distance <= receiver.max_range
     is_unsure = is_seen & ~pulses.is_sure & (pulses.snr <= CERTAIN_SNR)

@@ -217,9 +217,9 @@ def texture(
         a = 0.7071 * x + 0.5417 * y + 0.4545 * z
         b = -0.6124 * x + 0.7899 * y + 0.0113 * z
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z
-        grain = _albedo(a / _GRAIN, b / _GRAIN, c / _GRAIN)
-        patch = _albedo(a / _PATCH, b / _PATCH, c / _PATCH)
-        area = _albedo(a / _AREA, b / _AREA, c / _AREA)
+        grain = cell_number(a / _GRAIN, b / _GRAIN, c / _GRAIN)
+        patch = cell_number(a / _PATCH, b / _PATCH, c / _PATCH)
+        area = cell_number(a / _AREA, b / _AREA, c / _AREA)
         # Most patches are a little brighter than the mean, few much darker.
         dull = 0.4 - 0.085 * (1.0 - patch) ** 4
         share = part * (dull + grain * grain * grain) + _AREAS * area
@@ -241,8 +241,8 @@ def texture(
             distance[k] -= max(min(height / down, _FARTHEST), -_FARTHEST)
         out = fittings[geometry[k]]
         if out > 0.0:
-            distance[k] -= 0.04 * out * _albedo(0.0, 0.0, z / _COURSE)
-            thing = _albedo(a / _WIDE, b / _WIDE, z / _HIGH)
+            distance[k] -= 0.04 * out * cell_number(0.0, 0.0, z / _COURSE)
+            thing = cell_number(a / _WIDE, b / _WIDE, z / _HIGH)
             if thing > 1.0 - 2.0 * _COVERED:
                 distance[k] -= out * (0.5 + 0.5 * patch)
     return Light(light.beam, distance, energy, light.geometry)
@@ -264,7 +264,7 @@ def _wave(turns: float) -> float:
 
 
 @compiled
-def _albedo(a: float, b: float, c: float) -> float:
+def cell_number(a: float, b: float, c: float) -> float:
     """Returns a number from -1 to 1, the same within each unit cell."""
     z = (
         np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)

@@ -31,9 +31,9 @@ _BARK = 0.30
 _MARKINGS = 0.47
 _SHEETING = 220.0
 _PLATE = 160.0
-# Leaf area in a volume of leaves [1/m]: crowns and hedges of cities (Hosoi
-# and Omasa, 2006, found 0.5 to 2.5 in crowns).
-_LEAF_AREA_DENSITY = 1.5
+# Leaf area in a volume of leaves [1/m]: crowns have 0.5 to 2.5 (Hosoi and
+# Omasa, 2006), clipped hedges more. Fitted to the first place of KITTI.
+_LEAF_AREA_DENSITY = 3.0
 # Reflection of wet ground: a film of n = 1.33 reflects scattered light back to
 # the rough surface (Angstrom, 1925).
 _FILM_INNER = 1.0 - (1.0 - 0.066) / 1.33**2
@@ -131,7 +131,8 @@ def _reflection(
         given = entry.reflectivity
     if given is not None:
         return LAMBERT, given, 0.0
-    dark, bright = _CLASSES[entry.semantic_class]["reflectivity"]
+    fields = _CLASSES[entry.semantic_class]
+    dark, bright = fields["reflectivity"]
     part = geometry.name.rpartition("/")[2]
     words = set(part.split("_"))
     if words & {"glass", "panes", "windows"}:
@@ -149,14 +150,20 @@ def _reflection(
             return LAMBERT, _BARK, 0.0
         kind = LEAVES if is_closed(geometry.surface) else SPRAYS
         return kind, bright, _LEAF_AREA_DENSITY
+    if "trim" in words and "trim" in fields:
+        return LAMBERT, fields["trim"], 0.0
     return LAMBERT, dark + (bright - dark) * _brightness(geometry.rgb), 0.0
 
 
 def _brightness(rgb: tuple[float, float, float] | None) -> float:
-    """Returns the reflected part of white light of a colour, 0 to 1."""
+    """Returns the reflected part of white light of a colour, 0 to 1.
+
+    Colours of screens are nearly the roots of light (IEC 61966-2-1).
+    """
     if rgb is None:
         return 0.5
-    return float(np.clip(np.dot(rgb, (0.2126, 0.7152, 0.0722)), 0.0, 1.0))
+    light = np.square(np.clip(rgb, 0.0, 1.0))
+    return float(np.dot(light, (0.2126, 0.7152, 0.0722)))
 
 
 def _wet(reflectivity: float) -> float:

@@ -2,7 +2,8 @@
 
 Leaves are a medium: a ray passes a distance s with the probability exp(-G LAD
 s). LAD is the leaf area in a volume, and G = 1/2 the part of it that faces a
-ray, for leaves of all directions.
+ray, for leaves of all directions. Rays that enter at one clump or twig pass the
+same leaf area, in all scans of all drives.
 
 A pane reflects R of the light like a mirror and lets T through, by Fresnel's
 equations for both of its faces. Light scattered by dust on it comes back
@@ -19,13 +20,13 @@ from cns_drake.sensors.returns.light import (
     BeamHits,
     Light,
     Shots,
+    cell_number,
     join,
     reflect,
     reflected,
     select,
 )
 from cns_drake.sensors.returns.materials import GLASS, LEAVES, SPRAYS, Materials
-from cns_drake.sensors.returns.random_numbers import uniform
 
 # Refractive index of window glass near 900 nm.
 _GLASS_INDEX = 1.52
@@ -43,8 +44,8 @@ _FAINT_SNR = 3.0
 # Panes are flat to this angle: within it and the beam's own they send the
 # mirrored light back to the unit [rad].
 _FLATNESS = 2e-3
-# Numbers of a beam's draws for leaves, one for each of its rays.
-_LEAF_DRAW = 8
+# Edges of the cells of clumps and of twigs [m], and the part that are clumps.
+_CLUMP, _TWIG, _CLUMPS = 0.5, 0.1, 0.6
 
 
 class Ways(NamedTuple):
@@ -112,21 +113,33 @@ def start_ways(
     k, n = axes[onto_open], lit[side_onto_open]
     row = np.concatenate([k, sides.row[n]])
     met = join([select(hits, k), select(side_hits, n)])
-    # The leaf area before the first leaf is exponential with a mean of 1.
-    sub = np.concatenate([np.zeros_like(k), 1 + sides.number[n]])
-    depth = -np.log(1.0 - uniform(shots.key, beam[row], _LEAF_DRAW + sub))
+    p_WSset = shots.p_WSset[row % len(shots.p_WSset)]
     ways = Ways(
         beam[row],
-        shots.p_WSset[row % len(shots.p_WSset)],
+        p_WSset,
         met.d_Wset,
         shots.times[row % len(shots.times)],
         np.zeros(len(row)),
         np.concatenate([rest[k], sides.share[n]]),
-        depth,
+        _leaf_areas(p_WSset + met.ranges[:, None] * met.d_Wset),
         np.full(len(row), -1, np.int32),
         np.full(len(row), np.inf, np.float32),
     )
     return lights, ways, met
+
+
+@compiled
+def _leaf_areas(p_Wset: np.ndarray) -> np.ndarray:
+    """Returns leaf areas before the first leaf, exponential with mean 1."""
+    result = np.empty(len(p_Wset))
+    for k, (x, y, z) in enumerate(p_Wset):
+        size = _CLUMP
+        # A number from -1 to 1, another one than the share below.
+        if cell_number(z / size, x / size, y / size) > 2 * _CLUMPS - 1:
+            size = _TWIG
+        share = cell_number(x / size, y / size, z / size)
+        result[k] = -np.log(0.5 - 0.5 * share)
+    return result
 
 
 @compiled

@@ -27,6 +27,8 @@ class Response:
         full: that of an energy of 1.
         far: range beyond which the unit does not make up for distance [m].
         floor: lower intensities are reported as 0, whatever the gain.
+        least: echoes of less energy are not reported, however near: the unit
+            turns its power down.
         gain: standard deviation of a laser's gain.
         dim: how much faster gains fall more than that below the mean.
         flicker: by which part every second shot of a laser is brighter, and the
@@ -38,6 +40,7 @@ class Response:
     full: float = 0.0
     far: float = math.inf
     floor: float = 0.0
+    least: float = 0.0
     gain: float = 0.05
     dim: float = 0.0
     flicker: float = 0.0
