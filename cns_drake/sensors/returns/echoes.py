@@ -24,7 +24,7 @@ from cns_drake.sensors.returns.weather import Scattering
 
 # The index of the weather, in place of a geometry's.
 SCATTERED = -2
-# Numbers of a beam's draws; lower ones serve the sub-rays and the leaves.
+# Numbers of a beam's draws; lower ones serve the sub-rays.
 _FIRST_ECHO_DRAW = 128
 _DRAWS_PER_ECHO = 4
 _FIRST_DROP_DRAW = 200

@@ -31,8 +31,6 @@ class Sides(NamedTuple):
     Attributes:
         row: (P,) row of the beam.
         neighbour: (P,) row of the beam beyond the edge.
-        number: (P,) number of the side of the beam: 0 and 1 in the first order
-            of beams, 2 and 3 in the second one.
         share: (P,) part of the beam's light.
         d_Wset: (P, 3) directions.
         reach: (P,) float32: beyond the nearer of both surfaces [m].
@@ -40,7 +38,6 @@ class Sides(NamedTuple):
 
     row: np.ndarray
     neighbour: np.ndarray
-    number: np.ndarray
     share: np.ndarray
     d_Wset: np.ndarray
     reach: np.ndarray
@@ -58,6 +55,7 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     edges = [_find_edges(order, hits, farthest) for order in orders]
     row = np.concatenate([pairs.ravel() for pairs in edges])
     neighbour = np.concatenate([pairs[:, ::-1].ravel() for pairs in edges])
+    # Sides of a beam are 0 and 1 in the first order, 2 and 3 in the second one.
     number = np.concatenate(
         [np.tile([2 * k, 2 * k + 1], len(edges[k])) for k in range(len(edges))]
     )
@@ -73,7 +71,7 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     turn = uniform(shots.key, shots.beam[row], draw + 1) - 0.5
     angle = 2.0 * np.pi * share * turn
     d_Wset, reach = np.empty_like(toward), np.empty(len(row), np.float32)
-    sides = Sides(row, neighbour, number, share, d_Wset, reach)
+    sides = Sides(row, neighbour, share, d_Wset, reach)
     _aim(sides, toward, rest, angle, hits, shots.divergence, shots.max_range)
     return sides
 
