@@ -199,18 +199,11 @@ def ApplyImuConfig(
     They are `lcmt_drake_signal` on the channel `DRAKE_IMU_<name>`: specific
     force [m/s^2] and angular velocity [rad/s] in its frame.
 
-    Args:
-        config: an `ImuConfig`.
-        builder: see `ApplyLidarConfig`, as for all further arguments.
-        plant: see there.
-        scene_graph: not used; all sensors have the same arguments.
-        lcm_buses: see there.
-        lcm: see there.
+    All arguments and errors are those of `ApplyLidarConfig`. The `scene_graph`
+    is not used.
 
     Raises:
         InputError: Kalibr's file cannot be used.
-        RuntimeError: see there.
-        ValueError: see there.
 
     Example:
         from cns_drake import ApplyImuConfig, ImuConfig
@@ -251,17 +244,8 @@ def ApplyOdometryConfig(
     quaternion of R_WB (w first), p_WB [m], then angular and linear velocity in
     the world, expressed in B [rad/s, m/s].
 
-    Args:
-        config: an `OdometryConfig`.
-        builder: see `ApplyLidarConfig`, as for all further arguments.
-        plant: see there.
-        scene_graph: not used; all sensors have the same arguments.
-        lcm_buses: see there.
-        lcm: see there.
-
-    Raises:
-        RuntimeError: see there.
-        ValueError: see there.
+    All arguments and errors are those of `ApplyLidarConfig`. The `scene_graph`
+    is not used.
 
     Example:
         from cns_drake import ApplyOdometryConfig, OdometryConfig

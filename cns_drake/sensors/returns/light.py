@@ -64,10 +64,7 @@ class BeamHits(NamedTuple):
 
 @compiled
 def _cosines(normals_W: np.ndarray, d_Wset: np.ndarray) -> np.ndarray:
-    """Returns the cosines of incidence, 0 for a miss.
-
-    NumPy takes five times as long, for all rays of a frame.
-    """
+    """Returns the cosines of incidence, 0 for a miss."""
     result = np.empty(len(d_Wset))
     for k in range(len(d_Wset)):
         n, d = normals_W[k], d_Wset[k]

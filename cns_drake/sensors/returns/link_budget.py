@@ -14,13 +14,15 @@ alpha_0 covers all differences of the two rows from 1 / r^2.
 from dataclasses import dataclass
 import math
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import erf
 
 from cns_drake.base.compiled import compiled
+
+_Value = TypeVar("_Value", float, np.ndarray)
 
 # The SNR that a unit detects in half of all cases: Ouster's sheet of the OS1
 # (first generation) states 10 cm of range noise at an SNR of 12, its lowest.
@@ -92,11 +94,8 @@ def fit_link_budget(
 
 @compiled
 def target_snr(
-    budget: LinkBudget,
-    extinction: float,
-    energy: np.ndarray,
-    distance: np.ndarray,
-) -> np.ndarray:
+    budget: LinkBudget, extinction: float, energy: _Value, distance: _Value
+) -> _Value:
     """Returns the SNR of targets at positive distances [m].
 
     The extinction is the weather's [1/m], the energy is reflectivity times
@@ -131,9 +130,7 @@ def range_deviation(budget: LinkBudget, snr: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def echo_energy(
-    budget: LinkBudget, snr: np.ndarray, distance: np.ndarray
-) -> np.ndarray:
+def echo_energy(budget: LinkBudget, snr: _Value, distance: _Value) -> _Value:
     """Returns the energy of echoes as the unit infers it for clear air."""
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale

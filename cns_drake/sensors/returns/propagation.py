@@ -184,8 +184,6 @@ def _step(
 ) -> tuple[Light, Ways]:
     """Takes each ray to its hit.
 
-    NumPy takes ten times as long, a twelfth of a frame.
-
     Returns:
         The returning light, and the continued rays.
     """
