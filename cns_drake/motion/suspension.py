@@ -240,13 +240,17 @@ def _exponential(matrix: np.ndarray) -> np.ndarray:
 
 
 def ride_on_springs(
-    trajectory: Trajectory, suspension: Suspension, profile: RoadProfile
+    trajectory: Trajectory,
+    suspension: Suspension,
+    profile: RoadProfile,
+    *,
+    crossfall: float = 0.0,
 ) -> Trajectory:
     """Returns a drive on which the body heaves, rolls and pitches.
 
     The vehicle follows the same path at the same speed. Its springs feel the
     acceleration of the body's centre of mass, gravity on slopes, and the
-    profile below each wheel.
+    profile below each wheel, which falls to the right by the crossfall.
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS
@@ -258,13 +262,13 @@ def ride_on_springs(
     p_FQ_Wset = product(frame.R[:, :2, :2], masses.p_BWset.T)
     p_WQset = frame.p[:, :2, None] + p_FQ_Wset
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))
+    heights = heights.reshape(len(p_WQset), -1)
+    heights = heights + crossfall * masses.p_BWset[:, 1]
     x, z = masses.center
     a_WG = frame.acceleration_at(np.array([x, 0.0, z]))
     gravity = np.array([0.0, 0.0, -_GRAVITY])
     force_F = rotated(frame.R.transpose(0, 2, 1), a_WG - gravity)
-    inputs = np.column_stack(
-        [heights.reshape(len(a_WG), -1), force_F + gravity]
-    )
+    inputs = np.column_stack([heights, force_F + gravity])
     return trajectory.with_ride(
         BodyRide(*suspension.respond(inputs, step), step, x)
     )

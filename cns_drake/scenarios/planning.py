@@ -108,7 +108,9 @@ def plan_drive(
         suspension.load_car_masses(vehicle_file()),
         suspension.load_suspension_rates(suspension_file()),
     )
-    return suspension.ride_on_springs(trajectory, springs, profile)
+    return suspension.ride_on_springs(
+        trajectory, springs, profile, crossfall=scenario.ride.crossfall
+    )
 
 
 def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:

@@ -91,10 +91,19 @@ class RideConfig(Section):
         roughness: class of the road after ISO 8608, from `A` (new) to `E` (very
             poor).
         seed: seed of the road's profile.
+        crossfall: how far the road falls to the car's right, in m per m; 0.025
+            is usual where cars keep right. It needs a class of the road.
     """
 
     roughness: Literal["none", RoughnessClass] = "none"
     seed: int = Field(default=1, ge=0)
+    crossfall: float = field_off_by_default(0.0, ge=-0.1, le=0.1)
+
+    @model_validator(mode="after")
+    def _check_springs(self) -> RideConfig:
+        if self.crossfall and self.roughness == "none":
+            raise ValueError("crossfall: it has no effect without roughness")
+        return self
 
     def profile(self) -> RoadProfile | None:
         """Returns the road's profile; None if the vehicle is rigid."""

@@ -5,7 +5,8 @@
 
 Writes N scans of each drive, evenly over its time, into folders of their own:
 `hdl-64e` with calibrated returns, 1.73 m above the ground, among 60 vehicles on
-ride A. The motion of the car during a turn is undone, as in KITTI's scans.
+ride A, on roads that fall to the right by 3 %. The motion of the car during a
+turn is undone, as in KITTI's scans.
 
 With --full-streets, the switch `roadsides` puts cars, hedges and garages beside
 the way. It shows how much of what a classifier sees is what stands in a city,
@@ -31,6 +32,8 @@ from cns_drake.simulation.station import make_station
 DRIVES = ("riverside_02", "metropolis_04", "suburbia_02")
 # Turns of the unit [s], and steps of the poses during one.
 _PERIOD, _STEPS = 0.1, 10
+# As of the road of KITTI's first place.
+_CROSSFALL = 0.03
 
 
 def judged(name: str, *, is_full: bool) -> Scenario:
@@ -49,7 +52,7 @@ def judged(name: str, *, is_full: bool) -> Scenario:
         lidar.pop(field, None)
     own["lidars"] = {key: lidar}
     own.setdefault("traffic", {})["vehicles"] = 60
-    own["ride"] = {"roughness": "A"}
+    own["ride"] = {"roughness": "A", "crossfall": _CROSSFALL}
     if is_full:
         own["transient"] = {"roadsides": 1.0}
     return make_scenario(own, name)

@@ -241,3 +241,27 @@ def test_motion_at_many_times_is_that_at_each():
             assert many.position[k] == one.position[0]
             assert many.rate[k] == one.rate[0]
             assert many.acceleration[k] == one.acceleration[0]
+
+
+def test_a_crossfall_rolls_the_body_as_a_tilted_road_does():
+    fall = 0.03
+
+    class Falling:
+        """A level road, but for a plane that falls to the right of the way."""
+
+        def heights(self, p_WQset):
+            left = np.array([-np.sin(0.4), np.cos(0.4)])
+            return fall * (p_WQset - [20.0, -30.0]) @ left
+
+    points = straight(0.0, 200.0)
+    level = Trajectory(lane_path(points), CAREFUL)
+    rides = [
+        ride_on_springs(level, car(), Level(), crossfall=fall),
+        ride_on_springs(level, car(), Falling()),
+    ]
+    times = np.linspace(0.0, level.duration, 50)
+    leaning, expected = (one.at(times).ride.q for one in rides)
+    np.testing.assert_allclose(leaning, expected, atol=1e-9)
+    # The right side is down, a little more than the road: the weight leans.
+    _, roll, _ = leaning[0]
+    assert fall < roll < 1.2 * fall

@@ -147,6 +147,14 @@ def test_returns_and_weather_are_replaced(small_map):
             r"a.xyz.1: .*finite",
         ),
         ({"lidars": {"a": {"xyz": [0, 1e39, 0]}}}, r"a.xyz.1: .*less"),
+        (
+            {"ride": {"crossfall": 0.02}},
+            r"ride: crossfall: it has no effect without roughness",
+        ),
+        (
+            {"ride": {"crossfall": 0.11, "roughness": "A"}},
+            r"ride.crossfall: .*less",
+        ),
         ({"imu": {"xyz": [0, 0, 0], "rpy_deg": [1e300, 0, 0]}}, r"rpy_deg.0"),
         ({"imu": {"xyz": [0, 0]}}, r"scenario.yaml: imu.xyz"),
         ({"route": []}, r"scenario.yaml: route: "),
