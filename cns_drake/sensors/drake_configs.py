@@ -199,8 +199,8 @@ def ApplyImuConfig(
     They are `lcmt_drake_signal` on the channel `DRAKE_IMU_<name>`: specific
     force [m/s^2] and angular velocity [rad/s] in its frame.
 
-    All arguments and errors are those of `ApplyLidarConfig`. The `scene_graph`
-    is not used.
+    The config is an `ImuConfig`. Other arguments and errors are those of
+    `ApplyLidarConfig`; the `scene_graph` is not used.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -244,8 +244,8 @@ def ApplyOdometryConfig(
     quaternion of R_WB (w first), p_WB [m], then angular and linear velocity in
     the world, expressed in B [rad/s, m/s].
 
-    All arguments and errors are those of `ApplyLidarConfig`. The `scene_graph`
-    is not used.
+    The config is an `OdometryConfig`. Other arguments and errors are those of
+    `ApplyLidarConfig`; the `scene_graph` is not used.
 
     Example:
         from cns_drake import ApplyOdometryConfig, OdometryConfig

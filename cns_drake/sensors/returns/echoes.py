@@ -143,12 +143,12 @@ def _merge(
     energy, geometry = np.empty(count), np.empty(count, np.int32)
     echo = -1
     for one in range(num_beams):
-        begin, index, most = -np.inf, -1, 0.0
+        begin, index, most = 0.0, -1, 0.0
         for k in row[first[one] : first[one + 1]]:
             distance = light.distance[k]
             snr = target_snr(budget, extinction, light.energy[k], distance)
-            if distance - begin > resolution:
-                begin, index, most = distance, index + 1, -1.0
+            if index < 0 or distance - begin > resolution:
+                begin, index, most = distance, index + 1, snr
                 if index == _MOST_ECHOES:
                     break
                 echo += 1
@@ -156,6 +156,7 @@ def _merge(
                 # Light that is alone needs no mean.
                 mean[echo], total[echo] = distance, snr
                 energy[echo] = light.energy[k]
+                geometry[echo] = light.geometry[k]
                 if extinction > 0.0:
                     energy[echo] *= np.exp(-2.0 * extinction * distance)
             elif total[echo] + snr > 0.0:
