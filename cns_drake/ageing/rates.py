@@ -32,18 +32,7 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
         InputError: the file cannot be read; it names an unknown event, or a
             rate, or the factor, is out of range.
     """
-    found: object = {} if path is None else read_yaml(path)
-    if not isinstance(found, dict):
-        raise InputError(f"{path}: not a mapping of event: rate")
-    for event, rate in found.items():
-        if event not in DEFAULT_RATES:
-            raise InputError(
-                f"{path}: {event}: unknown event (there are: "
-                f"{', '.join(DEFAULT_RATES)})"
-            )
-        is_number = isinstance(rate, int | float) and not isinstance(rate, bool)
-        if not (is_number and 0.0 <= rate <= 1.0):
-            raise InputError(f"{path}: {event}: {rate!r} is no rate, 0 to 1")
+    found = check_rates({} if path is None else read_yaml(path), path)
     rates = {e: factor * r for e, r in {**DEFAULT_RATES, **found}.items()}
     for event, rate in rates.items():
         if not 0.0 <= rate <= 1.0:
@@ -52,6 +41,26 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
                 "not from 0 to 1"
             )
     return rates
+
+
+def check_rates(found: object, source: object) -> dict[str, float]:
+    """Returns event -> rate a year, of some events, if they are rates.
+
+    Raises:
+        InputError: an event is unknown, or a rate is not from 0 to 1.
+    """
+    if not isinstance(found, dict):
+        raise InputError(f"{source}: not a mapping of event: rate")
+    for event, rate in found.items():
+        if event not in DEFAULT_RATES:
+            raise InputError(
+                f"{source}: {event}: unknown event (there are: "
+                f"{', '.join(DEFAULT_RATES)})"
+            )
+        is_number = isinstance(rate, int | float) and not isinstance(rate, bool)
+        if not (is_number and 0.0 <= rate <= 1.0):
+            raise InputError(f"{source}: {event}: {rate!r} is no rate, 0 to 1")
+    return found
 
 
 def check_years(years: Iterable[int]) -> tuple[int, ...]:

@@ -142,13 +142,20 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     base: str | Path = family.base
     if base not in shipped_drives():
         base = path.parent / base
-    return _vary(scenario_files.load_scenario(base), family, path, redraw)
+    return vary(scenario_files.load_scenario(base), family, path, redraw)
 
 
-def _vary(
-    base: Scenario, family: Family, source: Path, redraw: Redraw | None
+def vary(
+    base: Scenario,
+    family: Family,
+    source: Path,
+    redraw: Redraw | None = None,
 ) -> list[Scenario]:
-    """Returns the members of a family; `source` is its file."""
+    """Returns the members of a family; `source` is its file.
+
+    Raises:
+        InputError: see `load_family`.
+    """
     if base.map is None:
         raise InputError(
             f"{source}: base: {base.name} has no map to vary; give a scenario "

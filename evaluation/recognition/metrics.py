@@ -221,8 +221,8 @@ def resampled_weights(
 
 def resampled_metrics(
     outcomes: QueryOutcomes, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns AUC (B,) and R@1 (B,) of samples of the queries.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns AUC, R@1 and strict AUC, each (B,), of samples of the queries.
 
     Args:
         outcomes: outcomes of Q queries, all of which count.
@@ -233,12 +233,13 @@ def resampled_metrics(
     # the precision of its first point.
     with np.errstate(invalid="ignore"):
         precision = tp / (tp + fp)
-    areas = areas_under(_filled_from_right(precision), recall_of(tp, fn))
+    precision = _filled_from_right(precision)
+    areas = areas_under(precision, recall_of(tp, fn))
+    with_match = (weights * outcomes.has_match).sum(axis=1)
+    stricts = areas_under(precision, recall_of(tp, with_match[:, None] - tp))
     with np.errstate(invalid="ignore"):
-        recalls = (weights * outcomes.is_right).sum(axis=1) / (
-            weights * outcomes.has_match
-        ).sum(axis=1)
-    return areas, recalls
+        recalls = (weights * outcomes.is_right).sum(axis=1) / with_match
+    return areas, recalls, stricts
 
 
 def percentile_interval(samples: np.ndarray) -> Interval:
@@ -258,7 +259,7 @@ def bootstrap_intervals(
     if len(outcomes) == 0:
         return UNKNOWN, UNKNOWN
     weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
-    areas, recalls = resampled_metrics(outcomes, weights)
+    areas, recalls, _ = resampled_metrics(outcomes, weights)
     return percentile_interval(areas), percentile_interval(recalls)
 
 

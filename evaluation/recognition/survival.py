@@ -146,8 +146,8 @@ def paired_intervals(
     if len(unchanged) != len(changed) or len(changed) == 0:
         return UNKNOWN, UNKNOWN
     weights = resampled_weights(len(changed), seed, changed.blocks)
-    before = resampled_metrics(unchanged, weights)
-    after = resampled_metrics(changed, weights)
+    before = resampled_metrics(unchanged, weights)[:2]
+    after = resampled_metrics(changed, weights)[:2]
     auc, recall = (
         percentile_interval(kept_share(one, other))
         for one, other in zip(after, before, strict=True)

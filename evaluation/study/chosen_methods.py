@@ -33,6 +33,12 @@ class MethodChoice:
     file: Path | None = None
     settings: tuple[tuple[str, Setting], ...] = ()
 
+    @property
+    def key(self) -> str:
+        """The name, with the settings: no other choice has it."""
+        settings = (f"{name}={value}" for name, value in self.settings)
+        return " ".join([self.name, *settings])
+
     def make(self) -> Method:
         """Returns the method.
 

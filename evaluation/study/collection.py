@@ -64,12 +64,12 @@ class Repetition:
     @property
     def key(self) -> str:
         """The `described_key` of the repetition."""
-        return described_key(self.method.name, self.protocol)
+        return described_key(self.method.key, self.protocol)
 
     @property
     def places_key(self) -> str:
         """That of its places."""
-        return self.method.name if self.shares_places else self.key
+        return self.method.key if self.shares_places else self.key
 
 
 @dataclass(frozen=True)

@@ -279,7 +279,7 @@ class Study:
         surveys = [self._files.survey(one.name) for one in pair]
         results = self._files.recognition(database.name, query.name)
         runs = [
-            (one, self.protocol, one.name, one.name) for one in self.methods
+            (one, self.protocol, one.key, one.key) for one in self.methods
         ]
         if explains:
             runs += [
@@ -307,7 +307,7 @@ class Study:
                 (
                     tuple((one.drive, one.scans) for one in surveys),
                     self.methods,
-                    tuple(results.result(one.name) for one in self.methods),
+                    tuple(results.result(one.key) for one in self.methods),
                     self.protocol,
                 ),
             )
@@ -320,7 +320,7 @@ class Study:
         """Returns the job that runs after all others, alone on the machine."""
         places, queries = (self._files.survey(one.name) for one in pair)
         described = tuple(
-            (places.described(one.name), queries.described(one.name))
+            (places.described(one.key), queries.described(one.key))
             for one in self.methods
         )
         source, drive = pair[1].source, queries.drive
@@ -342,7 +342,7 @@ class Study:
             control = city.unchanged_pair(*pair)
             results = files.recognition(*(one.name for one in pair))
             for method in self.methods:
-                changed = results.result(method.name).read()
+                changed = results.result(method.key).read()
                 if pair[0] is pair[1]:
                     if changed is not None:
                         closures.append(changed)
@@ -350,7 +350,7 @@ class Study:
                 unchanged = None
                 if control is not None:
                     beside = files.recognition(*(one.name for one in control))
-                    unchanged = beside.result(method.name).read()
+                    unchanged = beside.result(method.key).read()
                 survivals.append(Survival.of(changed, unchanged))
             for again in city.repetitions(pair, self.methods, self.protocol):
                 report.repeated.append(results.result(again.key).read())

@@ -250,6 +250,7 @@ def survey_recording(
     with_scans: bool = False,
     with_map: bool = True,
     further: Sequence[description.Request] = (),
+    keys: Sequence[str] | None = None,
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
@@ -299,8 +300,9 @@ def survey_recording(
             visit=keep if with_map or with_scans else None,
             further=further,
         )
-        keys = [method.name for method in methods]
-        keys += [described_key(method.name, one) for method, _, one in further]
+        if keys is None:
+            keys = [method.name for method in methods]
+            keys += [described_key(one.name, other) for one, _, other in further]
         described = dict(zip(keys, found, strict=True))
     placed = PlacedDrive.of(recording)
     if mapped is None:
@@ -367,19 +369,22 @@ class Survey(Step):
             part = self.files.described(key)
             return bool(self.roles) and (missing is None or part in missing)
 
+        methods = [one for one in self.methods if needed(one.key)]
+        further = [
+            (described_key(one.key, protocol), one, roles, protocol)
+            for one, roles, protocol in self.further
+            if needed(described_key(one.key, protocol))
+        ]
         return survey_recording(
             drive,
             self.roles,
-            [one.make() for one in self.methods if needed(one.name)],
+            [one.make() for one in methods],
             self.protocol,
             reporter.track,
             with_scans=self.with_scans,
             with_map=self.with_map,
-            further=[
-                (choice.make(), roles, protocol)
-                for choice, roles, protocol in self.further
-                if needed(described_key(choice.name, protocol))
-            ],
+            further=[(one.make(), *others) for _, one, *others in further],
+            keys=[*(one.key for one in methods), *(key for key, *_ in further)],
         )
 
     def write(
@@ -432,10 +437,10 @@ class Survey(Step):
             expected[self.files.scans] = own
         if self.roles:
             for choice in self.methods:
-                part = self.files.described(choice.name)
+                part = self.files.described(choice.key)
                 expected[part] = {**own, "method": choice.identity()}
             for choice, roles, protocol in self.further:
-                key = described_key(choice.name, protocol)
+                key = described_key(choice.key, protocol)
                 expected[self.files.described(key)] = {
                     **inputs(roles, protocol),
                     "method": choice.identity(),

@@ -1,4 +1,4 @@
-"""The outcome of a method on a rung of a ladder, query by query."""
+"""The outcome of a method on two drives, query by query."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _HALF = 0.5
 
 
 @dataclass(frozen=True)
-class RungOutcome:
-    """The outcome of a method on a rung.
+class PlaceOutcome:
+    """The outcome of a method on two drives.
 
     Attributes:
         method: its name.
@@ -37,6 +37,7 @@ class RungOutcome:
         pose_errors: errors of the best place.
         overlaps: (Q,) how much of the query's scan the best of its matches
             shows, see `overlap_truth`; NaN without a match.
+        radius: radius of a match [m].
     """
 
     method: str
@@ -50,6 +51,7 @@ class RungOutcome:
     distances: np.ndarray
     pose_errors: PoseErrors
     overlaps: np.ndarray
+    radius: float
 
     @classmethod
     def of(
@@ -60,7 +62,8 @@ class RungOutcome:
         query: DescribedDrive,
         drives: Sequence[str],
         overlaps: np.ndarray,
-    ) -> RungOutcome:
+        radius: float,
+    ) -> PlaceOutcome:
         """Reduces the scores of all pairs to the outcome of each query.
 
         Args:
@@ -71,6 +74,7 @@ class RungOutcome:
             drives: D names of the drives of the places; that of the query's
                 own city comes first.
             overlaps: (Q,) of the best match of each query.
+            radius: of a match [m].
         """
         best = retrieval.best_places
         rows = np.arange(len(best))
@@ -94,6 +98,7 @@ class RungOutcome:
             ),
             pose_errors=retrieval.pose_errors,
             overlaps=overlaps,
+            radius=radius,
         )
 
     @property
@@ -105,11 +110,8 @@ class RungOutcome:
         is_hidden = self.overlaps < _HALF
         return int((is_hidden & ~self.outcomes.is_right).sum())
 
-    def faults(self, radius: float) -> list[str]:
+    def faults(self) -> list[str]:
         """Returns the reason for each query's wrong best place.
-
-        Args:
-            radius: radius of a match [m].
 
         Returns:
             Q of: "" if it is right; `no_place` if the query has no match;
@@ -120,7 +122,7 @@ class RungOutcome:
             ~self.outcomes.has_match,
             self.match_frames < 0,
             np.isnan(self.distances),
-            self.distances <= NEARLY * radius,
+            self.distances <= NEARLY * self.radius,
         ]
         return np.where(
             self.outcomes.is_right,

@@ -1,24 +1,22 @@
-"""One rung of a ladder: all methods find a query drive in a database.
+"""All methods find the places of a query drive in a database.
 
 Each method has two results, without the gate and with it.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-import math
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.recognition import description
-from evaluation.recognition.costs import cpu_ms, query_ms
-from evaluation.recognition.metrics import pr_curve
+from evaluation.methods.method import Method
+from evaluation.recognition.costs import query_ms
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.query_outcomes import judge
-from evaluation.recognition.retrieval import compare, compare_with_gates
-from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.recognition.retrieval import compare_with_gates
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource, survey_recording
@@ -32,11 +30,13 @@ DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 _APART = 1e5
 # Queries whose time is measured, and the longest time for all queries at a size
 # [ms].
-_TIMED = 9
+TIMED = 9
 _LONGEST_MS = 3.6e6
+# Places that no method is known to take so long for.
+_MANY = 5000
 
 
-def measure_rung(
+def measure_places(
     reporter: Reporter,
     database: DescribedSource,
     query: DescribedSource,
@@ -44,11 +44,12 @@ def measure_rung(
     num_distractors: int,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
-) -> list[RungOutcome]:
-    """Returns the outcomes of a rung, two for each method.
+) -> list[PlaceOutcome]:
+    """Returns two outcomes of each method, without the gate and with it.
 
     The drives are in one world. A number of places of distractors, described
-    drives through other cities, is added to the database.
+    drives through other cities, is added to the database. A method that would
+    take over an hour for all queries has no outcome.
     """
     place_scans, places = _describe(
         database, "places", methods, protocol, reporter
@@ -63,7 +64,11 @@ def measure_rung(
     ):
         method = choice.make()
         mapped, asked = places(k), queries(k)
-        known = [mapped, *(parts[k].read()[1] for parts in distractors)]
+        known = [mapped]
+        for parts in distractors:
+            if sum(len(d.places.frames) for d in known[1:]) >= num_distractors:
+                break
+            known.append(parts[k].read()[1])
         searched = replace(
             mapped,
             places=joined_places(
@@ -71,6 +76,11 @@ def measure_rung(
             ),
         )
         drives = [one.name for one in known for _ in one.places.frames]
+        if len(searched.places.frames) > _MANY and _takes_long(
+            method, searched, asked
+        ):
+            reporter.note(f"{choice.name}: it would take over an hour")
+            continue
         both = compare_with_gates(
             method, searched, asked, protocol, [None, protocol.radius]
         )
@@ -83,10 +93,29 @@ def measure_rung(
                 both[0].matches[:, : len(place_scans)],
             )
         outcomes += [
-            RungOutcome.of(choice.name, is_gated, one, asked, drives, overlaps)
+            PlaceOutcome.of(
+                choice.key,
+                is_gated,
+                one,
+                asked,
+                drives,
+                overlaps,
+                protocol.radius,
+            )
             for is_gated, one in zip((False, True), both, strict=True)
         ]
     return outcomes
+
+
+def _takes_long(
+    method: Method,
+    database: description.DescribedDrive,
+    query: description.DescribedDrive,
+) -> bool:
+    one_ms = query_ms(
+        method, database.places, query.queries, TIMED + 1, with_pose=False
+    )
+    return one_ms * len(query.queries.frames) > _LONGEST_MS
 
 
 def _describe(
@@ -108,9 +137,10 @@ def _describe(
         reporter.track,
         with_scans=True,
         with_map=False,
+        keys=[choice.key for choice in methods],
     )
     assert isinstance(found.scans, list)
-    return found.scans, lambda k: found.described.pop(methods[k].name)
+    return found.scans, lambda k: found.described.pop(methods[k].key)
 
 
 def joined_places(
@@ -138,69 +168,3 @@ def joined_places(
     )
 
 
-@dataclass(frozen=True)
-class SizePoint:
-    """A method in a database with places of other cities.
-
-    Times are of the processor [ms]: the median of some queries, and for the
-    database from descriptions. The AUC is without the gate; NaN if all queries
-    would take over an hour.
-    """
-
-    method: str
-    others: int
-    places: int
-    queries: int
-    auc: float
-    r1: float
-    query_ms: float
-    build_ms: float
-
-
-def measure_size(
-    reporter: Reporter,
-    database: Part,
-    query: Part,
-    distractors: tuple[Part, ...],
-    num_distractors: int,
-    choice: MethodChoice,
-    protocol: RetrievalProtocol,
-) -> SizePoint:
-    """Returns the point of a method that described these drives.
-
-    The distractors lead through other cities.
-    """
-    method = choice.make()
-    (_, mapped), (_, asked) = database.read(), query.read()
-    known = [mapped.places]
-    for part in distractors:
-        if sum(len(one.frames) for one in known[1:]) >= num_distractors:
-            break
-        known.append(part.read()[1].places)
-    places = joined_places(known, num_distractors)
-    number = len(asked.queries.frames)
-    build_ms = cpu_ms(method.build_database, places.descriptors)
-    one_ms = query_ms(
-        method, places, asked.queries, _TIMED + 1, with_pose=False
-    )
-    auc = r1 = math.nan
-    if one_ms * number <= _LONGEST_MS:
-        found = compare(
-            method,
-            replace(mapped, places=places),
-            asked,
-            replace(protocol, gate=False),
-            reporter.track,
-        )
-        outcomes = judge(found.scores, found.matches)
-        auc, r1 = pr_curve(outcomes).auc, float(outcomes.recall_at(1))
-    return SizePoint(
-        method.name,
-        len(places.frames) - len(mapped.places.frames),
-        len(places.frames),
-        number,
-        float(auc),
-        r1,
-        one_ms,
-        build_ms,
-    )

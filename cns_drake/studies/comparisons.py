@@ -1,0 +1,419 @@
+"""The two drives of each condition of an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+import math
+import re
+from typing import Any
+
+from cns_drake.base.errors import InputError, validated
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.variation import Family, vary
+from cns_drake.sensors.lidar.config import WeatherConfig
+from cns_drake.simulation.loaded_drive import load_ways
+from cns_drake.studies.experiment import (
+    CAUSE,
+    LEVEL,
+    NO_CAUSE,
+    Changes,
+    Condition,
+    base_protocol,
+)
+from cns_drake.traffic.vehicles import room_for_vehicles
+from evaluation.recognition.protocol import RetrievalProtocol
+
+# Fields of a side that are no fields of a scenario.
+FAMILY_FIELDS = ("missing", "scattered", "towards")
+# Those of a side that only the database, or only the query, has.
+_QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
+_DATABASE_FIELDS = ("distractors", "lateral")
+# Sections whose draws follow the seed of a condition.
+_SEEDED = ("transient", "traffic", "ride", "driver")
+# Stages by their place in the life of a map.
+OWN, LAST, FIRST, EARLIER = "own", "last", "first", "earlier "
+# Earlier stages are told apart in so many steps.
+_STEPS = 4
+# No driver keeps exactly to a line: the LiDAR of the database is this far ahead
+# of the query's [m].
+_AHEAD = 1.25
+# Where it is besides: its offset to the left [m], and its heading [deg].
+VIEWPOINTS: Mapping[str, tuple[float, float]] = {
+    "near": (0.5, 0.0),
+    "lane": (5.0, 0.0),
+    "reversed": (5.0, 180.0),
+}
+# Greatest share of the roads' room for traffic: the car needs some, too.
+_MOST_ROOM = 0.5
+# Likewise for a car that follows others, since all wait for each other.
+_FOLLOWED_ROOM = 0.25
+
+
+class MissingError(Exception):
+    """A map lacks what a condition needs; the message says what."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A database and a query in one condition.
+
+    Attributes:
+        database: the drive that makes the database.
+        query: the drive that asks.
+        protocol: how it asks.
+        distractors: number of places elsewhere that join the database.
+    """
+
+    database: Scenario
+    query: Scenario
+    protocol: RetrievalProtocol
+    distractors: int = 0
+
+    def fingerprint(self) -> str:
+        """Returns a fingerprint of what is compared, names included."""
+        asked = {
+            name: getattr(self.protocol, name)
+            for name in (*_QUERY_FIELDS, "seed")
+            if any(getattr(self.protocol, one) for one in _QUERY_FIELDS)
+        }
+        return fingerprint(
+            {
+                "database": self.database.model_dump(mode="json"),
+                "query": self.query.model_dump(mode="json"),
+                "distractors": self.distractors,
+                **asked,
+            }
+        )
+
+
+# Returns the folder of a map that is some years older, and its stage: of a
+# drive, its years, their rates and a seed.
+Age = Callable[[Scenario, int, Any, int], tuple[str, str]]
+# Returns the folder of a map drawn anew, and its stage: of a drive and a seed.
+Redraw = Callable[[Scenario, int], tuple[str, str]]
+
+
+@dataclass
+class PairOfDrives:
+    """The two drives of a map whose conditions are built.
+
+    Attributes:
+        database: the drive that makes the database in the unchanged map.
+        query: the drive that asks.
+        same_route: whether the database has the query's route, beside it.
+        source: file of the experiment, for errors.
+        age, redraw: make the maps of a condition.
+        on_note: takes notes on what was left out.
+    """
+
+    database: Scenario
+    query: Scenario
+    same_route: bool
+    source: str
+    age: Age
+    redraw: Redraw
+    on_note: Callable[[str], None]
+
+    def __post_init__(self) -> None:
+        self._unchanged = {"database": self.database, "query": self.query}
+        for side, drive in self._unchanged.items():
+            # Drives have their draws by their names, which change.
+            if drive.driver.departs and drive.driver.seed is None:
+                driver = drive.driver.replaced(seed=drive.name)
+                self._unchanged[side] = drive.replaced(driver=driver)
+        # Side -> content of a drive -> the drive; equal drives share a name.
+        self._known: dict[str, dict[str, Scenario]] = {
+            "database": {},
+            "query": {},
+        }
+
+    def build(self, condition: Condition, seed: int) -> Compared:
+        """Returns the drives of a condition.
+
+        Raises:
+            MissingError: the map lacks what the condition needs.
+            InputError: a field is unknown or not usable.
+        """
+        chosen: list[Mapping[str, Changes]] = [condition.changes]
+        missing = None
+        for levels in condition.causes:
+            for fields in levels:
+                try:
+                    chosen.append(self._possible(fields))
+                    break
+                except MissingError as error:
+                    missing = error
+        if missing and len(chosen) == 1:
+            raise missing
+        fields: Any = {}
+        for one in chosen:
+            for side, values in one.items():
+                fields[side] = _joined(fields.get(side, {}), values)
+        built: dict[str, Scenario] = {}
+        asked = dict(fields.get("protocol", {}))
+        sides = {
+            side: _joined(fields.get("both", {}), fields.get(side, {}))
+            for side in ("database", "query")
+        }
+        for side, changes in sides.items():
+            self._check_side(side, changes)
+            drive = self._changed(side, changes, seed)
+            built[side] = self._named(side, drive, condition, seed)
+        changes = {n: sides["query"][n] for n in _QUERY_FIELDS if n in sides["query"]}
+        if changes:
+            asked |= {**changes, "seed": seed}
+        protocol = base_protocol(asked, self.source)
+        if lateral := sides["database"].get("lateral"):
+            # On a straight road, as many places match at any offset.
+            radius = math.hypot(protocol.radius, lateral)
+            protocol = replace(protocol, radius=radius)
+        number = sides["database"].get("distractors", 0)
+        return Compared(built["database"], built["query"], protocol, number)
+
+    def _possible(self, fields: Mapping[str, Changes]) -> dict[str, Changes]:
+        """Returns the fields of a case that the map allows.
+
+        Raises:
+            MissingError: it allows none.
+        """
+        missing: MissingError | None = None
+        found: dict[str, Changes] = {}
+        for side, changes in fields.items():
+            left = dict(changes)
+            for name, check in (
+                ("stage", self._check_stage),
+                ("traffic", self._check_roads),
+            ):
+                try:
+                    check(left.get(name))
+                except MissingError as error:
+                    missing = error
+                    del left[name]
+            if left:
+                found[side] = left
+        if missing and not found:
+            raise missing
+        return found
+
+    def _check_stage(self, stage: Any) -> None:
+        if stage is not None:
+            self._stage(self._unchanged["database"], stage)
+
+    def _check_roads(self, traffic: Any) -> None:
+        folder = map_folder(self.query)
+        has_roads = folder.roads.is_file() or folder.lanes.is_file()
+        if has_roads or not isinstance(traffic, Mapping):
+            return
+        if any(traffic.get(n) for n in ("vehicles", "walkers", "queues")):
+            raise MissingError(
+                f"neither {folder.roads.name} nor {folder.lanes.name}: no"
+                " traffic"
+            )
+
+    def _check_side(self, side: str, changes: Changes) -> None:
+        others = _DATABASE_FIELDS if side == "query" else _QUERY_FIELDS
+        for name in others:
+            if name in changes:
+                right = "query" if side == "database" else "database"
+                raise InputError(
+                    f"{self.source}: {side}.{name}: it is a field of {right}"
+                )
+        for name, most in (("distractors", 100_000), ("lateral", 100)):
+            value = changes.get(name, 0)
+            kinds = (int,) if name == "distractors" else (int, float)
+            if type(value) not in kinds or not 0 <= value <= most:
+                raise InputError(
+                    f"{self.source}: {side}.{name}: {value!r} is not from 0 to"
+                    f" {most}"
+                )
+
+    def _changed(self, side: str, changes: Changes, seed: int) -> Scenario:
+        """Returns a drive with its changed fields."""
+        drive = self._unchanged[side]
+        left = dict(changes)
+        for name in (*_QUERY_FIELDS, "distractors", "fresh"):
+            left.pop(name, None)
+        if "lidar" in left:
+            drive = drive.with_lidar_preset(left.pop("lidar"))
+        if "returns" in left:
+            weather = left.pop("weather", None)
+            if weather is not None:
+                weather = validated(
+                    WeatherConfig, weather, f"{self.source}: {side}.weather"
+                )
+            drive = drive.with_returns(left.pop("returns"), weather)
+            left.setdefault("seed", seed)
+        lateral = left.pop("lateral", 0.0)
+        viewpoint = left.pop("viewpoint", None)
+        if lateral and viewpoint is not None:
+            raise InputError(
+                f"{self.source}: {side}.lateral: give it or a viewpoint"
+            )
+        if lateral:
+            viewpoint = (lateral, 0.0)
+        if side == "database" and self.same_route:
+            place = self._place(side, "near" if viewpoint is None else viewpoint)
+            drive = moved(drive, _AHEAD, *place)
+        elif viewpoint is not None:
+            drive = moved(drive, 0.0, *self._place(side, viewpoint))
+        stage = self._stage(drive, left.pop("stage", OWN))
+        if stage != drive.stage:
+            drive = drive.replaced(stage=stage)
+        years, rates = left.pop("years", 0), left.pop("rates", 1.0)
+        if years:
+            if drive.stage != self.query.stage:
+                raise InputError(
+                    f"{self.source}: {side}.years: stage {LAST} ages, not"
+                    f" {drive.stage}"
+                )
+            folder, stage = self.age(drive, years, rates, seed)
+            drive = drive.replaced(map=folder, stage=stage)
+        if "version" in left:
+            folder, stage = self.redraw(drive, left.pop("version"))
+            drive = drive.replaced(map=folder, stage=stage)
+        family = {n: left.pop(n) for n in FAMILY_FIELDS if n in left}
+        if family:
+            drive = self._decayed(side, drive, family, seed)
+        for name in _SEEDED:
+            if isinstance(left.get(name), dict):
+                left[name] = {"seed": seed, **left[name]}
+        self._fit(drive, left)
+        if left:
+            drive = drive.with_fields(left, f"{self.source}: {side}")
+        return drive
+
+    def _place(self, side: str, viewpoint: Any) -> tuple[float, float]:
+        """Returns offset to the left [m] and heading [deg] of a viewpoint."""
+        if isinstance(viewpoint, str) and viewpoint in VIEWPOINTS:
+            return VIEWPOINTS[viewpoint]
+        try:
+            left, heading_deg = viewpoint
+            if abs(left) <= 100 and abs(heading_deg) <= 360:
+                return float(left), float(heading_deg)
+        except (TypeError, ValueError):
+            pass
+        raise InputError(
+            f"{self.source}: {side}.viewpoint: {viewpoint!r} is neither"
+            f" {', '.join(VIEWPOINTS)} nor [metres to the left, heading in deg]"
+        )
+
+    def _stage(self, drive: Scenario, wanted: Any) -> str:
+        """Returns the stage that a name or a place among stages means."""
+        own, last = str(drive.stage), str(self.query.stage)
+        stages = sorted(map_folder(drive).stages())
+        if wanted in (OWN, LAST, FIRST):
+            return {OWN: own, LAST: last, FIRST: min(stages, default=own)}[
+                wanted
+            ]
+        if isinstance(wanted, str) and wanted.startswith(EARLIER):
+            before = [one for one in stages if one < last]
+            number = min(_STEPS, len(before))
+            step = wanted.removeprefix(EARLIER)
+            back = _STEPS - int(step) if step in ("1", "2", "3", "4") else -1
+            if back >= 0:
+                if not before:
+                    raise MissingError(f"no stage before {last}")
+                if back >= number:
+                    raise MissingError(
+                        f"{len(before)} stages before {last}, so none for"
+                        f" '{wanted}'"
+                    )
+                return before[back * (len(before) - 1) // max(1, number - 1)]
+        if wanted in stages:
+            return str(wanted)
+        raise InputError(
+            f"{self.source}: stage: {wanted!r}: {map_folder(drive).name} has"
+            f" {', '.join(stages)}; or give {OWN}, {LAST}, {FIRST} or"
+            f" '{EARLIER}1' to '{EARLIER}{_STEPS}'"
+        )
+
+    def _decayed(
+        self, side: str, drive: Scenario, fields: Changes, seed: int
+    ) -> Scenario:
+        """Returns a drive through a city that lacks a part of itself."""
+        values = {**fields, "base": drive.name, "stage": drive.stage}
+        values["missing"] = [fields.get("missing", 0.0)]
+        family = validated(
+            Family, {**values, "seeds": [seed]}, f"{self.source}: {side}"
+        )
+        (member,) = vary(drive, family, self.source)
+        return drive.replaced(without=member.without)
+
+    def _fit(self, drive: Scenario, fields: dict[str, Any]) -> None:
+        """Limits traffic to the roads, and drivers to what a drive has."""
+        driver = fields.get("driver")
+        if driver and driver.get("lane_changes") and drive.waypoints:
+            self.on_note(f"{drive.name}: waypoints have no lanes to change")
+            fields["driver"] = {**driver, "lane_changes": 0.0}
+        traffic = fields.get("traffic")
+        if not traffic:
+            return
+        follows = driver and driver.get("follows")
+        share = _FOLLOWED_ROOM if follows else _MOST_ROOM
+        graph = load_ways(map_folder(self.query)).graph
+        most = int(share * room_for_vehicles(graph))
+        for name in ("vehicles", "walkers"):
+            if isinstance(given := traffic.get(name), int) and given > most:
+                self.on_note(
+                    f"{map_folder(self.query).name}: {given} {name} do not fit"
+                    f" its roads; {most} move"
+                )
+                traffic = fields["traffic"] = {**traffic, name: most}
+
+    def _named(
+        self, side: str, drive: Scenario, condition: Condition, seed: int
+    ) -> Scenario:
+        """Returns a drive with a name that no other drive has.
+
+        A drive that was built before keeps its name.
+        """
+        content = fingerprint(drive.replaced(name="").model_dump(mode="json"))
+        known = self._known[side]
+        if content not in known:
+            name = drive.name
+            if drive != self._unchanged[side]:
+                name += f"_{_ending(side, condition, seed)}"
+            known[content] = drive.replaced(name=name)
+        return known[content]
+
+
+def _joined(fields: Any, changes: Any) -> Any:
+    """Returns nested fields with changes."""
+    if not (isinstance(fields, Mapping) and isinstance(changes, Mapping)):
+        return changes
+    return {
+        **fields,
+        **{n: _joined(fields.get(n), one) for n, one in changes.items()},
+    }
+
+
+def _ending(side: str, condition: Condition, seed: int) -> str:
+    """Returns the end of the name of a drive with changes."""
+    factors = dict(condition.factors)
+    labels = []
+    cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
+    for path, value in factors.items():
+        if path.partition(".")[0] in (side, "both"):
+            name = path.rpartition(".")[2]
+            text = str(value).replace(".", "p").replace("-", "m")
+            labels.append(f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', text)}")
+    if cause != NO_CAUSE:
+        labels.append(f"{cause}_{level}")
+    return "_".join([*labels, str(seed)])
+
+
+def moved(
+    drive: Scenario, ahead: float, left: float, heading_deg: float
+) -> Scenario:
+    """Returns a drive with its LiDARs moved [m] and turned to the left [deg]."""
+    lidars = {}
+    for name, config in drive.lidars.items():
+        (x, y, z), (roll, pitch, yaw) = config.xyz, config.rpy_deg
+        lidars[name] = config.replaced(
+            xyz=(x + ahead, y + left, z),
+            rpy_deg=(roll, pitch, yaw + heading_deg),
+        )
+    return drive.replaced(lidars=lidars)

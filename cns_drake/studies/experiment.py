@@ -1,0 +1,504 @@
+"""Experiments: what differs between two drives, and what is asked of them.
+
+An experiment is a YAML file. It names maps, fields of the drive that makes the
+database and of the drive that queries it, and the tasks to measure. A field
+with a list of values is a factor; the conditions of the experiment are the
+product of all factors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+import functools
+import itertools
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from cns_drake.base.errors import InputError, validated
+from cns_drake.base.yaml_files import parse_yaml, read_yaml
+from cns_drake.scenarios.scenario import Name
+from cns_drake.sensors.sensor_config import Section
+from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
+
+_FOLDER = Path(__file__).with_name("experiments")
+SIDES = ("both", "database", "query")
+# Places in the file of an experiment where a list of values is a factor.
+_FACTORED = (*SIDES, "protocol")
+# Fields whose value is a list itself; a list of lists is a factor.
+_LISTS = frozenset({"viewpoint", "without", "xyz", "rpy_deg"})
+# A list of so many evenly spaced numbers.
+_SPREAD = {"from", "to", "count"}
+# Factors of experiments with cases: the name of the case, and its level.
+CAUSE, LEVEL = "cause", "level"
+NO_CAUSE = "none"
+_MOST_CONDITIONS = 20_000
+
+Changes = Mapping[str, Any]
+Case = dict[Literal["both", "database", "query"], dict[str, Any]]
+
+
+def _in_a_tuple(value: Any) -> Any:
+    return [value] if isinstance(value, str | int | dict) else value
+
+
+def _by_name(value: Any) -> Any:
+    """Returns a list of names as a mapping without settings."""
+    if isinstance(value, str):
+        value = [value]
+    if not isinstance(value, list):
+        return value
+    return {str(name): {} for name in value}
+
+
+_Settings = Annotated[dict[str, dict[str, Any]], BeforeValidator(_by_name)]
+
+
+class MadeMap(Section):
+    """A map that an experiment makes: a city that ages, or an imported one.
+
+    Attributes:
+        name: name of the map.
+        age: a map that ages by `years`.
+        years: years that pass.
+        import_file: file of a real city, to import; relative to `files` of the
+            experiment.
+        sha256: digest of that file.
+        grow: share of the imported buildings that the first stage lacks.
+        seed: seed of all draws.
+    """
+
+    name: Name
+    age: str | None = None
+    years: int | None = Field(default=None, ge=1, le=200)
+    import_file: str | None = Field(default=None, alias="import")
+    sha256: str | None = None
+    grow: float | None = Field(default=None, ge=0.0, le=1.0)
+    seed: int = Field(ge=0)
+
+    @model_validator(mode="after")
+    def _check_source(self) -> MadeMap:
+        if (self.age is None) == (self.import_file is None):
+            raise ValueError("give either age (a map) or import (a file)")
+        if (self.age is None) != (self.years is None):
+            raise ValueError("years: they belong to age")
+        return self
+
+
+class Experiment(Section):
+    """A question about two drives: fields, factors, tasks and methods.
+
+    Attributes:
+        name: name of the experiment, in all its tables.
+        about: the question in words.
+        maps: names or folders of maps, folders of recordings, or maps to be
+            made; by default the shipped maps.
+        files: folder of the files that `maps` import.
+        drives: `same-route`: the last drive of a map queries a database of its
+            own route; `stages`: it queries each earlier drive; `first-and-last`:
+            the last drive, through the last stage, queries the first one.
+        both: fields of both drives; lists are factors.
+        database: fields of the drive that makes the database.
+        query: fields of the drive that asks.
+        cases: name of a cause -> fields of a side, or names of other cases that
+            come together. Lists are the levels of the case, the weakest first.
+            Each case is measured by itself, beside the case `none`.
+        levels: levels of the cases to measure; all by default.
+        design: `product`: each value of a factor with each of all others;
+            `one-at-a-time`: each with the baseline's values of the others.
+        tasks: names of tasks, or name -> settings.
+        methods: names of methods or Python files, or name -> settings; lists of
+            settings are factors. By default all methods that ship.
+        seeds: seeds of everything that is random in a condition.
+        protocol: `fair` (the default), `paper` or `recorded`, or fields of a
+            protocol; `base` is the protocol whose fields are replaced.
+        baseline: values of factors in the condition that others are compared
+            with; by default the first value of each factor.
+        frozen: table of the shipped worlds with the fingerprints that the
+            drives of each level must have.
+        charts: the charts of the experiment's page.
+        quick: fields that replace those above with `--quick`.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]
+    about: str = ""
+    maps: Annotated[
+        tuple[str | MadeMap, ...] | None, BeforeValidator(_in_a_tuple)
+    ] = None
+    files: str | None = None
+    drives: Literal["same-route", "stages", "first-and-last"] = "same-route"
+    both: dict[str, Any] = Field(default_factory=dict)
+    database: dict[str, Any] = Field(default_factory=dict)
+    query: dict[str, Any] = Field(default_factory=dict)
+    cases: dict[Name, Case | tuple[Name, ...]] = Field(default_factory=dict)
+    levels: tuple[Annotated[int, Field(ge=1, le=100)], ...] | None = None
+    design: Literal["product", "one-at-a-time"] = "product"
+    tasks: _Settings = Field(default={"place": {}}, min_length=1)
+    methods: _Settings | None = None
+    seeds: Annotated[
+        tuple[Annotated[int, Field(ge=0, lt=2**31)], ...],
+        BeforeValidator(_in_a_tuple),
+    ] = Field(default=(1,), min_length=1)
+    protocol: Annotated[
+        dict[str, Any],
+        BeforeValidator(lambda v: {"base": v} if isinstance(v, str) else v),
+    ] = Field(default_factory=dict)
+    baseline: dict[str, Any] = Field(default_factory=dict)
+    frozen: str | None = None
+    charts: tuple[dict[str, Any], ...] = ()
+    quick: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check_cases(self) -> Experiment:
+        for name, case in self.cases.items():
+            for other in case if isinstance(case, tuple) else ():
+                if not isinstance(self.cases.get(other), dict):
+                    raise ValueError(
+                        f"cases.{name}: {other} is no case with fields"
+                    )
+        return self
+
+    @property
+    def fresh(self) -> list[int]:
+        """The fresh versions of maps, of which each has its own baseline."""
+        found = self.both.get("fresh", [])
+        return found if isinstance(found, list) else [found]
+
+    @property
+    def text(self) -> str:
+        """The experiment as YAML, without what is default."""
+        import yaml
+
+        values = self.model_dump(
+            mode="json", by_alias=True, exclude_defaults=True
+        )
+        return yaml.safe_dump(
+            values, sort_keys=False, allow_unicode=True, width=79
+        )
+
+
+def shipped_experiments() -> dict[str, Path]:
+    """Returns name -> file of the experiments that ship."""
+    return {path.stem: path for path in sorted(_FOLDER.glob("*.yaml"))}
+
+
+def load_experiment(
+    name_or_file: str | Path,
+    overrides: Iterable[str] = (),
+    *,
+    quick: bool = False,
+) -> Experiment:
+    """Reads an experiment.
+
+    Args:
+        name_or_file: a shipped experiment by name, or a file.
+        overrides: `FIELD=VALUE` of fields, nested ones with dots, such as
+            `database.years=[0, 5]`; values are YAML.
+        quick: whether the section `quick` replaces fields.
+
+    Raises:
+        InputError: there is no such experiment, or a field is unknown or not
+            usable.
+    """
+    shipped = shipped_experiments()
+    path = shipped.get(str(name_or_file), Path(name_or_file))
+    if not path.is_file():
+        raise InputError(
+            f"{name_or_file}: neither an experiment of this package "
+            f"({', '.join(shipped)}) nor a file"
+        )
+    values = read_yaml(path)
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: not a mapping of an experiment's fields")
+    values.setdefault("name", path.stem)
+    if quick:
+        values = _merged(values, values.get("quick") or {})
+    for text in overrides:
+        values = _merged(values, _override(text))
+    experiment = validated(Experiment, values, path)
+    try:
+        conditions(experiment)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None
+    if not quick and experiment.quick:
+        load_experiment(name_or_file, overrides, quick=True)
+    return experiment
+
+
+def _override(text: str) -> dict[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InputError(f"--set: {text!r} is not FIELD=VALUE")
+    try:
+        parsed = parse_yaml(value)
+    except ValueError as error:
+        raise InputError(f"--set: {name}: {error}") from None
+    for part in reversed(name.split(".")):
+        parsed = {part: parsed}
+    return parsed
+
+
+def _merged(values: Any, changes: Any) -> Any:
+    """Returns a tree with changes: mappings field by field, others whole."""
+    if not (isinstance(values, dict) and isinstance(changes, dict)):
+        return changes
+    return values | {
+        name: _merged(values.get(name), one) for name, one in changes.items()
+    }
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One cell of an experiment's grid.
+
+    Attributes:
+        factors: column of a table -> value.
+        changes: side, or `protocol` -> nested fields.
+        causes: the cases that come together. Each has its fields at the wanted
+            level, then at lower ones, for maps that lack a level.
+        is_baseline: whether others are compared with this one.
+    """
+
+    factors: Changes
+    changes: Mapping[str, Changes]
+    causes: tuple[tuple[Mapping[str, Changes], ...], ...] = ()
+    is_baseline: bool = False
+
+
+def conditions(experiment: Experiment) -> list[Condition]:
+    """Returns the conditions, the baseline first.
+
+    Raises:
+        ValueError: a factor has no value or one twice, the baseline names no
+            factor or no value of it, or there are too many conditions.
+    """
+    fixed, factors = _factors(experiment)
+    wanted = dict(_leaves(experiment.baseline, ()))
+    first: dict[str, Any] = {}
+    for path, values in factors.items():
+        asked = wanted.pop(path, values[0])
+        if asked not in values:
+            raise ValueError(f"baseline.{path}: {asked!r} is no value of it")
+        first[path] = asked
+    if wanted:
+        raise ValueError(f"baseline.{next(iter(wanted))}: this is no factor")
+    if experiment.design == "product":
+        number = functools.reduce(
+            lambda n, some: n * len(some), factors.values(), 1
+        )
+        if number > _MOST_CONDITIONS:
+            raise ValueError(f"{number} conditions, more than 20000")
+        cells = [
+            dict(zip(factors, some, strict=True))
+            for some in itertools.product(*factors.values())
+        ]
+        cells.sort(key=lambda cell: cell != first)
+    else:
+        cells = [first]
+        for path, values in factors.items():
+            cells += [
+                {**first, path: one} for one in values if one != first[path]
+            ]
+    cases = list(_cases(experiment))
+    found = []
+    for cell, (cause, level, members) in itertools.product(cells, cases):
+        changes: dict[str, Any] = fixed
+        for path, value in cell.items():
+            changes = _merged(changes, _nested(path, value))
+        named = {CAUSE: cause, LEVEL: level} if experiment.cases else {}
+        found.append(
+            Condition(
+                {**named, **{n: _shown(one) for n, one in cell.items()}},
+                changes,
+                members,
+                cause == NO_CAUSE
+                and all(
+                    value == first[path]
+                    for path, value in cell.items()
+                    if not path.startswith("protocol.")
+                ),
+            )
+        )
+    return found
+
+
+def _factors(
+    experiment: Experiment,
+) -> tuple[dict[str, Any], dict[str, list[Any]]]:
+    """Returns fixed fields of sides and protocol, and path -> values."""
+    fixed: dict[str, Any] = {}
+    factors: dict[str, list[Any]] = {}
+    for side in _FACTORED:
+        for path, value in _leaves(getattr(experiment, side), (side,)):
+            if path == "both.fresh":
+                continue
+            if not isinstance(value, _Values):
+                fixed = _merged(fixed, _nested(path, value))
+                continue
+            if not value:
+                raise ValueError(f"{path}: a factor without a value")
+            for one in value:
+                if value.count(one) > 1:
+                    raise ValueError(f"{path}: {one!r} is there twice")
+            factors[path] = list(value)
+    return fixed, factors
+
+
+class _Values(list):
+    """The values of a factor."""
+
+
+def _leaves(
+    fields: Mapping[str, Any], above: tuple[str, ...]
+) -> Iterator[tuple[str, Any]]:
+    """Yields path -> value, or values, of nested fields."""
+    for name, value in fields.items():
+        place = (*above, str(name))
+        path = ".".join(place)
+        if isinstance(value, dict) and set(value) == _SPREAD:
+            yield path, _Values(_spread(path, value))
+        elif isinstance(value, dict) and value:
+            yield from _leaves(value, place)
+        elif isinstance(value, list) and not _is_single(name, value):
+            yield path, _Values(value)
+        else:
+            yield path, value
+
+
+def _is_single(name: str, value: Sequence[Any]) -> bool:
+    """Returns whether a list is one value of a field."""
+    return name in _LISTS and not any(isinstance(v, list) for v in value)
+
+
+def _spread(path: str, value: Mapping[str, Any]) -> list[float]:
+    first, last, count = (value[name] for name in ("from", "to", "count"))
+    numbers = all(
+        isinstance(one, int | float) and not isinstance(one, bool)
+        for one in (first, last)
+    )
+    if not (numbers and type(count) is int and 2 <= count <= _MOST_CONDITIONS):
+        raise ValueError(f"{path}: from and to are numbers, count from 2 on")
+    step = (last - first) / (count - 1)
+    return [round(first + k * step, 4) for k in range(count)]
+
+
+def _nested(path: str, value: Any) -> Any:
+    for part in reversed(path.split(".")):
+        value = {part: value}
+    return value
+
+
+def _shown(value: Any) -> Any:
+    """Returns a factor's value as a table holds it: a number or text."""
+    if isinstance(value, dict | list):
+        text = json.dumps(value, separators=(",", ": "))
+        return text.replace('"', "").strip("{}")
+    return value
+
+
+def _cases(
+    experiment: Experiment,
+) -> Iterator[tuple[str, int, tuple[tuple[Case, ...], ...]]]:
+    """Yields cause, level and the fields of its members, `none` first."""
+    yield NO_CAUSE, 0, ()
+    for name, case in experiment.cases.items():
+        members = [case] if isinstance(case, dict) else []
+        if isinstance(case, tuple):
+            members = [experiment.cases[one] for one in case]  # type: ignore[misc]
+        lengths = [_num_levels(one) for one in members]
+        most = max(lengths)
+        wanted = experiment.levels or range(1, most + 1)
+        levels = sorted({min(level, most) for level in wanted})
+        for level in levels:
+            alone = len(members) == 1
+            yield (
+                name,
+                level,
+                tuple(
+                    tuple(
+                        _at_level(one, k)
+                        for k in range(level, level - 1 if alone else 0, -1)
+                        if k <= length
+                    )
+                    for one, length in zip(members, lengths, strict=True)
+                ),
+            )
+
+
+def _num_levels(case: Case) -> int:
+    return max(
+        [len(v) for _, v in _leaves(case, ()) if isinstance(v, _Values)],
+        default=1,
+    )
+
+
+def _at_level(case: Case, level: int) -> Case:
+    """Returns the fields of a case at a level, or the next lower one."""
+    fields: Any = {}
+    for path, value in _leaves(case, ()):
+        if isinstance(value, _Values):
+            value = value[min(level, len(value)) - 1]
+        fields = _merged(fields, _nested(path, value))
+    return fields
+
+
+def base_protocol(fields: Changes, source: object) -> RetrievalProtocol:
+    """Returns the protocol of a condition's fields.
+
+    Raises:
+        InputError: a field is unknown or out of range.
+    """
+    values = dict(fields)
+    base = values.pop("base", "fair")
+    known = {**PROTOCOLS, "recorded": RetrievalProtocol()}
+    if base not in known:
+        raise InputError(
+            f"{source}: protocol.base: {base!r} is none of {', '.join(known)}"
+        )
+    unknown = set(values) - set(RetrievalProtocol.__dataclass_fields__)
+    if unknown or "gate" in values:
+        name = min(unknown or {"gate"})
+        raise InputError(f"{source}: protocol.{name}: no such field")
+    try:
+        return replace(known[base], **values)
+    except InputError as error:
+        fault = str(error).removeprefix("--").replace("-", "_", 2)
+        raise InputError(f"{source}: protocol.{fault}") from None
+    except TypeError:
+        raise InputError(f"{source}: protocol: not a number") from None
+
+
+@dataclass(frozen=True)
+class MethodVariant:
+    """A method with settings; the varied ones are columns of a table."""
+
+    name: str
+    settings: tuple[tuple[str, str], ...] = ()
+    factors: Changes = field(default_factory=dict)
+
+
+def method_variants(
+    methods: Mapping[str, Mapping[str, Any]],
+) -> list[MethodVariant]:
+    """Returns each method with each combination of its varied settings."""
+    found = []
+    for name, settings in methods.items():
+        leaves = dict(_leaves(settings, ()))
+        varied = {n: v for n, v in leaves.items() if isinstance(v, _Values)}
+        for some in itertools.product(*varied.values()):
+            chosen = dict(zip(varied, some, strict=True))
+            values = {**leaves, **chosen}
+            found.append(
+                MethodVariant(
+                    name,
+                    tuple((n, str(one)) for n, one in values.items()),
+                    {
+                        f"methods.{name}.{n}": _shown(one)
+                        for n, one in chosen.items()
+                    },
+                )
+            )
+    return found

@@ -1,0 +1,267 @@
+"""Maps that an experiment makes: older ones, others, imported ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+import hashlib
+from pathlib import Path
+import shutil
+from typing import Any
+
+from cns_drake.ageing.aged_map import age_map
+from cns_drake.ageing.rates import (
+    DEFAULT_RATES,
+    LAST_YEAR,
+    check_rates,
+    read_rates,
+)
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes, user_errors
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.imports.import_map import import_city
+from cns_drake.imports.options import ImportOptions
+from cns_drake.scenarios.provenance import digest_file
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.studies.experiment import Experiment, MadeMap
+from cns_drake.studies.redrawing import RedrawCity
+from evaluation.study.parts import Part
+
+# The file in its folder with the fingerprint of a made map.
+_PART = "made.data"
+_FACTOR = "factor"
+# The only stage of a city that is drawn anew.
+_STAGE = "01"
+
+
+@dataclass(frozen=True)
+class _MakeMap(Step):
+    """Makes the folder of a map, in place of one of other inputs."""
+
+    folder: Path
+
+    @property
+    def output(self) -> Path:
+        return self.folder
+
+    def is_done(self) -> bool:
+        # A folder that has its final name is complete.
+        return Part(self.folder / _PART).is_current(self._made_of())
+
+    def run(self, reporter: Reporter) -> None:
+        made_of = self._made_of()
+        if (self.folder / _PART).is_file():
+            with user_errors(self.folder):
+                shutil.rmtree(self.folder)
+        self._make(
+            lambda draft: Part(draft / _PART).write(made_of, None), reporter
+        )
+
+    def _make(
+        self, finish: Callable[[Path], None], reporter: Reporter
+    ) -> None:
+        raise NotImplementedError
+
+    def _made_of(self) -> dict[str, object]:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class AgeCity(_MakeMap):
+    """Lets a city live for some years, with a stage after each of them."""
+
+    source: Path
+    years: tuple[int, ...]
+    seed: int
+    rates: tuple[tuple[str, float], ...]
+
+    def _make(
+        self, finish: Callable[[Path], None], reporter: Reporter
+    ) -> None:
+        age_map(
+            self.source,
+            self.years,
+            self.seed,
+            dict(self.rates),
+            self.folder,
+            finish=lambda draft, _: finish(draft),
+        )
+
+    def _made_of(self) -> dict[str, object]:
+        files = sorted(p for p in self.source.glob("*.*") if p.is_file())
+        return {
+            "files": {one.name: digest_file(one) for one in files},
+            "years": list(self.years),
+            "seed": self.seed,
+            "rates": dict(self.rates),
+            "code": code_digest("cns_drake.ageing.aged_map"),
+        }
+
+
+@dataclass(frozen=True)
+class ImportCity(_MakeMap):
+    """Imports the file of a real city."""
+
+    source: Path
+    options: ImportOptions
+
+    def _make(
+        self, finish: Callable[[Path], None], reporter: Reporter
+    ) -> None:
+        import_city(
+            self.source,
+            self.folder,
+            self.options,
+            reporter.note,
+            lambda draft, _: finish(draft),
+        )
+
+    def _made_of(self) -> dict[str, object]:
+        return {
+            "file": digest_file(self.source),
+            "options": repr(self.options),
+            "code": code_digest("cns_drake.imports.import_map"),
+        }
+
+
+@dataclass
+class MadeMaps:
+    """The maps that the conditions of an experiment need, in one folder.
+
+    They are asked for first, and made by `make`: a city that ages has a stage
+    for each of its years.
+    """
+
+    folder: Path
+    source: str
+    # (Map, rates, seed) -> years.
+    _ages: dict[tuple[Path, tuple[tuple[str, float], ...], int], set[int]] = (
+        field(default_factory=dict)
+    )
+    _steps: dict[Path, Step] = field(default_factory=dict)
+
+    def want_age(
+        self, drive: Scenario, years: Any, rates: Any, seed: int
+    ) -> None:
+        """Notes that a drive's city is needed after some years.
+
+        Raises:
+            InputError: years, or a rate, are out of range.
+        """
+        if type(years) is not int or not 1 <= years <= LAST_YEAR:
+            raise InputError(
+                f"{self.source}: years: {years!r} is not from 0 to {LAST_YEAR}"
+            )
+        key = self._key(drive, rates, seed)
+        self._ages.setdefault(key, set()).add(years)
+
+    def aged(
+        self, drive: Scenario, years: int, rates: Any, seed: int
+    ) -> tuple[str, str]:
+        """Returns the folder of a drive's city, and its stage after years."""
+        key = self._key(drive, rates, seed)
+        number = sorted(self._ages[key]).index(years)
+        return str(self._aged_folder(*key)), f"{number + 2:02d}"
+
+    def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
+        """Returns the folder of a drive's city drawn anew, and its stage."""
+        if type(seed) is not int or not 0 <= seed < 2**31:
+            raise InputError(
+                f"{self.source}: version: {seed!r} is no number from 0 on"
+            )
+        source = map_folder(drive).path.resolve()
+        folder = self.folder / f"{source.name}_c{seed}"
+        self._steps[folder] = RedrawCity(source, _STAGE, seed, folder)
+        return str(folder), _STAGE
+
+    def make(self, cluster: Cluster) -> None:
+        """Makes the maps that are not there.
+
+        Raises:
+            InputError: one could not be made; all are named.
+        """
+        steps = [
+            AgeCity(
+                self._aged_folder(path, rates, seed),
+                path,
+                tuple(sorted(years)),
+                seed,
+                rates,
+            )
+            for (path, rates, seed), years in self._ages.items()
+        ]
+        run_jobs(
+            [
+                Job(f"city {step.folder.name}", step, cost=15.0)
+                for step in (*steps, *self._steps.values())
+            ],
+            cluster,
+        )
+
+    def _key(
+        self, drive: Scenario, rates: Any, seed: int
+    ) -> tuple[Path, tuple[tuple[str, float], ...], int]:
+        path = map_folder(drive).path.resolve()
+        return path, tuple(sorted(self._rates(rates).items())), seed
+
+    def _rates(self, rates: Any) -> Mapping[str, float]:
+        factor: Any = rates
+        found: dict[str, float] = {}
+        if isinstance(rates, dict):
+            found = dict(rates)
+            factor = found.pop(_FACTOR, 1.0)
+            check_rates(found, f"{self.source}: rates")
+        if isinstance(factor, bool) or not isinstance(factor, int | float):
+            raise InputError(f"{self.source}: rates: {factor!r} is no number")
+        try:
+            known = read_rates(None, factor)
+        except InputError as error:
+            fault = str(error).removeprefix("--rate: ")
+            raise InputError(f"{self.source}: rates: {fault}") from None
+        return {**known, **found}
+
+    def _aged_folder(
+        self, path: Path, rates: tuple[tuple[str, float], ...], seed: int
+    ) -> Path:
+        name = f"{path.name}_s{seed}"
+        if dict(rates) != dict(DEFAULT_RATES):
+            name += f"_{fingerprint(dict(rates))[:6]}"
+        return self.folder / name
+
+
+def made_map_step(
+    made: MadeMap, experiment: Experiment, folder: Path, shipped: Mapping
+) -> _MakeMap:
+    """Returns the step that makes a map of an experiment in a folder.
+
+    Raises:
+        InputError: its file is missing, or another one; or its source is no
+            map.
+    """
+    if made.age is not None:
+        assert made.years is not None
+        path = Path(shipped.get(made.age, made.age))
+        if not MapFolder(path).recordable_drives():
+            raise InputError(f"maps: {made.name}: no map {made.age!r} with drives")
+        rates = tuple(sorted(DEFAULT_RATES.items()))
+        return AgeCity(
+            folder, path.resolve(), (made.years,), made.seed, rates
+        )
+    assert made.import_file is not None
+    path = Path(experiment.files or ".") / made.import_file
+    if not path.is_file():
+        raise InputError(
+            f"{path}: no such file; --set files=FOLDER names the folder of the"
+            " cities to import (docs/map_update.md says where they are from)"
+        )
+    if made.sha256 is not None:
+        digest = hashlib.sha256(read_bytes(path)).hexdigest()
+        if digest != made.sha256:
+            raise InputError(f"{path}: not the file of {made.name}: its sha256")
+    options = ImportOptions(seed=made.seed, grow=made.grow)
+    return ImportCity(folder, path.resolve(), options)

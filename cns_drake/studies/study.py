@@ -1,0 +1,571 @@
+"""A study: an experiment on maps, from its conditions to its table and page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.base.process import num_cores
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import load_scenario, map_folder
+from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.comparisons import (
+    LAST,
+    OWN,
+    Compared,
+    MissingError,
+    PairOfDrives,
+)
+from cns_drake.studies.elsewhere import distracting_drives
+from cns_drake.studies.experiment import (
+    Condition,
+    Experiment,
+    MadeMap,
+    MethodVariant,
+    base_protocol,
+    conditions,
+    method_variants,
+)
+from cns_drake.studies.made_maps import MadeMaps, made_map_step
+from cns_drake.studies.recording import is_recorded
+from cns_drake.studies.redrawing import draw_fresh_cities
+from cns_drake.studies.tasks.change import ChangeTask
+from cns_drake.studies.tasks.cost import CostTask
+from cns_drake.studies.tasks.localise import LocaliseTask
+from cns_drake.studies.tasks.place import PlaceTask, PoseTask
+from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
+from cns_drake.studies.tasks.update import MapTask
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.page import write_page
+from evaluation.results.table import (
+    QUERIES,
+    RESULTS,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+)
+from evaluation.study.chosen_methods import MethodChoice, choose_methods
+from evaluation.study.collection import (
+    City,
+    RecordingInfo,
+    find_recordings,
+    group_cities,
+)
+from evaluation.study.parts import Part, StudyFiles
+
+TASKS: Mapping[str, type[Task]] = {
+    task.name: task
+    for task in (
+        *(PlaceTask, PoseTask, LocaliseTask),
+        *(MapTask, ChangeTask, CostTask),
+    )
+}
+# The factor of the fresh versions of the shipped maps.
+FRESH = "both.fresh"
+_STAGE = "database.stage"
+# A study that takes longer is announced [s].
+_LONG = 3600.0
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A pair of drives in a condition, with what its tasks write."""
+
+    map_name: str
+    names: tuple[str, str]
+    condition: Condition
+    factors: Mapping[str, Any]
+    seed: int
+    pair: Pair
+    parts: dict[str, Part] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Drives:
+    """The pairs of drives of one map, before any condition."""
+
+    map_name: str
+    factors: Mapping[str, Any]
+    pairs: Sequence[tuple[Scenario, Scenario]] = ()
+    city: City | None = None
+
+
+def run_study(
+    experiment: Experiment,
+    output: Path,
+    cluster: Cluster,
+    maps: Sequence[str] = (),
+    *,
+    own_methods: Sequence[Path] = (),
+    source: str = "",
+    on_note: Callable[[str], None] = lambda text: None,
+) -> Path:
+    """Measures all conditions of an experiment; writes its table and page.
+
+    `<output>/results.csv` and `queries.csv` are the tables, and `index.html` is
+    the page. `<output>/cities` holds maps that were made. Finished work is not
+    repeated.
+
+    Args:
+        experiment: the experiment.
+        output: folder of the results.
+        cluster: does the work.
+        maps: maps in place of the experiment's.
+        own_methods: Python files of further methods.
+        source: file of the experiment, for errors.
+        on_note: takes notes on what is left out, and how long it takes.
+
+    Returns:
+        The path of the page.
+
+    Raises:
+        InputError: a field of the experiment, a map or the folder cannot be
+            used, or a step failed.
+    """
+    study = Study(
+        experiment,
+        output.absolute(),
+        source or experiment.name,
+        cluster,
+        tuple(own_methods),
+        on_note,
+    )
+    return study.run(maps)
+
+
+@dataclass
+class Study:
+    """An experiment that is being measured; see `run_study`."""
+
+    experiment: Experiment
+    output: Path
+    source: str
+    cluster: Cluster
+    own_methods: tuple[Path, ...] = ()
+    on_note: Callable[[str], None] = lambda text: None
+
+    def __post_init__(self) -> None:
+        self._tasks = []
+        for name, settings in self.experiment.tasks.items():
+            if name not in TASKS:
+                raise InputError(
+                    f"{self.source}: tasks: no task {name!r} (there are:"
+                    f" {', '.join(TASKS)})"
+                )
+            self._tasks.append(TASKS[name](settings, self.source))
+        self._variants = self._choose_methods()
+        self._conditions = conditions(self.experiment)
+        self._protocol = self._protocol_of(self._conditions[0])
+        self._made = MadeMaps(self.output / "cities", self.source)
+
+    def run(self, maps: Sequence[str] = ()) -> Path:
+        """Does the work; returns the path of the page."""
+        drives = list(self._drives(maps))
+        for some in drives:
+            if some.city is None:
+                self._note_ages(some)
+        make_folder(self.output)
+        self._made.make(self.cluster)
+        jobs, measured = self._plan(drives)
+        self._announce(jobs)
+        run_jobs(jobs.values(), self.cluster)
+        results = Results.of(self._rows(measured))
+        queries = QueryRows.of(self._answers(measured))
+        results.write_csv(self.output / RESULTS)
+        queries.write_csv(self.output / QUERIES)
+        return write_page(
+            results,
+            queries,
+            self.output,
+            title=self.experiment.name,
+            about=self.experiment.about,
+            charts=self.experiment.charts,
+            experiment_text=self.experiment.text,
+            notes=[self._protocol.to_text()],
+        )
+
+    def _choose_methods(self) -> dict[str, tuple[MethodChoice, MethodVariant]]:
+        """Returns key -> method of the experiment, with its variant."""
+        wanted = self.experiment.methods
+        files = [*self.own_methods]
+        if wanted is not None:
+            files += [Path(one) for one in wanted if one.endswith(".py")]
+        known = {one.name: one for one in choose_methods(files)}
+        if wanted is None:
+            wanted = {name: {} for name in known}
+        found = {}
+        for variant in method_variants(wanted):
+            name = variant.name
+            if name.endswith(".py"):
+                path = Path(name).absolute()
+                name = next(n for n, one in known.items() if one.file == path)
+            if name not in known:
+                raise InputError(
+                    f"{self.source}: methods: no method {name!r} (known:"
+                    f" {', '.join(known)})"
+                )
+            choice = replace(known[name], settings=variant.settings)
+            choice.make()  # A wrong setting is found before anything slow.
+            found[choice.key] = choice, replace(variant, name=name)
+        return found
+
+    def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
+        """Yields the drives of all maps; makes maps that are named by files."""
+        made = {
+            one.name: one
+            for one in self.experiment.maps or ()
+            if isinstance(one, MadeMap)
+        }
+        wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
+        if not maps:
+            wanted = self.experiment.maps or tuple(
+                name
+                for name, path in shipped_maps().items()
+                if MapFolder(path).recordable_drives()
+            )
+        names: dict[str, str] = {}
+        for one in wanted:
+            for some in self._drives_of(one):
+                key = " ".join((some.map_name, *map(str, some.factors.values())))
+                if key in names:
+                    raise InputError(
+                        f"{one}: another map has the name {some.map_name}, too"
+                    )
+                names[key] = key
+                yield some
+
+    def _drives_of(self, one: str | MadeMap) -> Iterator[_Drives]:
+        if isinstance(one, MadeMap):
+            folder = self.output / "cities" / one.name
+            step = made_map_step(one, self.experiment, folder, shipped_maps())
+            make_folder(self.output)
+            run_jobs([Job(f"city {one.name}", step, cost=15.0)], self.cluster)
+            yield _Drives(one.name, {}, self._pairs(folder))
+            return
+        path = shipped_maps().get(one, Path(one))
+        versions = self.experiment.fresh
+        if versions:
+            if one not in shipped_maps():
+                raise InputError(
+                    f"{self.source}: {FRESH}: {one}: no shipped map"
+                )
+            cities = draw_fresh_cities(
+                [one], versions, self.output / "cities", self.cluster
+            )
+            for number, city in zip(versions, cities, strict=True):
+                yield _Drives(one, {FRESH: number}, self._pairs(city))
+            return
+        if path.is_dir() and not MapFolder(path).drives():
+            for city in group_cities(find_recordings(path, self.on_note)):
+                yield _Drives(city.name, {}, city=city)
+            return
+        yield _Drives(path.name, {}, self._pairs(recordable_map(one)))
+
+    def _pairs(self, folder: Path) -> list[tuple[Scenario, Scenario]]:
+        """Returns the pairs of drives of a map: database and query."""
+        files = MapFolder(folder).recordable_drives()
+        kind = self.experiment.drives
+        if kind == "first-and-last":
+            stages = sorted(MapFolder(folder).stages())
+            # An imported city has another way at each stage.
+            last = (sorted(folder.glob("other_*.yaml")) or files)[-1]
+            return [
+                (
+                    load_scenario(files[0]).replaced(stage=stages[0]),
+                    load_scenario(last).replaced(stage=stages[-1]),
+                )
+            ]
+        drives = [load_scenario(path) for path in files]
+        if kind == "same-route":
+            query = drives[-1]
+            return [(query.replaced(name=f"{query.name}_database"), query)]
+        query = max(drives, key=lambda drive: drive.stage or "")
+        return [(one, query) for one in drives if one is not query]
+
+    def _note_ages(self, drives: _Drives) -> None:
+        """Notes the years that the cities of drives must live."""
+        for condition in self._conditions:
+            groups = [condition.changes]
+            groups += [one for levels in condition.causes for one in levels]
+            for fields in groups:
+                for side in ("both", "database", "query"):
+                    changes = fields.get(side, {})
+                    if not (years := changes.get("years", 0)):
+                        continue
+                    for seed in self.experiment.seeds:
+                        for _, query in drives.pairs[:1]:
+                            self._made.want_age(
+                                query, years, changes.get("rates", 1.0), seed
+                            )
+
+    def _plan(
+        self, drives: Iterable[_Drives]
+    ) -> tuple[dict[str, Job], list[_Measured]]:
+        """Returns the jobs, and what they measure."""
+        jobs: dict[str, Job] = {}
+        measured: list[_Measured] = []
+        for some in drives:
+            found = list(
+                self._recorded(some.city)
+                if some.city is not None
+                else self._simulated(some)
+            )
+            planned = Jobs(
+                StudyFiles(self.output),
+                tuple(choice for choice, _ in self._variants.values()),
+            )
+            most = max((one.pair.distractors for one in found), default=0)
+            if most:
+                planned.distractors = [
+                    self._named(one)
+                    for one in distracting_drives(
+                        some.pairs[0][0],
+                        most,
+                        self._protocol.place_spacing,
+                        self.output / "cities",
+                        self.cluster,
+                        self.on_note,
+                    )
+                ]
+            for task in self._tasks:
+                for one in found:
+                    task.expect(one.pair, planned)
+            for task in self._tasks:
+                for one in found:
+                    one.parts[task.name] = task.measure(one.pair, planned)
+            jobs |= planned.jobs
+            measured += found
+        return jobs, measured
+
+    def _named(self, drive: Scenario) -> NamedDrive:
+        """Returns a drive that is simulated, or read if it is recorded."""
+        if is_recorded(drive, self.output):
+            from evaluation.study.surveys import RecordedDrive
+
+            return NamedDrive(drive.name, RecordedDrive(self.output / drive.name))
+        return NamedDrive(drive.name, DriveSimulation(drive))
+
+    def _simulated(self, some: _Drives) -> Iterator[_Measured]:
+        """Yields the pairs of a map in all conditions that it allows."""
+        noted: dict[str, None] = {}
+        for database, query in some.pairs:
+            pair = PairOfDrives(
+                database,
+                query,
+                self.experiment.drives == "same-route",
+                self.source,
+                self._made.aged,
+                self._made.redrawn,
+                noted.setdefault,
+            )
+            known: set[str] = set()
+            for condition in self._conditions:
+                for seed in self.experiment.seeds:
+                    try:
+                        compared = pair.build(condition, seed)
+                    except MissingError as error:
+                        label = "condition"
+                        if condition.causes:
+                            label = str(condition.factors["cause"])
+                        noted.setdefault(f"{error}: no {label}")
+                        break
+                    # A condition without random draws is measured once.
+                    key = f"{condition.factors} {compared.fingerprint()}"
+                    if key not in known:
+                        known.add(key)
+                        yield _Measured(
+                            some.map_name,
+                            (_base_name(database), query.name),
+                            condition,
+                            {**some.factors, **condition.factors},
+                            seed,
+                            self._pair(compared, query, seed),
+                        )
+        for text in noted:
+            self.on_note(f"{some.map_name}: {text}")
+
+    def _pair(self, compared: Compared, query: Scenario, seed: int) -> Pair:
+        database, asked = map(self._named, (compared.database, compared.query))
+        way = database
+        if self.experiment.drives == "same-route":
+            city = {
+                name: getattr(compared.database, name)
+                for name in ("map", "stage", "without", "transient")
+            }
+            drive = query.replaced(**city)
+            if drive != query:
+                drive = drive.replaced(name=f"{compared.database.name}_way")
+            way = self._named(drive)
+        name = f"{database.name} {asked.name} {compared.fingerprint()[:8]}"
+        return Pair(
+            name,
+            database,
+            asked,
+            way,
+            compared.protocol,
+            compared.distractors,
+            seed,
+        )
+
+    def _recorded(self, city: City) -> Iterator[_Measured]:
+        """Yields the pairs of recordings; nothing but their stage varies."""
+        allowed = {_STAGE, *_protocol_factors(self._conditions)}
+        for name in self._conditions[0].factors:
+            if name not in allowed:
+                raise InputError(
+                    f"{self.source}: {name}: the recordings of {city.name} are"
+                    " as they are; simulated drives alone can vary it"
+                )
+        for pair in city.change_pairs():
+            control = city.unchanged_pair(*pair)
+            for condition in self._conditions:
+                stage = condition.factors.get(_STAGE, OWN)
+                sources = pair if stage == OWN else control
+                if stage not in (OWN, LAST) or sources is None:
+                    continue
+                database, query = map(_recording, sources)
+                protocol = self._protocol_of(condition)
+                yield _Measured(
+                    city.name,
+                    (pair[0].name, pair[1].name),
+                    condition,
+                    condition.factors,
+                    self.experiment.seeds[0],
+                    Pair(
+                        f"{database.name} {query.name} {protocol.radius:g}",
+                        *(database, query, database),
+                        protocol,
+                    ),
+                )
+
+    def _announce(self, jobs: Mapping[str, Job]) -> None:
+        """Says how long a long study takes."""
+        workers = self.cluster.slots or num_cores()
+        longest = _LONG * workers
+        if sum(job.cost for job in jobs.values()) <= longest:
+            return
+        left = sum(job.cost for job in jobs.values() if not job.step.is_done())
+        if left > longest:
+            hours = left / workers / 3600.0
+            self.on_note(
+                f"{self.experiment.name}: {len(jobs)} jobs, about {hours:.1f} h"
+                f" with {workers} side by side; the same command goes on after"
+                " an interruption"
+            )
+
+    def _rows(self, measured: Sequence[_Measured]) -> Iterator[Row]:
+        """Yields all numbers."""
+        # The values of the baseline of a map, its drives and protocol, by
+        # seed and task.
+        baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
+        for one in measured:
+            if one.condition.is_baseline:
+                values = {name: part.read() for name, part in one.parts.items()}
+                baselines.setdefault(_place(one), {})[one.seed] = values
+        for one in measured:
+            before = baselines.get(_place(one), {})
+            base = before.get(one.seed) or next(iter(before.values()), {})
+            for task in self._tasks:
+                found = one.parts[task.name].read()
+                for number in task.numbers(found, base.get(task.name)):
+                    yield Row(
+                        **self._key(one, task.name, number.method, number.gate),
+                        metric=number.metric,
+                        value=number.value,
+                        low=number.interval.low,
+                        high=number.interval.high,
+                        n=number.n,
+                    )
+
+    def _answers(self, measured: Iterable[_Measured]) -> Iterator[Answers]:
+        """Yields the answers to all queries."""
+        for one in measured:
+            for task in self._tasks:
+                for given in task.answers(one.parts[task.name].read()):
+                    yield Answers(
+                        **self._key(one, task.name, given.method, given.gate),
+                        columns={
+                            name: np.array([-1 if v is None else v for v in some])
+                            if isinstance(some, list)
+                            else np.asarray(some)
+                            for name, some in given.columns.items()
+                        },
+                    )
+
+    def _key(
+        self, one: _Measured, task: str, method: str, gate: bool
+    ) -> dict[str, Any]:
+        factors = dict(one.factors)
+        if method in self._variants:
+            _, variant = self._variants[method]
+            method = variant.name
+            factors |= variant.factors
+        database, query = one.names
+        return {
+            "experiment": self.experiment.name,
+            "map": one.map_name,
+            "database": database,
+            "query": query,
+            "seed": one.seed,
+            "factors": factors,
+            "task": task,
+            "method": method,
+            "gate": gate,
+            "protocol": self._protocol_of(one.condition).name,
+        }
+
+    def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
+        fields = condition.changes.get("protocol", {})
+        return base_protocol(fields, self.source)
+
+
+def recordable_map(name: str) -> Path:
+    """Returns the folder of a shipped map, or one given, with drives.
+
+    Raises:
+        InputError: there is no such map, or it has no drive.
+    """
+    known = ", ".join(shipped_maps())
+    folder = shipped_maps().get(name, Path(name))
+    if not folder.is_dir():
+        raise InputError(
+            f"unknown map '{name}'; there are: {known}; or give a folder"
+        )
+    if not MapFolder(folder).recordable_drives():
+        raise InputError(
+            f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+        )
+    return folder
+
+
+def _recording(info: RecordingInfo) -> NamedDrive:
+    return NamedDrive(info.name, info.source)
+
+
+def _protocol_factors(cells: Sequence[Condition]) -> list[str]:
+    return [name for name in cells[0].factors if name.startswith("protocol.")]
+
+
+def _base_name(database: Scenario) -> str:
+    return database.name.removesuffix("_database")
+
+
+def _place(one: _Measured) -> tuple:
+    """Returns what has one baseline: a map, its drives, and a protocol."""
+    fixed = [
+        (name, value)
+        for name, value in one.factors.items()
+        if name == FRESH or name.startswith("protocol.")
+    ]
+    return one.map_name, one.names, *fixed

@@ -1,0 +1,106 @@
+"""How much the city changed between two drives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import math
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.studies.tasks.task import (
+    Jobs,
+    NamedDrive,
+    Number,
+    Pair,
+    Task,
+    positive,
+)
+from evaluation.change.drive_change import Surveyed, compare
+from evaluation.drives.sampling import sample_frames
+from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.study.parts import Part
+from evaluation.study.surveys import DriveSource
+
+# Expected seconds to map a drive with each of its scans, or with some.
+_WHOLE_COST, _COST = 60.0, 20.0
+
+
+class ChangeTask(Task):
+    """TCR_sym of the two drives, or of the query's way through both cities."""
+
+    name = "change"
+    defaults: Mapping[str, Any] = {"spacing": None}
+
+    def check(self, name: str, value: Any, where: str) -> None:
+        if value is not None:
+            positive(value, where)
+
+    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+        spacing = self.settings["spacing"]
+        needs: list[str] = []
+
+        def mapped(drive: NamedDrive) -> Part:
+            name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
+            part = jobs.files.part("mapped", name)
+            needs.append(f"mapped {part.path.stem}")
+            cost = _WHOLE_COST if spacing is None else _COST
+            return jobs.add(
+                part, map_city, (drive.source, spacing), cost=cost
+            )
+
+        maps = mapped(pair.way), mapped(pair.query)
+        part = jobs.files.part("change", pair.name)
+        return jobs.add(part, measure_change, maps, needs, 2.0)
+
+    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
+        for name, (value, number) in found.items():
+            if not math.isnan(value):
+                yield Number("", False, name, value, n=number)
+
+
+def map_city(
+    reporter: Reporter, source: DriveSource, spacing: float | None
+) -> tuple[VoxelMap, np.ndarray]:
+    """Maps a drive on the grid of the TCR.
+
+    Scans are `spacing` apart [m]; None for all of them.
+
+    Returns:
+        The map, and positions (N, 3) of the sensor [m].
+    """
+    drive = source()
+    positions = drive.X_WS[:, :3, 3]
+    frames = np.arange(len(drive))
+    if spacing is not None:
+        frames = sample_frames(positions, spacing)
+    voxels = VoxelAccumulator()
+    for frame in reporter.track(frames, "mapping", len(frames)):
+        voxels.add(drive.scan(frame), drive.X_WS[frame])
+    return voxels.to_map(), positions
+
+
+def measure_change(
+    reporter: Reporter, first: Part, second: Part
+) -> dict[str, tuple[float, int]]:
+    """Returns metric -> value and number of voxels, of two mapped drives."""
+    del reporter
+    a, b = (
+        Surveyed(name, *part.read())
+        for name, part in (("database", first), ("query", second))
+    )
+    report = compare(a, b)
+    found = {}
+    for name, change in (
+        ("tcr_sym", report.change),
+        ("tcr_sym_masked", report.masked),
+    ):
+        if change is not None:
+            found[name] = float(change.symmetric), change.num_in_hull
+    for name, side in (
+        ("tcr_source_to_target", report.change.source_to_target),
+        ("tcr_target_to_source", report.change.target_to_source),
+    ):
+        found[name] = float(side.ratio), side.num_in_hull
+    return found

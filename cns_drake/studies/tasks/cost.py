@@ -1,0 +1,85 @@
+"""CPU time of methods, by the number of places they choose from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.studies.tasks.task import Jobs, Number, Pair, Task
+from evaluation.recognition.costs import cpu_ms, query_ms
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.parts import Part
+from evaluation.study.place_outcomes import TIMED, joined_places
+
+_COST = 30.0
+
+
+class CostTask(Task):
+    """What a query costs, and a database made of descriptions."""
+
+    name = "cost"
+
+    def expect(self, pair: Pair, jobs: Jobs) -> None:
+        # Times are those of descriptions that are there.
+        for _ in range(2):
+            jobs.expect(pair.database, "places", pair.protocol)
+            jobs.expect(pair.query, "queries", pair.protocol)
+
+    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+        needs: list[str] = []
+        database, query = (
+            jobs.described(drive, role, pair.protocol, needs)
+            for drive, role in (
+                (pair.database, "places"),
+                (pair.query, "queries"),
+            )
+        )
+        assert isinstance(database, tuple)
+        assert isinstance(query, tuple)
+        arguments = (
+            *(database[1:], query[1:], jobs.elsewhere(pair, needs)),
+            *(pair.distractors, jobs.methods),
+        )
+        part = jobs.files.part("cost", pair.name)
+        return jobs.add(part, measure_costs, arguments, needs, _COST)
+
+    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
+        for method, (places, values) in found.items():
+            for name, value in values.items():
+                yield Number(method, False, name, value, n=places)
+
+
+def measure_costs(
+    reporter: Reporter,
+    database: tuple[Part, ...],
+    query: tuple[Part, ...],
+    distractors: tuple[tuple[Part, ...], ...],
+    num_distractors: int,
+    methods: tuple[MethodChoice, ...],
+) -> dict[str, tuple[int, dict[str, float]]]:
+    """Returns key of a method -> number of places, and times [ms].
+
+    `query_ms` is the median CPU time of some queries, `build_ms` that of a
+    database from descriptions.
+    """
+    found = {}
+    for k, choice in enumerate(reporter.track(methods, "", len(methods))):
+        method = choice.make()
+        known = [database[k].read()[1].places]
+        for parts in distractors:
+            if sum(len(one.frames) for one in known[1:]) >= num_distractors:
+                break
+            known.append(parts[k].read()[1].places)
+        places = joined_places(known, num_distractors)
+        asked = query[k].read()[1].queries
+        found[choice.key] = (
+            len(places.frames),
+            {
+                "build_ms": cpu_ms(method.build_database, places.descriptors),
+                "query_ms": query_ms(
+                    method, places, asked, TIMED + 1, with_pose=False
+                ),
+            },
+        )
+    return found

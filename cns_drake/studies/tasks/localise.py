@@ -1,0 +1,192 @@
+"""Localisation of scans in the map of a database, from drawn starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base import points as clouds
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.studies.tasks.task import (
+    Answers,
+    Jobs,
+    Number,
+    Pair,
+    Task,
+    positive,
+)
+from evaluation.localisation import estimators, localise
+from evaluation.localisation.localise import Starts
+from evaluation.recognition.survival import kept_share
+from evaluation.study.parts import Part
+from evaluation.study.surveys import DriveSource
+
+# Those of the wheel that this package needs.
+SHIPPED = tuple(
+    name for name in estimators.METHODS if name != estimators.KISS_MATCHER
+)
+_COST = 60.0
+_SHOWN = (
+    *("success_03m_1deg", "success_2m_5deg"),
+    *("translation_median", "translation_95", "rotation_median_deg"),
+    "auroc_own_score",
+)
+
+
+class LocaliseTask(Task):
+    """Whether scans are aligned with the map, from starts beside the truth."""
+
+    name = "localise"
+    headline = "success_03m_1deg"
+    defaults: Mapping[str, Any] = {
+        "methods": list(SHIPPED),
+        "starts": [[2.0, 10.0]],
+        "spacing": None,
+    }
+
+    def check(self, name: str, value: Any, where: str) -> None:
+        if name == "spacing":
+            positive(value, where)
+        elif name == "methods":
+            for one in value if isinstance(value, list) else [value]:
+                known = str(one) in estimators.METHODS
+                if not known and not Path(str(one)).is_file():
+                    raise InputError(
+                        f"{where}: {one!r} is neither"
+                        f" {', '.join(estimators.METHODS)} nor a file"
+                    )
+        else:
+            try:
+                self._starts(value)
+            except (TypeError, ValueError):
+                raise InputError(
+                    f"{where}: {value!r} is no list of [metres, degrees]"
+                ) from None
+
+    @staticmethod
+    def _starts(values: Any) -> tuple[Starts, ...]:
+        return tuple(Starts(float(r), float(turn)) for r, turn in values)
+
+    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+        # Own estimators are known by their place and their content.
+        named = tuple(
+            Path(one).absolute() if one.endswith(".py") else one
+            for one in self.settings["methods"]
+        )
+        texts = tuple(
+            one.read_bytes().hex() if isinstance(one, Path) else ""
+            for one in named
+        )
+        spacing = self.settings["spacing"] or pair.protocol.query_spacing
+        arguments = (
+            *(pair.database.source, pair.query.source),
+            *(named, texts, self._starts(self.settings["starts"]), spacing),
+        )
+        part = jobs.files.part("localise", pair.name)
+        return jobs.add(part, measure_localisation, arguments, cost=_COST)
+
+    def _runs(self, found: Iterable[np.ndarray]) -> Iterator[tuple[str, Any]]:
+        """Yields the name of each method and start, with its queries."""
+        starts = self.settings["starts"]
+        rows = iter(found)
+        for method in self.settings["methods"]:
+            stem = Path(method).stem if method.endswith(".py") else method
+            for radius, _ in starts:
+                far = f" from {radius:g} m" if len(starts) > 1 else ""
+                yield f"{stem}{far}", next(rows)
+
+    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
+        then = dict(self._runs(before)) if before is not None else {}
+        for method, rows in self._runs(found):
+            numbers = localise.Localisation(rows).to_json()
+            values = {name: numbers[name] for name in _SHOWN}
+            if method in then:
+                share = kept_share(
+                    float(localise.is_right(rows).mean()),
+                    float(localise.is_right(then[method]).mean()),
+                )
+                values["kept"] = float(share)
+            for name, value in values.items():
+                if value is not None:
+                    yield Number(
+                        method, False, name, float(value), n=len(rows)
+                    )
+
+    def answers(self, found: Any) -> Iterator[Answers]:
+        for method, rows in self._runs(found):
+            yield Answers(
+                method,
+                False,
+                {
+                    "query_frame": rows["frame"],
+                    "query_stamp_ns": rows["stamp_ns"],
+                    "correct": localise.is_right(rows),
+                    "score": np.where(
+                        np.isfinite(rows["own_score"]), rows["own_score"], np.nan
+                    ),
+                    "translation_error": rows["translation_error"],
+                    "rotation_error_deg": rows["rotation_error_deg"],
+                },
+            )
+
+
+def measure_localisation(
+    reporter: Reporter,
+    database: DriveSource,
+    query: DriveSource,
+    methods: tuple[str | Path, ...],
+    texts: tuple[str, ...],
+    starts: tuple[Starts, ...],
+    spacing: float,
+) -> list[np.ndarray]:
+    """Localises the queries of a pair of drives in one world.
+
+    Each scan is read once, since a drive may be made while it is read. Methods
+    are names, or Python files, whose texts make them other inputs. The spacing
+    is between two queries [m].
+
+    Returns:
+        (K,) of `QUERY` for each method and start, the starts of a method side
+        by side.
+    """
+    del texts
+    mapped, asked = database(), query()
+    maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
+    localisers = []
+    for method in methods:
+        settings = estimators.default_settings(str(method))
+        key = settings.voxel, settings.neighbours
+        if key not in maps:
+            # The drive is opened anew for each other map.
+            source = mapped if not maps else database()
+            maps[key] = estimators.make_map(source, settings, reporter.track)
+        estimator = estimators.make_estimator(str(method), settings)
+        localisers.append(localise.Localiser(maps[key], estimator, settings))
+    is_mapped = localise.mapped_frames(
+        mapped, localisers[0].surroundings, asked
+    )
+    frames = localise.query_frames(asked, is_mapped, spacing)
+    X_WS = asked.X_WS
+    R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
+    found: list[list[np.ndarray]] = [
+        [] for _ in range(len(methods) * len(starts))
+    ]
+    for frame in reporter.track(frames, "localising", len(frames)):
+        scan = clouds.from_xyz(clouds.xyz(asked.scan(frame)))
+        ends = iter(found)
+        for localiser in localisers:
+            for draw in starts:
+                row, _ = localiser.query(
+                    frame,
+                    int(asked.stamps_ns[frame]),
+                    scan,
+                    X_WS[frame],
+                    R_WT[frame],
+                    *draw.draw(frame),
+                )
+                next(ends).append(row)
+    return [np.array(rows) for rows in found]

@@ -1,0 +1,248 @@
+"""The interface of tasks, and what the jobs of a study share."""
+
+from __future__ import annotations
+
+import abc
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.running import Job
+from evaluation.recognition.description import Role
+from evaluation.recognition.metrics import UNKNOWN, Interval
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.place_outcomes import DescribedSource
+from evaluation.study.surveys import DriveSource, Survey
+
+# Expected seconds to describe a drive by all methods.
+_DESCRIPTION_COST = 30.0
+
+
+class Number(NamedTuple):
+    """A number that a task found.
+
+    Attributes:
+        method: method, estimator or baseline; "" if there is none. For a place
+            recognition method it is the `key` of its choice.
+        gate: whether the gate was used.
+        metric: name of the number.
+        value: the number itself.
+        interval: its 95 % interval.
+        n: number of queries, or other things, that count.
+    """
+
+    method: str
+    gate: bool
+    metric: str
+    value: float
+    interval: Interval = UNKNOWN
+    n: int = 0
+
+
+class Answers(NamedTuple):
+    """The answers of a method to Q queries: column -> Q values."""
+
+    method: str
+    gate: bool
+    columns: Mapping[str, Sequence[Any] | np.ndarray]
+
+
+@dataclass(frozen=True)
+class NamedDrive:
+    """A drive that is measured: a name that no other has, and its source."""
+
+    name: str
+    source: DriveSource
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A database and a query that are measured.
+
+    Attributes:
+        name: a name that no other pair has.
+        way: the drive along the query's way through the city of the database;
+            the database itself if its route is another.
+    """
+
+    name: str
+    database: NamedDrive
+    query: NamedDrive
+    way: NamedDrive
+    protocol: RetrievalProtocol
+    distractors: int = 0
+    seed: int = 1
+
+
+@dataclass
+class Jobs:
+    """The jobs of a study.
+
+    Each description of a drive serves all pairs that need it. A drive that one
+    pair alone needs is described by the job of that pair, and not kept.
+
+    Attributes:
+        methods: the methods that are run.
+        distractors: described drives elsewhere, the first to be added first.
+    """
+
+    files: StudyFiles
+    methods: tuple[MethodChoice, ...]
+    distractors: Sequence[NamedDrive] = ()
+    jobs: dict[str, Job] = field(default_factory=dict)
+    _uses: Counter[str] = field(default_factory=Counter)
+
+    def expect(
+        self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+    ) -> None:
+        """Notes that a pair will need descriptions of a drive."""
+        self._uses[_description_name(drive, role, protocol)] += 1
+
+    def described(
+        self,
+        drive: NamedDrive,
+        role: Role,
+        protocol: RetrievalProtocol,
+        needs: list[str],
+        *,
+        kept: bool = False,
+    ) -> DescribedSource:
+        """Returns a drive's source, or the parts of its descriptions.
+
+        Args:
+            drive: the drive.
+            role: role of its scans.
+            protocol: protocol of the pair.
+            needs: gets the name of the job that writes the parts.
+            kept: whether the parts are needed in any case.
+        """
+        name = _description_name(drive, role, protocol)
+        if not (kept or self._uses[name] > 1):
+            return drive.source
+        files = self.files.survey(name)
+        step = Survey(
+            drive.source,
+            frozenset({role}),
+            self.methods,
+            protocol,
+            files,
+            with_scans=True,
+            with_map=False,
+        )
+        job = f"describe {name}"
+        self.jobs[job] = Job(job, step, cost=_DESCRIPTION_COST)
+        needs.append(job)
+        return (
+            files.scans,
+            *(files.described(one.key) for one in self.methods),
+        )
+
+    def elsewhere(
+        self, pair: Pair, needs: list[str]
+    ) -> tuple[tuple[Part, ...], ...]:
+        """Returns the descriptions of drives elsewhere that a pair needs."""
+        if not pair.distractors:
+            return ()
+        found = []
+        for drive in self.distractors:
+            parts = self.described(
+                drive, "places", pair.protocol, needs, kept=True
+            )
+            assert isinstance(parts, tuple)
+            found.append(parts[1:])
+        return tuple(found)
+
+    def add(
+        self,
+        part: Part,
+        function: Callable[..., object],
+        arguments: tuple[object, ...],
+        needs: Iterable[str] = (),
+        cost: float = 20.0,
+    ) -> Part:
+        """Adds the job of a part, named like it; returns the part."""
+        name = f"{part.path.parent.name} {part.path.stem}"
+        step = MakePart(part, function, arguments)
+        self.jobs[name] = Job(name, step, tuple(needs), cost)
+        return part
+
+
+def _description_name(
+    drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+) -> str:
+    options = protocol.described(queries=role == "queries")
+    return f"{drive.name} {role} {fingerprint(options)[:6]}"
+
+
+class Task(abc.ABC):
+    """A question about two drives.
+
+    Attributes:
+        name: name of the task in files and on the command line.
+        headline: metric of which the share that is kept is computed; "" if
+            there is none.
+        defaults: settings of an experiment's file, and their values.
+    """
+
+    name: ClassVar[str]
+    headline: ClassVar[str] = ""
+    defaults: ClassVar[Mapping[str, Any]] = {}
+
+    def __init__(self, settings: Mapping[str, Any], source: str):
+        """Takes the settings of an experiment, whose file is the source.
+
+        Raises:
+            InputError: a setting is unknown or of another type.
+        """
+        self.settings = {**self.defaults, **settings}
+        for name, value in settings.items():
+            where = f"{source}: tasks.{self.name}.{name}"
+            if name not in self.defaults:
+                known = ", ".join(self.defaults) or "none"
+                raise InputError(f"{where}: no such setting (there are: {known})")
+            self.check(name, value, where)
+
+    def check(self, name: str, value: Any, where: str) -> None:
+        """Checks a setting.
+
+        Raises:
+            InputError: its value is not usable.
+        """
+
+    def expect(self, pair: Pair, jobs: Jobs) -> None:
+        """Notes the descriptions that `measure` will need."""
+
+    @abc.abstractmethod
+    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+        """Adds the jobs that measure a pair; returns what they write."""
+
+    @abc.abstractmethod
+    def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:
+        """Yields the numbers of a pair.
+
+        Args:
+            found: value of the part.
+            before: that of the baseline condition; None if there is none.
+        """
+
+    def answers(self, found: Any) -> Iterable[Answers]:
+        """Yields the answers to the queries; none by default."""
+        return ()
+
+
+def positive(value: Any, where: str) -> None:
+    """Checks that a setting is a positive number.
+
+    Raises:
+        InputError: it is not.
+    """
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (is_number and 0.0 < value < 1e6):
+        raise InputError(f"{where}: {value!r} is not a positive number")

@@ -1,0 +1,125 @@
+"""What of a map must be updated: labels of its points, scored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+import tempfile
+from typing import Any
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.progress import Track, silent
+from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies import map_truth
+from cns_drake.studies.tasks.task import Jobs, Number, Pair, Task, positive
+from evaluation.map_update.baselines import BASELINES, run_baseline
+from evaluation.map_update.scores import Labels, score
+from evaluation.map_update.sessions import Label, read_pair, read_truth
+from evaluation.study.parts import Part
+from evaluation.study.surveys import RecordedDrive
+
+_SCORES = (
+    "miou",
+    *(f"iou_{name}" for name in ("kept", "gone", "new", "unobserved")),
+    *(
+        f"{kind}_{name}"
+        for name in ("gone", "new")
+        for kind in ("precision", "recall")
+    ),
+    "called_points",
+    "called_structures",
+    "right_structures",
+)
+# The true labels, as those of a method.
+TRUTH = "truth"
+_COST = 60.0
+
+
+class MapTask(Task):
+    """Which points of two maps are kept, gone, new or not observed."""
+
+    name = "map"
+    defaults: Mapping[str, Any] = {"methods": None, "spacing": 5.0}
+
+    def check(self, name: str, value: Any, where: str) -> None:
+        if name == "spacing":
+            positive(value, where)
+            return
+        known = (TRUTH, *BASELINES)
+        for one in value if isinstance(value, list) else [value]:
+            if one not in known:
+                raise InputError(f"{where}: {one!r} is none of {', '.join(known)}")
+
+    def measure(self, pair: Pair, jobs: Jobs) -> Part:
+        methods = self.settings["methods"]
+        if methods is None:
+            # M3C2 needs the extra map-update.
+            has_m3c2 = find_spec("py4dgeo") is not None
+            methods = [
+                one
+                for one in (TRUTH, *BASELINES)
+                if one != "m3c2" or has_m3c2
+            ]
+        arguments = (
+            *(pair.database.source, pair.query.source),
+            *(tuple(methods), float(self.settings["spacing"])),
+        )
+        part = jobs.files.part("map", pair.name)
+        return jobs.add(part, measure_maps, arguments, cost=_COST)
+
+    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
+        for method, scores in found.items():
+            number = scores["gone"] + scores["new"]
+            for name in (*_SCORES, "gone", "new"):
+                if scores[name] is not None:
+                    value = float(scores[name])
+                    yield Number(method, False, name, value, n=number)
+
+
+def measure_maps(
+    reporter: Reporter,
+    database: DriveSimulation | RecordedDrive,
+    query: DriveSimulation | RecordedDrive,
+    methods: tuple[str, ...],
+    spacing: float,
+) -> dict[str, dict[str, float | None]]:
+    """Maps two drives and scores methods like `score_methods`.
+
+    Scans are `spacing` apart [m].
+    """
+    a, b = (
+        map_truth.simulate_survey(source.scenario)
+        if isinstance(source, DriveSimulation)
+        else map_truth.open_survey(source.path)
+        for source in (database, query)
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        maps = Path(folder) / "maps"
+        map_truth.write_truth(
+            a, b, maps, spacing, reporter.track, across_maps=True
+        )
+        return score_methods(maps, methods, reporter.track)
+
+
+def score_methods(
+    maps: Path, methods: tuple[str, ...], track: Track = silent
+) -> dict[str, dict[str, float | None]]:
+    """Returns method -> name -> value of scores of baselines or of `TRUTH`.
+
+    Raises:
+        InputError: the folder cannot be read, or a baseline cannot run.
+    """
+    pair = read_pair(maps)
+    truth = Labels(*read_truth(pair))
+    found = {}
+    for method in methods:
+        labels = truth if method == TRUTH else run_baseline(method, pair, track)
+        scores = score(pair, truth, labels, {})
+        found[method] = {
+            **{name: scores[name] for name in _SCORES},
+            "gone": int((truth.A == Label.GONE).sum()),
+            "new": int((truth.B == Label.NEW).sum()),
+        }
+    return found
