@@ -1,6 +1,6 @@
 """Output of the command line: results, progress, and one-line errors."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 import contextlib
 import json
 import math
@@ -10,6 +10,7 @@ import traceback
 from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from cns_drake.base import interrupts
 from cns_drake.base.errors import (
@@ -37,13 +38,31 @@ def plain_app(**settings: Any) -> typer.Typer:
     )
 
 
-def make_program(name: str, summary: str, epilog: str) -> typer.Typer:
+def make_program(
+    name: str,
+    summary: str,
+    epilog: str,
+    renamed: Mapping[str, str] | None = None,
+) -> typer.Typer:
     """Returns a program without commands, to which they are added.
 
     It has `--version` and the options of shell completion, and shows its help
     when called without arguments.
+
+    Args:
+        renamed: command of an earlier version -> what to call now, after the
+            program's name. Such a command is bad usage, and says so.
     """
-    app = plain_app(help=summary, epilog=epilog)
+
+    class Program(TyperGroup):
+        def get_command(self, ctx: Any, cmd_name: str) -> Any:
+            if renamed is not None and cmd_name in renamed:
+                raise _UsageError(
+                    f"'{name} {cmd_name}' is now '{name} {renamed[cmd_name]}'"
+                )
+            return super().get_command(ctx, cmd_name)
+
+    app = plain_app(cls=Program, help=summary, epilog=epilog)
 
     @app.callback(invoke_without_command=True)
     def start(

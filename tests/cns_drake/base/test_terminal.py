@@ -4,6 +4,7 @@ import io
 import subprocess
 import sys
 
+from helpers.eval_program import run_program
 import pytest
 from rich.console import Console
 import typer
@@ -39,6 +40,31 @@ def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
         terminal.run(app, "program")
     assert raised.value.code == status
     assert capsys.readouterr().err == f"program: {line}\n"
+
+
+@pytest.mark.parametrize("rest", [[], ["--help"], ["a", "--jobs", "2"]])
+def test_a_renamed_command_names_the_new_one(capsys, rest):
+    app = terminal.make_program(
+        "program", "Summary.", "", renamed={"years": "study years"}
+    )
+
+    def study():
+        print("studied")
+
+    app.command("study")(study)
+
+    def main():
+        terminal.run(app, "program")
+
+    status, out, err = run_program(capsys, "program", main, "years", *rest)
+    assert (status, out) == (2, "")
+    assert (
+        err == "program: error: 'program years' is now 'program study years'\n"
+    )
+    assert run_program(capsys, "program", main, "study")[0] == 0
+    _, out, _ = run_program(capsys, "program", main, "--help")
+    assert "study" in out
+    assert "years" not in out
 
 
 @pytest.mark.parametrize("width", [30, 40, 60, 80, 200])

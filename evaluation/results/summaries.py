@@ -1,0 +1,579 @@
+"""Numbers that are functions of the table of results, or of that of queries.
+
+Intervals of shares, excesses and differences of AUC are by bootstrap over
+blocks of the route, with the same blocks on both sides. Those of means and of
+rank correlations are by bootstrap over conditions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+import itertools
+import math
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from scipy.stats import rankdata
+
+from cns_drake.base.errors import InputError
+from evaluation.recognition.metrics import (
+    UNKNOWN,
+    Difference,
+    Interval,
+    auc_difference,
+    holm,
+    percentile_interval,
+    pr_curve,
+    resampled_metrics,
+    resampled_weights,
+)
+from evaluation.recognition.survival import kept_share
+from evaluation.results.table import Answers, Key, QueryRows, Results, Row
+
+# Task and metric -> the metric of the share of it that is kept.
+KEPT = {
+    ("place", "auc"): "kept",
+    ("place", "auc_strict"): "kept_strict",
+    ("pose", "pose_success"): "kept",
+    ("localise", "success_03m_1deg"): "kept",
+}
+CAUSE, LEVEL = "cause", "level"
+# Joins the names of causes that come together.
+_AND = "+"
+_SAMPLES = 1000
+
+_Keyed = TypeVar("_Keyed", bound=Key)
+
+
+class Mean(NamedTuple):
+    """A mean over rows that have the same values in some columns.
+
+    `number` is that of the rows whose value is known; the others do not count.
+    """
+
+    key: tuple
+    value: float
+    least: float
+    greatest: float
+    number: int
+
+
+def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
+    """Returns the mean for each combination of values in columns.
+
+    The least and the greatest value, such as those of seeds, stand beside it.
+    """
+    groups: dict[tuple, list[float]] = {}
+    for row in rows:
+        group = groups.setdefault(tuple(row[name] for name in columns), [])
+        if not math.isnan(row.value):
+            group.append(row.value)
+    nothing = [math.nan]
+    return [
+        Mean(
+            key,
+            float(np.mean(some or nothing)),
+            min(some or nothing),
+            max(some or nothing),
+            len(some),
+        )
+        for key, some in groups.items()
+    ]
+
+
+class _Conditions(Generic[_Keyed]):
+    """Rows or answers by condition, and by seed or with all seeds joined."""
+
+    def __init__(self, keys: Iterable[_Keyed], *, pooled: bool) -> None:
+        self.groups: dict[tuple, list[_Keyed]] = {}
+        self._first: dict[tuple, list[_Keyed]] = {}
+        for key in keys:
+            name = key.but("seed"), getattr(key, "metric", None)
+            seed = None if pooled else key.seed
+            group = self.groups.setdefault((name, seed), [])
+            group.append(key)
+            self._first.setdefault(name, group)
+
+    def at(
+        self,
+        key: Key,
+        values: Mapping[str, object] | None = None,
+        metric: str | None = None,
+    ) -> list[_Keyed]:
+        """Returns those of a condition with other values of some factors.
+
+        They have the seed of the key; or the first one, without that.
+        """
+        moved = replace(key, factors={**key.factors, **(values or {})})
+        name = moved.but("seed"), metric
+        return self.groups.get((name, key.seed), self._first.get(name, []))
+
+
+def kept_rows(
+    results: Results,
+    baseline: Mapping[str, object],
+    queries: QueryRows | None = None,
+    *,
+    pooled: bool = False,
+) -> list[Row]:
+    """Returns the shares of AUC, or of successes, that conditions leave.
+
+    Args:
+        results: the table.
+        baseline: factor -> its value in the condition that has all; the other
+            factors stay. The seed does so, too, or is the first one.
+        queries: they give the 95 % intervals of shares of AUC.
+        pooled: whether seeds are joined. The share is then one of means over
+            seeds, and the row has the first seed.
+
+    Returns:
+        A row for each row of a metric in `KEPT`. Its value is NaN if the table
+        has no baseline, or one of 0; its interval is NaN if the numbers of
+        queries differ.
+    """
+    measured = [row for row in results.rows if (row.task, row.metric) in KEPT]
+    rows = _Conditions(measured, pooled=pooled)
+    answers = _Conditions(queries.answers if queries else (), pooled=pooled)
+    found = []
+    for some in rows.groups.values():
+        one = some[0]
+        none = rows.at(one, baseline, one.metric)
+        share, interval = math.nan, UNKNOWN
+        if none:
+            share = float(kept_share(_mean(some), _mean(none)))
+        if one.metric == "auc":
+            interval = kept_interval(answers.at(one, baseline), answers.at(one))
+        metric = KEPT[one.task, one.metric]
+        ends = {"low": interval.low, "high": interval.high}
+        found.append(replace(one, metric=metric, value=share, **ends))
+    return found
+
+
+def _mean(rows: Iterable[Row]) -> float:
+    return float(np.mean([row.value for row in rows]))
+
+
+def kept_interval(
+    unchanged: Sequence[Answers], changed: Sequence[Answers]
+) -> Interval:
+    """Returns the 95 % interval of the share of AUC that is kept.
+
+    The answers are those of several seeds, to the same queries.
+    """
+    lengths = {len(one.outcomes) for one in (*unchanged, *changed)}
+    if not (unchanged and changed) or len(lengths) > 1 or 0 in lengths:
+        return UNKNOWN
+    before, after = _sampled(changed[0], unchanged, changed)
+    return percentile_interval(kept_share(after, before))
+
+
+def _sampled(blocks: Answers, *groups: Sequence[Answers]) -> list[np.ndarray]:
+    """Returns the mean AUC (B,) of each group, of the same samples."""
+    outcomes = blocks.outcomes
+    weights = resampled_weights(len(outcomes), blocks=outcomes.blocks)
+    return [
+        np.mean(
+            [resampled_metrics(one.outcomes, weights)[0] for one in group],
+            axis=0,
+        )
+        for group in groups
+    ]
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A method under two changes at once, and under each alone.
+
+    Attributes:
+        answers: under both, with the first seed.
+        names: names of the two causes, or of the two factors.
+        kept: shares of the baseline's AUC: under the first, under the second,
+            under both.
+        value: what both cost beyond the product of what each leaves, as a
+            share of the baseline's AUC.
+        interval: its 95 % interval; above 0 if that is beyond doubt.
+    """
+
+    answers: Answers
+    names: tuple[str, str]
+    kept: tuple[float, float, float]
+    value: float
+    interval: Interval
+
+
+def excesses(
+    queries: QueryRows, baseline: Mapping[str, object]
+) -> list[Excess]:
+    """Returns what two changes cost together, for all pairs of changes.
+
+    A pair is a cause whose name joins two by "+", each of which is also there
+    alone (at its strongest level), or a condition that differs from the
+    baseline in two factors. Seeds are joined.
+    """
+    conditions = _Conditions(queries.answers, pooled=True)
+    levels: dict[object, Any] = {}
+    for one in queries.answers:
+        name = one.map, one[CAUSE]
+        levels[name] = max(one[LEVEL] or 0, levels.get(name, 0))
+    found = []
+    for both in conditions.groups.values():
+        key = both[0]
+        names = str(key[CAUSE]).split(_AND)
+        none = {n: baseline[n] for n in (CAUSE, LEVEL) if n in baseline}
+        alone = [{CAUSE: n, LEVEL: levels.get((key.map, n))} for n in names]
+        if len(names) != 2:
+            names = [n for n, v in baseline.items() if key[n] != v]
+            names = [name for name in names if name != LEVEL]
+            # The first is alone where the second is as in the baseline.
+            alone = [
+                {n: baseline[n], **(none if n == CAUSE else {})}
+                for n in reversed(names)
+            ]
+            none = dict(baseline)
+        groups = [conditions.at(key, values) for values in (none, *alone)]
+        if len(names) != 2:
+            continue
+        if not all(groups):
+            continue
+        all_of_it, *kept = (
+            float(np.mean([pr_curve(one.outcomes).auc for one in group]))
+            for group in (*groups, both)
+        )
+        first, second, together = (
+            float(kept_share(k, all_of_it)) for k in kept
+        )
+        interval = UNKNOWN
+        if len({len(g[0].outcomes) for g in (*groups, both)}) == 1:
+            base, *samples = _sampled(key, *groups, both)
+            a, b, ab = (kept_share(one, base) for one in samples)
+            interval = percentile_interval(a * b - ab)
+        found.append(
+            Excess(
+                key,
+                (names[0], names[1]),
+                (first, second, together),
+                first * second - together,
+                interval,
+            )
+        )
+    return found
+
+
+def lifetime(
+    times: Sequence[float], kept: Sequence[float], left: float
+) -> float:
+    """Returns the time until a share is left; infinite if more is left.
+
+    The times ascend; the share is 1 at the first one, and changes evenly
+    between two. NaN if a share is unknown.
+    """
+    if any(math.isnan(share) for share in kept):
+        return math.nan
+    for k in range(1, len(times)):
+        if kept[k] <= left:
+            fall = kept[k - 1] - kept[k]
+            part = (kept[k - 1] - left) / fall if fall > 0.0 else 0.0
+            return times[k - 1] + part * (times[k] - times[k - 1])
+    return math.inf
+
+
+@dataclass(frozen=True)
+class Lifetime:
+    """How much of a factor it takes until a share is left.
+
+    Attributes:
+        row: one that has the map, the drives and the method.
+        share: that is left.
+        value: of the mean over seeds; infinite if more is left at `last`.
+        low, high: the least and the greatest of a seed.
+        last: greatest value of the factor that was measured.
+    """
+
+    row: Row
+    share: float
+    value: float
+    low: float
+    high: float
+    last: float
+
+
+def lifetimes(
+    results: Results, factor: str, shares: Iterable[float] = (0.9, 0.5)
+) -> list[Lifetime]:
+    """Returns lifetimes over a numeric factor, of all rows of `kept`.
+
+    The least value of the factor is the baseline. What is there with one seed
+    alone, as the baseline may be, belongs to all seeds.
+    """
+    groups: dict[tuple, list[Row]] = {}
+    for row in results.where(metric="kept").rows:
+        if row[factor] is not None:
+            groups.setdefault(row.but("seed", factor), []).append(row)
+    found = []
+    for some in groups.values():
+        curves: dict[float, dict[int, float]] = {}
+        for row in some:
+            at = float(row[factor])  # type: ignore[arg-type]  # A number.
+            curves.setdefault(at, {})[row.seed] = row.value
+        times = sorted(curves)
+        seeds = sorted({seed for at in times[1:] for seed in curves[at]})
+        for share in shares:
+            mean = [float(np.mean(list(curves[at].values()))) for at in times]
+            single = [
+                lifetime(*_curve_of(curves, seed), share) for seed in seeds
+            ] or [math.inf]
+            found.append(
+                Lifetime(
+                    some[0],
+                    share,
+                    lifetime(times, mean, share),
+                    min(single),
+                    max(single),
+                    times[-1],
+                )
+            )
+    return found
+
+
+def _curve_of(
+    curves: Mapping[float, Mapping[int, float]], seed: int
+) -> tuple[list[float], list[float]]:
+    """Returns the times and shares of a seed, with what has a single seed."""
+    points = [
+        (at, some.get(seed, next(iter(some.values()))))
+        for at, some in sorted(curves.items())
+        if seed in some or len(some) == 1
+    ]
+    return [at for at, _ in points], [share for _, share in points]
+
+
+def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
+    """Returns the rows of a metric, each with another number beside it.
+
+    The number is a factor's, or a metric's of the same condition: of the same
+    method and gate, else without the gate, else of no method (as `tcr_sym`).
+    Rows without one are left out.
+    """
+    wider: tuple[tuple[str, ...], ...] = (
+        ("task", "protocol"),
+        ("task", "protocol", "gate"),
+        ("task", "protocol", "gate", "method"),
+    )
+    values: dict[tuple, float] = {}
+    for row in results.where(metric=x).rows:
+        values[row.but(*wider[0])] = row.value
+        if not row.gate:
+            values[row.but(*wider[1])] = row.value
+        if not row.method:
+            values[row.but(*wider[2])] = row.value
+    found = []
+    for row in results.where(metric=y).rows:
+        at: object = row[x]
+        if x not in results.factors:
+            keys = (row.but(*names) for names in wider)
+            at = next((values[key] for key in keys if key in values), None)
+        if isinstance(at, int | float) and not math.isnan(at + row.value):
+            found.append((row, float(at)))
+    return found
+
+
+class Growth(NamedTuple):
+    """The exponent with which a number grows over another one.
+
+    It is from the point before, which has less of `at`; NaN for the first.
+    """
+
+    row: Row
+    at: float
+    exponent: float
+
+
+def growths(results: Results, over: str, metric: str) -> list[Growth]:
+    """Returns the exponents of a metric over a factor, or another metric.
+
+    Points with the same map, method and gate belong together.
+    """
+    groups: dict[tuple, list[tuple[float, Row]]] = {}
+    for row, at in paired_values(results, over, metric):
+        key = row.experiment, row.map, row.label, row.gate
+        groups.setdefault(key, []).append((at, row))
+    found = []
+    for some in groups.values():
+        before: tuple[float, Row] | None = None
+        for at, row in sorted(some, key=lambda point: point[0]):
+            exponent = math.nan
+            if before is not None and 0.0 < before[0] < at:
+                grown = math.log(row.value / before[1].value)
+                exponent = grown / math.log(at / before[0])
+            found.append(Growth(row, at, exponent))
+            before = at, row
+    return found
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """How well numbers predict what a method misses.
+
+    Attributes:
+        method: with its settings.
+        number: of conditions.
+        rho: Spearman's rank correlation of 1 less the metric with each number,
+            and its 95 % interval by bootstrap over conditions.
+        difference: the second correlation less the first; None of one number.
+    """
+
+    method: str
+    number: int
+    rho: tuple[tuple[float, Interval], ...]
+    difference: tuple[float, Interval] | None
+
+
+def correlations(
+    results: Results, numbers: Sequence[str], metric: str = "auc"
+) -> list[Correlation]:
+    """Returns the rank correlations of a metric with factors or metrics.
+
+    Conditions count where all numbers are known. With and without the gate is
+    to be selected before.
+    """
+    points: dict[str, dict[int, list[float]]] = {}
+    for name in numbers:
+        for row, at in paired_values(results, name, metric):
+            methods = points.setdefault(row.label, {})
+            methods.setdefault(id(row), [1.0 - row.value]).append(at)
+    found = []
+    for method, rows in points.items():
+        known = np.array([r for r in rows.values() if len(r) > len(numbers)])
+        if len(known) == 0:
+            continue
+        rng = np.random.default_rng(0)
+        draws = rng.integers(len(known), size=(_SAMPLES, len(known)))
+        rho, samples = _spearman(known), _spearman(known[draws])
+        difference = None
+        if len(numbers) == 2:
+            apart = percentile_interval(samples[:, 1] - samples[:, 0])
+            difference = float(rho[1] - rho[0]), apart
+        each = tuple(
+            (float(value), percentile_interval(sampled))
+            for value, sampled in zip(rho, samples.T, strict=True)
+        )
+        found.append(Correlation(method, len(known), each, difference))
+    return found
+
+
+def _spearman(values: np.ndarray) -> np.ndarray:
+    """Returns Spearman's correlation of the first column with the others.
+
+    Values are (..., N, C), correlations (..., C - 1); NaN where a column is
+    constant.
+    """
+    ranks = rankdata(values, axis=-2)
+    ranks -= ranks.mean(axis=-2, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ranks /= np.linalg.norm(ranks, axis=-2, keepdims=True)
+    return (ranks[..., :1] * ranks[..., 1:]).sum(axis=-2)
+
+
+class MethodDifference(NamedTuple):
+    """Two methods in a condition, and the AUC of the first less the second.
+
+    The p-value is corrected, by Holm's method, for the number of all
+    differences; NaN if unknown.
+    """
+
+    first: Answers
+    second: Answers
+    difference: Difference
+    p_value: float
+
+
+def method_differences(queries: QueryRows) -> list[MethodDifference]:
+    """Compares each two methods in each condition of the task `place`.
+
+    Raises:
+        InputError: two methods answered different queries.
+    """
+    groups: dict[tuple, list[Answers]] = {}
+    for one in queries.answers:
+        if one.task == "place":
+            groups.setdefault(one.but("method"), []).append(one)
+    pairs = [
+        pair
+        for group in groups.values()
+        for pair in itertools.combinations(group, 2)
+    ]
+    for one, other in pairs:
+        check_same_queries(one, other)
+    found = [auc_difference(a.outcomes, b.outcomes) for a, b in pairs]
+    corrected = holm(np.array([one.p_value for one in found])).tolist()
+    return [
+        MethodDifference(*pair, one, p)
+        for pair, one, p in zip(pairs, found, corrected, strict=True)
+    ]
+
+
+def check_same_queries(one: Answers, other: Answers) -> None:
+    """Checks that two methods answered the same queries.
+
+    Raises:
+        InputError: otherwise.
+    """
+    frames = [a.columns["query_frame"] for a in (one, other)]
+    if not np.array_equal(*frames):
+        raise InputError(
+            f"{one.experiment}: {one.database}, {one.query}: {one.label} and"
+            f" {other.label} answered different queries"
+        )
+
+
+class Ranked(NamedTuple):
+    """A method's mean over conditions, with its 95 % interval."""
+
+    method: str
+    value: float
+    interval: Interval
+
+
+def ranking(rows: Iterable[Row]) -> tuple[list[Ranked], np.ndarray]:
+    """Ranks methods by their means over the conditions that all have.
+
+    The bootstrap draws maps, where there are several, else conditions; a
+    sample has the same ones for each method. A single condition has the
+    interval of its row.
+
+    Args:
+        rows: rows of one metric.
+
+    Returns:
+        The methods, the best first, and their means (B, M) in samples. There
+        are none without a condition that all have.
+    """
+    table: dict[tuple, dict[str, Row]] = {}
+    for row in rows:
+        if not math.isnan(row.value):
+            table.setdefault(row.but("method"), {})[row.label] = row
+    methods = {name for some in table.values() for name in some}
+    common = [some for some in table.values() if len(some) == len(methods)]
+    if not common:
+        return [], np.empty((0, 0))
+    names = sorted(methods)
+    values = np.array([[some[n].value for n in names] for some in common])
+    of_map = [some[names[0]].map for some in common]
+    units = of_map if len(set(of_map)) > 1 else list(range(len(common)))
+    weights = resampled_weights(len(common), blocks=_numbered(units))
+    with np.errstate(invalid="ignore"):
+        samples = weights @ values / weights.sum(axis=1, keepdims=True)
+    found = []
+    for k, name in enumerate(names):
+        interval = percentile_interval(samples[:, k])
+        if len(common) == 1:
+            interval = Interval(common[0][name].low, common[0][name].high)
+        found.append(Ranked(name, float(values[:, k].mean()), interval))
+    order = sorted(range(len(names)), key=lambda k: (-found[k].value, names[k]))
+    return [found[k] for k in order], samples[:, order]
+
+
+def _numbered(units: Sequence[object]) -> np.ndarray:
+    known = list(dict.fromkeys(units))
+    return np.array([known.index(one) for one in units])

@@ -1,0 +1,589 @@
+"""The table of results, a number a row; and that of queries.
+
+`results.csv` and `queries.csv` begin with the same columns: where and under
+which condition something was measured. All columns that are not named here are
+factors of an experiment, named by their place in its file, such as
+`query.transient.snow`; their values are numbers, text or truth values, and a
+cell is empty where a factor does not apply.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import csv
+from dataclasses import dataclass, fields
+from functools import cached_property
+import io
+import math
+from operator import itemgetter
+from pathlib import Path
+import re
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base.csv_files import csv_text
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes, write_text
+from evaluation.recognition.protocol import PROTOCOL_NAMES
+from evaluation.recognition.query_outcomes import QueryOutcomes
+
+RESULTS, QUERIES = "results.csv", "queries.csv"
+# The beginning of a factor that is a setting of a method.
+SETTINGS = "methods."
+_BEFORE = ("experiment", "map", "database", "query", "seed")
+_BEHIND = ("task", "method", "gate", "protocol")
+_MEASURED = ("metric", "value", "low", "high", "n")
+# Columns of a query -> what kind of value they have.
+_ANSWERS = {
+    "query_frame": int,
+    "query_stamp_ns": int,
+    "query_x": float,
+    "query_y": float,
+    "query_z": float,
+    "block": int,
+    "correct": bool,
+    "has_match": bool,
+    "score": float,
+    "first_right_rank": int,
+    "why": str,
+    "match_drive": str,
+    "match_frame": int,
+    "distance": float,
+    "translation_error": float,
+    "rotation_error_deg": float,
+    "overlap": float,
+    "visible_change": float,
+}
+_NEEDED_ANSWERS = ("query_frame", "correct", "has_match", "score")
+# What stands for an empty cell.
+_EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
+_NUMBER = re.compile(
+    r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE
+)
+# Leading zeros belong to names, as in the stage 01.
+_NAME_OF_DIGITS = re.compile(r"0\d+")
+_TRUTH = {"0": False, "1": True, "false": False, "true": True}
+# Metrics, and the values that they can have; others have any.
+_RANGES = (
+    (
+        r"auc|auc_strict|r1|pose_success|success_\w+|auroc\w*|m?iou\w*"
+        r"|precision_\w+|recall_\w+|tcr_\w+",
+        0.0,
+        1.0,
+    ),
+    (r"visible_change", -1.0, 1.0),
+    (
+        r"kept\w*|with_match|places|no_\w+|other_city|too_far|elsewhere|lost"
+        r"|found|translation_\w+|rotation_\w+|\w+_ms",
+        0.0,
+        math.inf,
+    ),
+)
+# They are numbers of any queries.
+_ALWAYS_KNOWN = ("auc", "auc_strict")
+# Columns of tables of earlier versions -> what makes such a table now.
+_FORMER = (
+    ({"version", "db", "kept"}, "cns-drake study fresh"),
+    ({"db", "cause", "level"}, "cns-drake study ladder"),
+    ({"year", "seed", "kept"}, "cns-drake study years"),
+    ({"tenth", "half"}, "cns-drake study years"),
+    ({"db", "auc_unchanged"}, "cns-drake study stages"),
+    ({"tcr_sym", "recall_at_1"}, "cns-drake study trend"),
+    ({"others", "places", "query_ms"}, "cns-drake study size"),
+    ({"map", "db", "query"}, "cns-drake study stages"),
+)
+
+
+@dataclass(frozen=True)
+class Key:
+    """Where, under which condition and how something was measured.
+
+    Attributes:
+        experiment: name of the experiment.
+        map: name of the map.
+        database: name of the drive that makes the database.
+        query: name of the drive that asks.
+        seed: of everything that is random.
+        factors: column -> value of those that apply.
+        task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
+        method: method, estimator or baseline; "" for the task `change`.
+        gate: whether places were rejected by the method's own pose.
+        protocol: name of the protocol, see `RetrievalProtocol.name`.
+    """
+
+    experiment: str
+    map: str
+    database: str
+    query: str
+    seed: int
+    factors: Mapping[str, object]
+    task: str
+    method: str
+    gate: bool
+    protocol: str
+
+    def __getitem__(self, column: str) -> object:
+        """Returns the value of a column; None for a factor without one."""
+        if column in _COLUMNS:
+            return getattr(self, column)
+        return self.factors.get(column)
+
+    @property
+    def label(self) -> str:
+        """The method, with those of its settings that are factors."""
+        start = f"{SETTINGS}{self.method}."
+        settings = (
+            f"{name.removeprefix(start)} {value}"
+            for name, value in self.factors.items()
+            if name.startswith(start) and value is not None
+        )
+        return ", ".join((self.method, *settings))
+
+    def but(self, *names: str) -> tuple[object, ...]:
+        """Returns what identifies it, apart from some columns.
+
+        The settings of a method, such as `methods.ring++.crop`, are left out
+        with `method`.
+        """
+        known = [n for n in (*_BEFORE, *_BEHIND) if n not in names]
+        without_settings = "method" in names
+        applying = (
+            (name, value)
+            for name, value in self.factors.items()
+            if value is not None
+            and name not in names
+            and not (without_settings and name.startswith(SETTINGS))
+        )
+        return (
+            *(getattr(self, n) for n in known),
+            *sorted(applying, key=_NAME),
+        )
+
+
+_NAME: Callable[[Any], str] = itemgetter(0)
+
+
+@dataclass(frozen=True)
+class Row(Key):
+    """A number that was measured.
+
+    Attributes:
+        metric: its name.
+        value: the number; NaN if it is undefined.
+        low, high: its 95 % interval; NaN if unknown.
+        n: number of queries, structures or points that count; None if unknown.
+    """
+
+    metric: str
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+    n: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Answers(Key):
+    """What a method answered to Q queries.
+
+    Attributes:
+        columns: name -> (Q,) values, of the columns of `queries.csv`. NaN
+            stands for an empty number, -1 (or NaN) for an empty whole one.
+    """
+
+    columns: Mapping[str, np.ndarray]
+
+    @cached_property
+    def outcomes(self) -> QueryOutcomes:
+        """The outcome of each query; the size of the database is unknown."""
+        columns = self.columns
+        is_right = np.asarray(columns["correct"], dtype=bool)
+        ranks = np.full(len(is_right), math.inf)
+        if "first_right_rank" in columns:
+            known = np.asarray(columns["first_right_rank"], dtype=float)
+            ranks = np.where(known >= 1.0, known, math.inf)
+        blocks = columns.get("block")
+        return QueryOutcomes(
+            np.asarray(columns["score"], dtype=float),
+            is_right,
+            np.asarray(columns["has_match"], dtype=bool),
+            np.where(is_right, 1.0, ranks),
+            0,
+            None if blocks is None or (blocks < 0).all() else blocks,
+        )
+
+
+_COLUMNS = frozenset(one.name for one in (*fields(Row), *fields(Answers)))
+
+
+@dataclass(frozen=True)
+class Results:
+    """A table of results: the names of its factors, in order, and its rows."""
+
+    factors: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    @classmethod
+    def of(cls, rows: Iterable[Row]) -> Results:
+        """Returns the table of rows, with their factors as they come."""
+        rows = tuple(rows)
+        return cls(_factor_names(rows), rows)
+
+    @classmethod
+    def read(cls, path: Path) -> Results:
+        """Reads `results.csv`, or that of a folder.
+
+        Columns may have any order; those that are unknown are factors.
+
+        Raises:
+            InputError: the file cannot be read, is a table of an earlier
+                version, lacks a column, has one twice, or has a value that
+                cannot be. The line, the column and the fault are named.
+        """
+        file = path / RESULTS if path.is_dir() else path
+        table = _Cells.read(file, (*_BEFORE, *_BEHIND, *_MEASURED))
+        rows: list[Row] = []
+        lines: dict[tuple[object, ...], int] = {}
+        for one in table.lines():
+            row = Row(**one.key(table.factors), **_measured(one))
+            first = lines.setdefault((*row.but(), row.metric), one.number)
+            if first != one.number:
+                raise one.fault("metric", f"the same is in line {first}")
+            rows.append(row)
+        return cls(table.factors, tuple(rows))
+
+    def write_csv(self, path: Path) -> None:
+        """Writes the table; equal ones give equal bytes.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        lines = (
+            (
+                *_key_cells(row, self.factors),
+                row.metric,
+                *map(_cell, (float(row.value), row.low, row.high, row.n)),
+            )
+            for row in self.rows
+        )
+        header = (*_BEFORE, *self.factors, *_BEHIND, *_MEASURED)
+        write_text(path, csv_text(header, lines))
+
+    def where(
+        self, columns: Mapping[str, object] | None = None, **named: object
+    ) -> Results:
+        """Returns the rows with values in columns.
+
+        A tuple, list or set stands for any of its values. Names of factors
+        with dots go into `columns`.
+        """
+        wanted = {
+            name: value if isinstance(value, tuple | list | set) else (value,)
+            for name, value in {**(columns or {}), **named}.items()
+        }
+        return Results(
+            self.factors,
+            tuple(
+                row
+                for row in self.rows
+                if all(row[name] in some for name, some in wanted.items())
+            ),
+        )
+
+    def distinct(self, column: str) -> list[Any]:
+        """Returns the values of a column, in their order, without None."""
+        found = dict.fromkeys(row[column] for row in self.rows)
+        return [value for value in found if value is not None]
+
+
+@dataclass(frozen=True)
+class QueryRows:
+    """A table of queries: the names of its factors, and all answers."""
+
+    factors: tuple[str, ...]
+    answers: tuple[Answers, ...]
+
+    @classmethod
+    def of(cls, answers: Iterable[Answers]) -> QueryRows:
+        """Returns the table of answers, with their factors as they come."""
+        answers = tuple(answers)
+        return cls(_factor_names(answers), answers)
+
+    @classmethod
+    def read(cls, path: Path) -> QueryRows:
+        """Reads `queries.csv`, or that of a folder.
+
+        Of the columns of a query, all but `query_frame`, `correct`,
+        `has_match` and `score` may be missing.
+
+        Raises:
+            InputError: as `Results.read`.
+        """
+        file = path / QUERIES if path.is_dir() else path
+        table = _Cells.read(
+            file, (*_BEFORE, *_BEHIND, *_NEEDED_ANSWERS), tuple(_ANSWERS)
+        )
+        names = [name for name in _ANSWERS if name in table.columns]
+        # The same key has the same cells in all its lines, but for spelling.
+        spelled: dict[tuple[str, ...], dict[str, Any]] = {}
+        found: dict[tuple[object, ...], tuple[dict[str, Any], list]] = {}
+        lines: dict[object, int] = {}
+        for one in table.lines():
+            cells = one.cells_of((*_BEFORE, *table.factors, *_BEHIND))
+            if cells not in spelled:
+                spelled[cells] = one.key(table.factors)
+            key = spelled[cells]
+            identity = Key(**key).but()
+            answer = [one.value(name, _ANSWERS[name]) for name in names]
+            _check_answer(
+                one, key["task"], dict(zip(names, answer, strict=True))
+            )
+            frame = (identity, answer[names.index("query_frame")])
+            first = lines.setdefault(frame, one.number)
+            if first != one.number:
+                raise one.fault("query_frame", f"the same is in line {first}")
+            found.setdefault(identity, (key, []))[1].append(answer)
+        return cls(
+            table.factors,
+            tuple(
+                Answers(**key, columns=_arrays(names, rows))
+                for key, rows in found.values()
+            ),
+        )
+
+    def write_csv(self, path: Path) -> None:
+        """Writes the table; equal ones give equal bytes.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        header = (*_BEFORE, *self.factors, *_BEHIND, *_ANSWERS)
+        write_text(path, csv_text(header, self._lines()))
+
+    def _lines(self) -> Iterator[list[str]]:
+        for one in self.answers:
+            key = _key_cells(one, self.factors)
+            number = len(one.columns["correct"])
+            columns = [
+                [_answer_cell(v, kind) for v in one.columns[name].tolist()]
+                if name in one.columns
+                else [""] * number
+                for name, kind in _ANSWERS.items()
+            ]
+            for answer in zip(*columns, strict=True):
+                yield [*key, *answer]
+
+
+def _factor_names(keys: Iterable[Key]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for key in keys for name in key.factors))
+
+
+def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
+    names = (*_BEFORE, *factors, *_BEHIND)
+    cells = [_cell(key[name]) for name in names]
+    cells[names.index("gate")] = str(int(key.gate))
+    return cells
+
+
+def _cell(value: object) -> str:
+    """Returns a value as the table has it, with all its digits."""
+    if isinstance(value, bool | np.bool_):
+        return str(value).lower()
+    if isinstance(value, float):
+        return "" if math.isnan(value) else repr(float(value))
+    return "" if value is None else str(value)
+
+
+def _answer_cell(value: Any, kind: type) -> str:
+    if kind is int and not 0 <= value < math.inf:
+        return ""
+    return str(int(value)) if kind in (bool, int) else _cell(value)
+
+
+def _arrays(names: Sequence[str], rows: list) -> dict[str, np.ndarray]:
+    columns = zip(*rows, strict=True)
+    return {
+        name: np.array(column, dtype=object if kind is str else kind)
+        for name, column in zip(names, columns, strict=True)
+        for kind in (_ANSWERS[name],)
+    }
+
+
+def _measured(one: _Line) -> dict[str, Any]:
+    """Returns what a row holds behind its key."""
+    metric = one.text("metric")
+    value, low, high = (
+        one.value(name, float) for name in ("value", "low", "high")
+    )
+    if math.isnan(value) and metric in _ALWAYS_KNOWN:
+        raise one.fault("value", f"{metric} needs a number")
+    for pattern, least, greatest in _RANGES:
+        fits = re.fullmatch(pattern, metric) is not None
+        if fits and (value < least or value > greatest):
+            limits = f"from {least:g} to {greatest:g}"
+            if math.isinf(greatest):
+                limits = f"{least:g} or more"
+            raise one.fault("value", f"{value:g}, but {metric} is {limits}")
+    if math.isnan(low) != math.isnan(high):
+        raise one.fault("low", "an interval has a low and a high end")
+    if low > high:
+        raise one.fault("low", f"{low:g} is more than high ({high:g})")
+    n = one.value("n", int)
+    return {
+        "metric": metric,
+        "value": value,
+        "low": low,
+        "high": high,
+        "n": None if n < 0 else n,
+    }
+
+
+def _check_answer(one: _Line, task: str, answer: Mapping[str, Any]) -> None:
+    if task != "place":
+        return
+    if answer["correct"] and not answer["has_match"]:
+        raise one.fault("correct", "1, but the query has no match")
+    if answer["correct"] and math.isnan(answer["score"]):
+        raise one.fault("score", "a place that is right needs a number")
+    rank = answer.get("first_right_rank", -1)
+    if rank >= 0 and (rank == 1) != answer["correct"]:
+        raise one.fault("first_right_rank", f"{rank} does not fit correct")
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A line of a table."""
+
+    file: Path
+    number: int
+    columns: Mapping[str, int]
+    cells: Sequence[str]
+
+    def fault(self, column: str, fault: str) -> InputError:
+        return InputError(f"{self.file}: line {self.number}: {column}: {fault}")
+
+    def cells_of(self, names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(self.cells[self.columns[name]] for name in names)
+
+    def text(self, column: str) -> str:
+        cell = self.cells[self.columns[column]]
+        if not cell:
+            raise self.fault(column, "empty")
+        return cell
+
+    def value(self, column: str, kind: type) -> Any:
+        """Returns a value of a kind, or what stands for an empty one."""
+        cell = self.cells[self.columns[column]]
+        if kind is bool:
+            if cell.lower() not in _TRUTH:
+                raise self.fault(column, f"{cell!r} is neither 0 nor 1")
+            return _TRUTH[cell.lower()]
+        if kind is str or not cell:
+            return cell or _EMPTY[kind]
+        if not _NUMBER.fullmatch(cell) or math.isinf(float(cell)):
+            raise self.fault(column, f"{cell!r} is no number")
+        if kind is float:
+            return float(cell)
+        # Programs with NaN for empty cells write whole numbers with a point.
+        whole = int(cell) if cell.isdigit() else float(cell)
+        if not 0 <= whole < 2**63 or whole != int(whole):
+            raise self.fault(column, f"{cell!r} is no whole number from 0 on")
+        return int(whole)
+
+    def factor(self, column: str) -> object:
+        """Returns the number, truth value or text of a factor, or None."""
+        cell = self.cells[self.columns[column]]
+        if _NUMBER.fullmatch(cell) and not _NAME_OF_DIGITS.fullmatch(cell):
+            value = float(cell)
+            if math.isinf(value):
+                raise self.fault(column, f"{cell!r} is no number")
+            return int(cell) if cell.lstrip("+-").isdigit() else value
+        if cell.lower() in ("true", "false"):
+            return _TRUTH[cell.lower()]
+        return cell or None
+
+    def key(self, factors: Iterable[str]) -> dict[str, Any]:
+        """Returns the attributes of a `Key`."""
+        values: dict[str, Any] = {
+            name: self.text(name) for name in ("experiment", "map", "task")
+        }
+        for name in ("database", "query", "method", "protocol"):
+            values[name] = self.cells[self.columns[name]]
+        values["seed"] = self.value("seed", int)
+        if values["seed"] < 0:
+            raise self.fault("seed", "empty")
+        values["gate"] = self.value("gate", bool)
+        known = {name: self.factor(name) for name in factors}
+        values["factors"] = {n: v for n, v in known.items() if v is not None}
+        if not values["method"] and values["task"] != "change":
+            raise self.fault("method", "empty")
+        names = (*PROTOCOL_NAMES, "")
+        if values["protocol"] not in names:
+            raise self.fault(
+                "protocol",
+                f"{values['protocol']!r} is none of {', '.join(names[:-1])}",
+            )
+        return values
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The lines of a file, and where each column stands."""
+
+    file: Path
+    columns: Mapping[str, int]
+    factors: tuple[str, ...]
+    rows: Sequence[tuple[int, list[str]]]
+
+    @classmethod
+    def read(
+        cls, file: Path, needed: Iterable[str], known: Iterable[str] = ()
+    ) -> _Cells:
+        try:
+            text = read_bytes(file).decode("utf-8-sig")
+            reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+            (_, names), *rows = [
+                (reader.line_num, [cell.strip(" ") for cell in row])
+                for row in reader
+            ] or [(1, [])]
+        except UnicodeDecodeError:
+            raise InputError(f"{file}: not UTF-8 text") from None
+        except csv.Error as error:
+            raise InputError(f"{file}: not CSV: {error}") from None
+        for number, row in [(1, names), *rows]:
+            for k, cell in enumerate(row):
+                if not cell.isprintable():
+                    name = names[k] if number > 1 and k < len(names) else k + 1
+                    raise InputError(
+                        f"{file}: line {number}: column {name!r}:"
+                        f" {cell!r} has a control character"
+                    )
+        needed = tuple(needed)
+        missing = [name for name in needed if name not in names]
+        for former, command in _FORMER:
+            if missing and former <= set(names):
+                raise InputError(
+                    f"{file}: a table of an earlier version; '{command}' makes"
+                    " one with the columns of now"
+                )
+        if missing:
+            raise InputError(f"{file}: no column '{missing[0]}'")
+        for name in names:
+            if not name or names.count(name) > 1:
+                fault = "is there twice" if name else "has no name"
+                raise InputError(f"{file}: line 1: column '{name}' {fault}")
+        factors = [n for n in names if n not in {*needed, *known}]
+        columns = {name: k for k, name in enumerate(names)}
+        rows = [one for one in rows if any(one[1])]
+        if not rows:
+            raise InputError(f"{file}: no rows")
+        return cls(file, columns, tuple(factors), rows)
+
+    def lines(self) -> Iterator[_Line]:
+        for number, cells in self.rows:
+            if len(cells) != len(self.columns):
+                raise InputError(
+                    f"{self.file}: line {number}: {len(cells)} cells instead"
+                    f" of {len(self.columns)}"
+                )
+            yield _Line(self.file, number, self.columns, cells)
