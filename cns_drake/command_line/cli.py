@@ -30,28 +30,16 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
     ),
     simulating.repair: ("repair damaged.mcap --output whole.mcap",),
     studying.reproduce: ("reproduce metropolis --output study --quick",),
-    studying.fresh: ("fresh suburbia --number 2 --output fresh",),
-    studying.trend: (
-        "trend --vary family.yaml \\",
-        "    --query riverside_02 --output trend",
-    ),
-    learning.overlap: (
-        "overlap metropolis_01 metropolis_04 \\",
-        "    --output overlaps.csv",
-    ),
+    studying.study: ("study ladder suburbia --quick --output ladder",),
     learning.map_truth: (
         "map-truth metropolis_01 metropolis_04 \\",
         "    --output maps",
     ),
-    learning.map_pairs: ("map-pairs suburbia_5 --output pairs",),
-    studying.ladder: ("ladder metropolis --output ladder --quick",),
-    studying.levels: ("levels ours.csv theirs.csv",),
     learning.train: ("train --output mine.npz --minutes 10",),
     learning.export_pairs: (
         "export-pairs riverside_01 riverside_02 \\",
         "    --format pointnetvlad --output pairs",
     ),
-    studying.size: ("size suburbia --places 0 --output size",),
     import_city: (
         "import delft.city.jsonl \\",
         "    --years 1930 1970 2000 2020 --output delft",
@@ -59,10 +47,6 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
     age: (
         "age suburbia \\",
         "    --years 1 5 20 --seed 1 --output old_suburbia",
-    ),
-    studying.years: (
-        "years suburbia \\",
-        "    --years 5 20 --quick --output years",
     ),
     city: ("city town --start", "cns-drake city town --calibrate 01 02"),
 }
@@ -73,15 +57,23 @@ app = terminal.make_program(
     "cns-drake",
     "Cities that change, driven and recorded by simulated LiDAR.",
     example("cns-drake simulate metropolis_01 --output drives"),
+    renamed={
+        "ladder": "study ladder",
+        "levels": "study levels",
+        "size": "study size",
+        "years": "study years",
+        "fresh": "study fresh",
+        "trend": "study trend",
+        "map-pairs": "study map-pairs",
+        "overlap": "export-pairs A B --format overlap-table",
+    },
 )
 for _command, (_first, *_rest) in _EXAMPLES.items():
     app.command(
         _NAMES.get(_command),
         epilog=example(f"cns-drake {_first}", *_rest),
         # Years before today look like options.
-        context_settings={
-            "ignore_unknown_options": _command in (age, studying.years)
-        },
+        context_settings={"ignore_unknown_options": _command is age},
     )(explained(_command))
 
 

@@ -13,14 +13,11 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.options import Jobs, Scheduler
 from cns_drake.command_line.simulating import DriveNames, family_members
-from evaluation.command_line.map_updating import BaselineName
 from evaluation.command_line.options import SessionSpacing
-from evaluation.recognition.protocol import PAPER_PROTOCOL, RetrievalProtocol
 
 _Recorded = Annotated[
     str, typer.Argument(metavar="RECORDING|NAME|SCENARIO.yaml")
 ]
-_Simulated = Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")]
 
 
 class Part(str, Enum):
@@ -129,51 +126,6 @@ def export_pairs(
         print(path)
 
 
-def overlap(
-    database: _Simulated,
-    query: _Simulated,
-    *,
-    output: Annotated[Path, typer.Option(metavar="FILE.csv")],
-    query_spacing: float = PAPER_PROTOCOL.query_spacing,
-    place_spacing: float = PAPER_PROTOCOL.place_spacing,
-    max_range: float = PAPER_PROTOCOL.max_range,
-) -> None:
-    """Exact overlap of queries with places.
-
-    Rays are cast in the city of the first drive, its database, at the points of
-    the second drive's scans. Nothing is recorded.
-
-    Args:
-        output: Table to write.
-        query_spacing: Distance between two queries along the path [m].
-        place_spacing: Distance between two places of the database [m].
-        max_range: Leave out points farther than this along an axis [m].
-    """
-    with uninterrupted():
-        from cns_drake.base.files import make_folder
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.simulation.simulated_drive import DriveSimulation
-        from cns_drake.studies.exact_overlap import exact_overlaps
-        from evaluation.recognition.overlap_truth import (
-            compared_frames,
-            write_overlaps,
-        )
-
-    protocol = RetrievalProtocol(
-        query_spacing=query_spacing,
-        place_spacing=place_spacing,
-        max_range=max_range,
-    )
-    # Before minutes of work.
-    make_folder(output.parent)
-    places, queries = (
-        DriveSimulation(load_scenario(name))() for name in (database, query)
-    )
-    found = exact_overlaps(places, queries, protocol, terminal.track)
-    write_overlaps(output, *compared_frames(places, queries, protocol), found)
-    print(output)
-
-
 def map_truth(
     a: _Recorded,
     b: _Recorded,
@@ -215,40 +167,3 @@ def map_truth(
             f" {mapped} are in its map, {right} of them gone or new"
         )
     print(output)
-
-
-def map_pairs(
-    pairs: Annotated[list[str] | None, typer.Argument(metavar="PAIR")] = None,
-    *,
-    output: Annotated[Path, typer.Option(metavar="DIR")],
-    files: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
-    baseline: list[BaselineName] | None = None,
-    spacing: SessionSpacing = 1.0,
-) -> None:
-    """Make and score the frozen test pairs.
-
-    Twelve pairs of maps, four of them of imported cities, by seeds that were
-    drawn before any method ran on them. Writes cities, labelled maps and
-    map_pairs.csv. What is there already stays.
-
-    Args:
-        pairs: Test pairs; all by default.
-        output: Folder to write.
-        files: Folder of the imported cities' files.
-        baseline: Baseline to score; free-space and distance by default.
-    """
-    with uninterrupted():
-        from cns_drake.studies.map_pairs import score_pairs
-
-    chosen = baseline or (BaselineName.FREE_SPACE, BaselineName.DISTANCE)
-    print(
-        score_pairs(
-            pairs or (),
-            [one.value for one in chosen],
-            output,
-            files,
-            spacing,
-            terminal.note,
-            terminal.track,
-        )
-    )

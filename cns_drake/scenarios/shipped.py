@@ -46,6 +46,37 @@ def shipped_maps() -> dict[str, Path]:
     }
 
 
+def recordable_maps() -> list[str]:
+    """Returns the shipped maps with drives whose stage is shipped as well."""
+    return [
+        name
+        for name, folder in shipped_maps().items()
+        if MapFolder(folder).recordable_drives()
+    ]
+
+
+def recordable_map(name: str) -> Path:
+    """Returns the folder of a map whose drives can be recorded.
+
+    Args:
+        name: a shipped map, or a folder.
+
+    Raises:
+        InputError: there is no such map, or no such drive in it.
+    """
+    folder = shipped_maps().get(name, Path(name))
+    if not folder.is_dir():
+        known = ", ".join(recordable_maps())
+        raise InputError(
+            f"unknown map '{name}'; there are: {known}; or give a folder"
+        )
+    if not MapFolder(folder).recordable_drives():
+        raise InputError(
+            f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+        )
+    return folder
+
+
 def shipped_drives() -> dict[str, Path]:
     """Returns the file of each shipped drive, by name (`<map>_<NN>`)."""
     return {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import math
 import re
 from typing import Any
@@ -65,26 +65,23 @@ class Compared:
         query: the drive that asks.
         protocol: how it asks.
         distractors: number of places elsewhere that join the database.
+        asked: what the condition changes of how the query asks.
     """
 
     database: Scenario
     query: Scenario
     protocol: RetrievalProtocol
     distractors: int = 0
+    asked: Changes = field(default_factory=dict)
 
     def fingerprint(self) -> str:
         """Returns a fingerprint of what is compared, names included."""
-        asked = {
-            name: getattr(self.protocol, name)
-            for name in (*_QUERY_FIELDS, "seed")
-            if any(getattr(self.protocol, one) for one in _QUERY_FIELDS)
-        }
         return fingerprint(
             {
                 "database": self.database.model_dump(mode="json"),
                 "query": self.query.model_dump(mode="json"),
                 "distractors": self.distractors,
-                **asked,
+                **self.asked,
             }
         )
 
@@ -124,6 +121,11 @@ class PairOfDrives:
             if drive.driver.departs and drive.driver.seed is None:
                 driver = drive.driver.replaced(seed=drive.name)
                 self._unchanged[side] = drive.replaced(driver=driver)
+        self._plain = dict(self._unchanged)
+        if self.same_route:
+            self._plain["database"] = moved(
+                self._unchanged["database"], _AHEAD, *VIEWPOINTS["near"]
+            )
         # Side -> content of a drive -> the drive; equal drives share a name.
         self._known: dict[str, dict[str, Scenario]] = {
             "database": {},
@@ -153,7 +155,6 @@ class PairOfDrives:
             for side, values in one.items():
                 fields[side] = _joined(fields.get(side, {}), values)
         built: dict[str, Scenario] = {}
-        asked = dict(fields.get("protocol", {}))
         sides = {
             side: _joined(fields.get("both", {}), fields.get(side, {}))
             for side in ("database", "query")
@@ -162,16 +163,24 @@ class PairOfDrives:
             self._check_side(side, changes)
             drive = self._changed(side, changes, seed)
             built[side] = self._named(side, drive, condition, seed)
-        changes = {n: sides["query"][n] for n in _QUERY_FIELDS if n in sides["query"]}
-        if changes:
-            asked |= {**changes, "seed": seed}
-        protocol = base_protocol(asked, self.source)
+        changed = {
+            name: sides["query"][name]
+            for name in _QUERY_FIELDS
+            if name in sides["query"]
+        }
+        if changed:
+            changed["seed"] = seed
+        protocol = base_protocol(
+            {**fields.get("protocol", {}), **changed}, self.source
+        )
         if lateral := sides["database"].get("lateral"):
             # On a straight road, as many places match at any offset.
             radius = math.hypot(protocol.radius, lateral)
             protocol = replace(protocol, radius=radius)
         number = sides["database"].get("distractors", 0)
-        return Compared(built["database"], built["query"], protocol, number)
+        return Compared(
+            built["database"], built["query"], protocol, number, changed
+        )
 
     def _possible(self, fields: Mapping[str, Changes]) -> dict[str, Changes]:
         """Returns the fields of a case that the map allows.
@@ -255,7 +264,9 @@ class PairOfDrives:
         if lateral:
             viewpoint = (lateral, 0.0)
         if side == "database" and self.same_route:
-            place = self._place(side, "near" if viewpoint is None else viewpoint)
+            place = self._place(
+                side, "near" if viewpoint is None else viewpoint
+            )
             drive = moved(drive, _AHEAD, *place)
         elif viewpoint is not None:
             drive = moved(drive, 0.0, *self._place(side, viewpoint))
@@ -374,7 +385,7 @@ class PairOfDrives:
         known = self._known[side]
         if content not in known:
             name = drive.name
-            if drive != self._unchanged[side]:
+            if drive != self._plain[side]:
                 name += f"_{_ending(side, condition, seed)}"
             known[content] = drive.replaced(name=name)
         return known[content]

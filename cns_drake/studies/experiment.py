@@ -187,7 +187,7 @@ def shipped_experiments() -> dict[str, Path]:
 
 def load_experiment(
     name_or_file: str | Path,
-    overrides: Iterable[str] = (),
+    overrides: Iterable[str | tuple[str, Any]] = (),
     *,
     quick: bool = False,
 ) -> Experiment:
@@ -196,7 +196,8 @@ def load_experiment(
     Args:
         name_or_file: a shipped experiment by name, or a file.
         overrides: `FIELD=VALUE` of fields, nested ones with dots, such as
-            `database.years=[0, 5]`; values are YAML.
+            `database.years=[0, 5]`, whose value is YAML; or a top-level field
+            and its value.
         quick: whether the section `quick` replaces fields.
 
     Raises:
@@ -216,8 +217,11 @@ def load_experiment(
     values.setdefault("name", path.stem)
     if quick:
         values = _merged(values, values.get("quick") or {})
-    for text in overrides:
-        values = _merged(values, _override(text))
+    for one in overrides:
+        if isinstance(one, str):
+            values = _merged(values, _override(one))
+        else:
+            values = values | dict([one])
     experiment = validated(Experiment, values, path)
     try:
         conditions(experiment)

@@ -5,13 +5,14 @@ are absent at the earlier stage, and those that are lower there. Each is taken
 back in turn, and the drives are simulated anew.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 import shutil
 import tempfile
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import run_jobs
 from cns_drake.base.map_folder import MESH_FOLDER
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import render_stages
@@ -19,9 +20,12 @@ from cns_drake.city.plan.stages import Stage, load_stages
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.tasks.change import ChangeTask
+from cns_drake.studies.tasks.place import PlaceTask
+from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair
 from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.study import trend_databases
 from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.parts import StudyFiles
 
 _AS_IT_IS = "as_it_is"
 # Variant of the earlier stage -> its title.
@@ -36,33 +40,42 @@ _TITLES = {
 
 def knob_effects(
     earlier: Scenario, later: Scenario, cluster: Cluster
-) -> dict[str, list[trend_databases.TrendPoint]]:
+) -> dict[str, dict[str, dict[str, float]]]:
     """Simulates the pair as it is and with each knob taken back.
 
     The earlier drive is the database, and one of the same map at a later stage
-    the query. The result is title -> a point for each method.
+    the query. The result is title -> method -> metric -> value; TCR_sym is that
+    of the method "".
 
     Raises:
         InputError: the map's files cannot be used.
     """
     with tempfile.TemporaryDirectory(prefix="calibration_") as scratch:
-        folder = Path(scratch) / "map"
-        drives = _variants(earlier, later, folder)
-        points = trend_databases.measure_drives(
-            later.name,
-            DriveSimulation(later),
-            {name: DriveSimulation(drive) for name, drive in drives.items()},
-            dict.fromkeys(drives),
-            Path(scratch) / "study",
-            cluster,
-            choose_methods(),
+        drives = _variants(earlier, later, Path(scratch) / "map")
+        methods = choose_methods()
+        jobs = Jobs(StudyFiles(Path(scratch) / "study"), methods)
+        query = NamedDrive(later.name, DriveSimulation(later))
+        tasks = PlaceTask({}, ""), ChangeTask({}, "")
+        pairs = {}
+        for name, drive in drives.items():
+            database = NamedDrive(name, DriveSimulation(drive))
             # Cities were fitted to the paper's numbers.
-            PAPER_PROTOCOL,
-        )
-    return {
-        _TITLES[name]: [one for one in points if one.database == name]
-        for name in drives
-    }
+            pairs[name] = Pair(name, database, query, database, PAPER_PROTOCOL)
+            jobs.expect(pairs[name])
+        parts = {
+            name: [task.measure(pair, jobs) for task in tasks]
+            for name, pair in pairs.items()
+        }
+        run_jobs(jobs.jobs.values(), cluster)
+        effects: dict[str, dict[str, dict[str, float]]] = {}
+        for name, found in parts.items():
+            values = effects[_TITLES[name]] = {}
+            for task, part in zip(tasks, found, strict=True):
+                for one in task.numbers(part.read(), None):
+                    if not one.gate:
+                        by_metric = values.setdefault(one.method, {})
+                        by_metric[one.metric] = one.value
+        return effects
 
 
 def _variants(
@@ -109,14 +122,16 @@ def _variants(
 
 
 def effect_lines(
-    effects: Mapping[str, Sequence[trend_databases.TrendPoint]],
+    effects: Mapping[str, Mapping[str, Mapping[str, float]]],
 ) -> Iterator[str]:
     """Yields a table of TCR_sym, and of AUC and R@1 of each method."""
-    methods = [point.method for point in next(iter(effects.values()))]
+    methods = [name for name in next(iter(effects.values())) if name]
     yield "  ".join(
         [f"{'AUC/R@1':<44} TCR_sym", *(f"{m:>15}" for m in methods)]
     )
-    for title, points in effects.items():
-        numbers = [f"{p.auc:>10.3f}/{p.recall_at_1:.2f}" for p in points]
-        change = points[0].tcr_sym
+    for title, found in effects.items():
+        numbers = [
+            f"{found[m]['auc']:>10.3f}/{found[m]['r1']:.2f}" for m in methods
+        ]
+        change = found[""]["tcr_sym"]
         yield "  ".join([f"{title:<44}  {change:.4f}", *numbers])

@@ -62,9 +62,7 @@ class _MakeMap(Step):
             lambda draft: Part(draft / _PART).write(made_of, None), reporter
         )
 
-    def _make(
-        self, finish: Callable[[Path], None], reporter: Reporter
-    ) -> None:
+    def _make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
         raise NotImplementedError
 
     def _made_of(self) -> dict[str, object]:
@@ -80,9 +78,7 @@ class AgeCity(_MakeMap):
     seed: int
     rates: tuple[tuple[str, float], ...]
 
-    def _make(
-        self, finish: Callable[[Path], None], reporter: Reporter
-    ) -> None:
+    def _make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
         age_map(
             self.source,
             self.years,
@@ -110,9 +106,7 @@ class ImportCity(_MakeMap):
     source: Path
     options: ImportOptions
 
-    def _make(
-        self, finish: Callable[[Path], None], reporter: Reporter
-    ) -> None:
+    def _make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
         import_city(
             self.source,
             self.folder,
@@ -247,11 +241,11 @@ def made_map_step(
         assert made.years is not None
         path = Path(shipped.get(made.age, made.age))
         if not MapFolder(path).recordable_drives():
-            raise InputError(f"maps: {made.name}: no map {made.age!r} with drives")
+            raise InputError(
+                f"maps: {made.name}: no map {made.age!r} with drives"
+            )
         rates = tuple(sorted(DEFAULT_RATES.items()))
-        return AgeCity(
-            folder, path.resolve(), (made.years,), made.seed, rates
-        )
+        return AgeCity(folder, path.resolve(), (made.years,), made.seed, rates)
     assert made.import_file is not None
     path = Path(experiment.files or ".") / made.import_file
     if not path.is_file():

@@ -12,18 +12,16 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scenarios.shipped import recordable_map, recordable_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.report.ladder import LadderRung
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
-from evaluation.study.localisation import ComparedPair
 from evaluation.study.plan import Study
-from evaluation.study.surveys import DriveSource, RecordedDrive, Survey
+from evaluation.study.surveys import Survey
 
 
 def reproduce_maps(
@@ -55,7 +53,7 @@ def reproduce_maps(
             failed.
     """
     methods = choose_methods(own_methods, settings)
-    folders = [recordable_map(name) for name in maps or _recordable_maps()]
+    folders = [recordable_map(name) for name in maps or recordable_maps()]
     drives, controls, pictures = [], [], []
     for folder in folders:
         of_map = _drives(folder)
@@ -97,48 +95,6 @@ def reproduce_maps(
         if page.is_file()
     }
     return study.assemble(addresses, on_note)
-
-
-def stage_pairs(maps: Sequence[str] | None, output: Path) -> list[ComparedPair]:
-    """Returns the last drive of maps with each of the earlier ones.
-
-    Drives that are recorded in the folder are read, others are simulated and
-    not recorded. Levels count back from the last stage; at the cause `routes`,
-    the same routes are driven in the last stage.
-
-    Raises:
-        InputError: a map is unknown.
-    """
-
-    def source(drive: Scenario) -> DriveSource:
-        if is_recorded(drive, output):
-            return RecordedDrive(output.absolute() / drive.name)
-        return DriveSimulation(drive)
-
-    pairs = []
-    for folder in [recordable_map(name) for name in maps or _recordable_maps()]:
-        drives = _drives(folder)
-        query = max(drives, key=lambda drive: drive.stage or "")
-        older = [drive for drive in drives if drive is not query]
-        for cause, known in (
-            ("routes", control_drives(drives)),
-            ("stages", older),
-        ):
-            pairs += [
-                ComparedPair(
-                    LadderRung(
-                        folder.name,
-                        drive.name,
-                        query.name,
-                        cause,
-                        level,
-                        f"map of {drive.name}",
-                    ),
-                    (source(drive), source(query)),
-                )
-                for level, drive in enumerate(reversed(known), start=1)
-            ]
-    return pairs
 
 
 def _surveyed(recording: Job, study: Sequence[Job]) -> Job:
@@ -202,30 +158,3 @@ def recording_info(
         way=driven_way(scenario_files.describe_scenario(scenario)),
         needs=(scenario.name,) if is_waiting else (),
     )
-
-
-def _recordable_maps() -> list[str]:
-    return [
-        name
-        for name, folder in shipped_maps().items()
-        if MapFolder(folder).recordable_drives()
-    ]
-
-
-def recordable_map(name: str) -> Path:
-    """Returns the folder of a map that can be recorded.
-
-    Raises:
-        InputError: there is no such map.
-    """
-    folder = shipped_maps().get(name, Path(name))
-    if not folder.is_dir():
-        known = ", ".join(_recordable_maps())
-        raise InputError(
-            f"unknown map '{name}'; there are: {known}; or give a folder"
-        )
-    if not MapFolder(folder).recordable_drives():
-        raise InputError(
-            f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
-        )
-    return folder

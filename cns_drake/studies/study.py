@@ -16,8 +16,12 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import num_cores
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario, map_folder
-from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scenarios.shipped import (
+    recordable_map,
+    recordable_maps,
+    shipped_maps,
+)
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import (
     LAST,
@@ -88,6 +92,7 @@ class _Measured:
     factors: Mapping[str, Any]
     seed: int
     pair: Pair
+    fingerprint: str = ""
     parts: dict[str, Part] = field(default_factory=dict)
 
 
@@ -229,15 +234,13 @@ class Study:
         }
         wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
         if not maps:
-            wanted = self.experiment.maps or tuple(
-                name
-                for name, path in shipped_maps().items()
-                if MapFolder(path).recordable_drives()
-            )
+            wanted = self.experiment.maps or recordable_maps()
         names: dict[str, str] = {}
         for one in wanted:
             for some in self._drives_of(one):
-                key = " ".join((some.map_name, *map(str, some.factors.values())))
+                key = " ".join(
+                    (some.map_name, *map(str, some.factors.values()))
+                )
                 if key in names:
                     raise InputError(
                         f"{one}: another map has the name {some.map_name}, too"
@@ -338,12 +341,14 @@ class Study:
                         self.on_note,
                     )
                 ]
+            if any(task.asks for task in self._tasks):
+                for one in found:
+                    planned.expect(one.pair)
             for task in self._tasks:
                 for one in found:
-                    task.expect(one.pair, planned)
-            for task in self._tasks:
-                for one in found:
-                    one.parts[task.name] = task.measure(one.pair, planned)
+                    if task.asks or not one.pair.is_as_before:
+                        part = task.measure(one.pair, planned)
+                        one.parts[task.name] = part
             jobs |= planned.jobs
             measured += found
         return jobs, measured
@@ -353,7 +358,9 @@ class Study:
         if is_recorded(drive, self.output):
             from evaluation.study.surveys import RecordedDrive
 
-            return NamedDrive(drive.name, RecordedDrive(self.output / drive.name))
+            return NamedDrive(
+                drive.name, RecordedDrive(self.output / drive.name)
+            )
         return NamedDrive(drive.name, DriveSimulation(drive))
 
     def _simulated(self, some: _Drives) -> Iterator[_Measured]:
@@ -390,12 +397,13 @@ class Study:
                             condition,
                             {**some.factors, **condition.factors},
                             seed,
-                            self._pair(compared, query, seed),
+                            self._pair(compared, query),
+                            compared.fingerprint(),
                         )
         for text in noted:
             self.on_note(f"{some.map_name}: {text}")
 
-    def _pair(self, compared: Compared, query: Scenario, seed: int) -> Pair:
+    def _pair(self, compared: Compared, query: Scenario) -> Pair:
         database, asked = map(self._named, (compared.database, compared.query))
         way = database
         if self.experiment.drives == "same-route":
@@ -415,7 +423,7 @@ class Study:
             way,
             compared.protocol,
             compared.distractors,
-            seed,
+            bool(compared.asked or compared.distractors),
         )
 
     def _recorded(self, city: City) -> Iterator[_Measured]:
@@ -476,7 +484,7 @@ class Study:
         for one in measured:
             before = baselines.get(_place(one), {})
             base = before.get(one.seed) or next(iter(before.values()), {})
-            for task in self._tasks:
+            for task in self._measuring(one):
                 found = one.parts[task.name].read()
                 for number in task.numbers(found, base.get(task.name)):
                     yield Row(
@@ -491,17 +499,25 @@ class Study:
     def _answers(self, measured: Iterable[_Measured]) -> Iterator[Answers]:
         """Yields the answers to all queries."""
         for one in measured:
-            for task in self._tasks:
+            for task in self._measuring(one):
                 for given in task.answers(one.parts[task.name].read()):
                     yield Answers(
                         **self._key(one, task.name, given.method, given.gate),
                         columns={
-                            name: np.array([-1 if v is None else v for v in some])
+                            name: np.array(
+                                [-1 if v is None else v for v in some]
+                            )
                             if isinstance(some, list)
                             else np.asarray(some)
                             for name, some in given.columns.items()
                         },
                     )
+
+    def _measuring(self, one: _Measured) -> Iterator[Task]:
+        """Yields the tasks that a pair was measured for."""
+        for task in self._tasks:
+            if task.name in one.parts:
+                yield task
 
     def _key(
         self, one: _Measured, task: str, method: str, gate: bool
@@ -528,25 +544,6 @@ class Study:
     def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
         fields = condition.changes.get("protocol", {})
         return base_protocol(fields, self.source)
-
-
-def recordable_map(name: str) -> Path:
-    """Returns the folder of a shipped map, or one given, with drives.
-
-    Raises:
-        InputError: there is no such map, or it has no drive.
-    """
-    known = ", ".join(shipped_maps())
-    folder = shipped_maps().get(name, Path(name))
-    if not folder.is_dir():
-        raise InputError(
-            f"unknown map '{name}'; there are: {known}; or give a folder"
-        )
-    if not MapFolder(folder).recordable_drives():
-        raise InputError(
-            f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
-        )
-    return folder
 
 
 def _recording(info: RecordingInfo) -> NamedDrive:

@@ -26,7 +26,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies.ladder_rungs import mapped_from
+from cns_drake.studies.comparisons import moved
 from cns_drake.studies.redrawing import redrawn_inputs
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.learned import polar_image
@@ -119,9 +119,7 @@ class DrawnCity:
         if self.returns and returns:
             drive = drive.with_returns("calibrated")
             fields["weather"] = {"visibility": fog}
-        return mapped_from(drive, 0.0, aside, 0.0).with_fields(
-            fields, drive.name
-        )
+        return moved(drive, 0.0, aside, 0.0).with_fields(fields, drive.name)
 
     def _rng(self, purpose: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, self.number, purpose])

@@ -301,58 +301,6 @@ def report(
     print(path)
 
 
-@app.command(
-    epilog=example(
-        "cns-eval trend family/riverside_01_m* \\",
-        "    --query family/riverside_02 --output trend",
-    )
-)
-@options.explained
-@options.with_named_protocol
-def trend(
-    databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
-    query: Annotated[Path, typer.Option()],
-    output: Annotated[Path, typer.Option()],
-    control: list[Path] | None = None,
-    method: options.OwnMethods = None,
-    lidar: options.LidarName = None,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
-    parameter: options.Settings = None,
-    *,
-    protocol: RetrievalProtocol,
-) -> None:
-    """AUC over TCR_sym, of many databases.
-
-    One drive queries them all, by every method. Writes trend.csv and a figure
-    with 95 % bands. After an interruption the same command goes on where it
-    was.
-
-    Args:
-        query: The query drive.
-        output: Folder to write.
-        control: A drive on the route of the databases, but in the stage of the
-            query. It adds the kept share of AUC to the figure. May be repeated.
-    """
-    from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.study.trend import write_trend
-    from evaluation.study.trend_databases import measure_trend
-
-    cluster = choose_cluster(jobs, scheduler)
-    points = measure_trend(
-        query,
-        databases,
-        output,
-        cluster,
-        method or (),
-        protocol,
-        control or (),
-        lidar,
-        parameter or (),
-    )
-    print(write_trend(points, output))
-
-
 @app.command(epilog=example("cns-eval ranking simulated/report real/report"))
 @options.explained
 def ranking(

@@ -10,13 +10,13 @@ from typing import TypeAlias
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
-from evaluation.recognition import description
 from evaluation.methods.method import Method
+from evaluation.recognition import description
 from evaluation.recognition.costs import query_ms
 from evaluation.recognition.overlap_truth import best_overlaps
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare_with_gates
-from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource, survey_recording
@@ -166,5 +166,3 @@ def joined_places(
         descriptors=[d for one in drives for d in one.descriptors][:end],
         clouds=[cloud for one in drives for cloud in one.clouds][:end],
     )
-
-

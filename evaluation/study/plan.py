@@ -278,9 +278,7 @@ class Study:
         database, query = pair
         surveys = [self._files.survey(one.name) for one in pair]
         results = self._files.recognition(database.name, query.name)
-        runs = [
-            (one, self.protocol, one.key, one.key) for one in self.methods
-        ]
+        runs = [(one, self.protocol, one.key, one.key) for one in self.methods]
         if explains:
             runs += [
                 (one.method, one.protocol, one.places_key, one.key)

@@ -302,7 +302,9 @@ def survey_recording(
         )
         if keys is None:
             keys = [method.name for method in methods]
-            keys += [described_key(one.name, other) for one, _, other in further]
+            keys += [
+                described_key(one.name, other) for one, _, other in further
+            ]
         described = dict(zip(keys, found, strict=True))
     placed = PlacedDrive.of(recording)
     if mapped is None:

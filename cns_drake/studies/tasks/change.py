@@ -42,13 +42,13 @@ class ChangeTask(Task):
         needs: list[str] = []
 
         def mapped(drive: NamedDrive) -> Part:
-            name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
+            name = (
+                drive.name if spacing is None else f"{drive.name} {spacing:g}"
+            )
             part = jobs.files.part("mapped", name)
             needs.append(f"mapped {part.path.stem}")
             cost = _WHOLE_COST if spacing is None else _COST
-            return jobs.add(
-                part, map_city, (drive.source, spacing), cost=cost
-            )
+            return jobs.add(part, map_city, (drive.source, spacing), cost=cost)
 
         maps = mapped(pair.way), mapped(pair.query)
         part = jobs.files.part("change", pair.name)

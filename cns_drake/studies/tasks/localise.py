@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -89,10 +89,12 @@ class LocaliseTask(Task):
         part = jobs.files.part("localise", pair.name)
         return jobs.add(part, measure_localisation, arguments, cost=_COST)
 
-    def _runs(self, found: Iterable[np.ndarray]) -> Iterator[tuple[str, Any]]:
+    def _runs(self, found: Sequence[np.ndarray]) -> Iterator[tuple[str, Any]]:
         """Yields the name of each method and start, with its queries."""
         starts = self.settings["starts"]
         rows = iter(found)
+        if not found:
+            return
         for method in self.settings["methods"]:
             stem = Path(method).stem if method.endswith(".py") else method
             for radius, _ in starts:
@@ -112,9 +114,7 @@ class LocaliseTask(Task):
                 values["kept"] = float(share)
             for name, value in values.items():
                 if value is not None:
-                    yield Number(
-                        method, False, name, float(value), n=len(rows)
-                    )
+                    yield Number(method, False, name, float(value), n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answers]:
         for method, rows in self._runs(found):
@@ -126,7 +126,9 @@ class LocaliseTask(Task):
                     "query_stamp_ns": rows["stamp_ns"],
                     "correct": localise.is_right(rows),
                     "score": np.where(
-                        np.isfinite(rows["own_score"]), rows["own_score"], np.nan
+                        np.isfinite(rows["own_score"]),
+                        rows["own_score"],
+                        np.nan,
                     ),
                     "translation_error": rows["translation_error"],
                     "rotation_error_deg": rows["rotation_error_deg"],
@@ -151,7 +153,7 @@ def measure_localisation(
 
     Returns:
         (K,) of `QUERY` for each method and start, the starts of a method side
-        by side.
+        by side; nothing if the query is nowhere near the map.
     """
     del texts
     mapped, asked = database(), query()
@@ -166,9 +168,13 @@ def measure_localisation(
             maps[key] = estimators.make_map(source, settings, reporter.track)
         estimator = estimators.make_estimator(str(method), settings)
         localisers.append(localise.Localiser(maps[key], estimator, settings))
-    is_mapped = localise.mapped_frames(
-        mapped, localisers[0].surroundings, asked
-    )
+    try:
+        is_mapped = localise.mapped_frames(
+            mapped, localisers[0].surroundings, asked
+        )
+    except InputError as error:
+        reporter.note(f"{error}: not localised")
+        return []
     frames = localise.query_frames(asked, is_mapped, spacing)
     X_WS = asked.X_WS
     R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)

@@ -25,10 +25,7 @@ class PlaceTask(Task):
 
     name = "place"
     headline = "auc"
-
-    def expect(self, pair: Pair, jobs: Jobs) -> None:
-        jobs.expect(pair.database, "places", pair.protocol)
-        jobs.expect(pair.query, "queries", pair.protocol)
+    asks = True
 
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
         needs: list[str] = []
@@ -118,9 +115,7 @@ class PoseTask(PlaceTask):
                     ),
                 }
             for name, one in values.items():
-                yield Number(
-                    now.method, now.is_gated, name, one, n=with_match
-                )
+                yield Number(now.method, now.is_gated, name, one, n=with_match)
 
     def answers(self, found: Outcomes) -> Iterable[Answers]:
         # Those of `place` have the errors of poses.

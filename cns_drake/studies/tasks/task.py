@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
@@ -70,6 +69,8 @@ class Pair:
         name: a name that no other pair has.
         way: the drive along the query's way through the city of the database;
             the database itself if its route is another.
+        is_as_before: whether the two drives are those of a pair without the
+            condition, which changes how queries are asked, or adds places.
     """
 
     name: str
@@ -78,7 +79,7 @@ class Pair:
     way: NamedDrive
     protocol: RetrievalProtocol
     distractors: int = 0
-    seed: int = 1
+    is_as_before: bool = False
 
 
 @dataclass
@@ -97,13 +98,14 @@ class Jobs:
     methods: tuple[MethodChoice, ...]
     distractors: Sequence[NamedDrive] = ()
     jobs: dict[str, Job] = field(default_factory=dict)
-    _uses: Counter[str] = field(default_factory=Counter)
+    # Description -> names of the pairs that need it.
+    _uses: dict[str, set[str]] = field(default_factory=dict)
 
-    def expect(
-        self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
-    ) -> None:
-        """Notes that a pair will need descriptions of a drive."""
-        self._uses[_description_name(drive, role, protocol)] += 1
+    def expect(self, pair: Pair) -> None:
+        """Notes that a pair will need descriptions of its drives."""
+        for drive, role in _roles(pair):
+            name = _description_name(drive, role, pair.protocol)
+            self._uses.setdefault(name, set()).add(pair.name)
 
     def described(
         self,
@@ -124,7 +126,7 @@ class Jobs:
             kept: whether the parts are needed in any case.
         """
         name = _description_name(drive, role, protocol)
-        if not (kept or self._uses[name] > 1):
+        if not (kept or len(self._uses.get(name, ())) > 1):
             return drive.source
         files = self.files.survey(name)
         step = Survey(
@@ -174,6 +176,10 @@ class Jobs:
         return part
 
 
+def _roles(pair: Pair) -> tuple[tuple[NamedDrive, Role], ...]:
+    return (pair.database, "places"), (pair.query, "queries")
+
+
 def _description_name(
     drive: NamedDrive, role: Role, protocol: RetrievalProtocol
 ) -> str:
@@ -188,11 +194,14 @@ class Task(abc.ABC):
         name: name of the task in files and on the command line.
         headline: metric of which the share that is kept is computed; "" if
             there is none.
+        asks: whether it depends on how queries are asked, and on the places
+            of the database; other tasks depend on the drives alone.
         defaults: settings of an experiment's file, and their values.
     """
 
     name: ClassVar[str]
     headline: ClassVar[str] = ""
+    asks: ClassVar[bool] = False
     defaults: ClassVar[Mapping[str, Any]] = {}
 
     def __init__(self, settings: Mapping[str, Any], source: str):
@@ -206,18 +215,17 @@ class Task(abc.ABC):
             where = f"{source}: tasks.{self.name}.{name}"
             if name not in self.defaults:
                 known = ", ".join(self.defaults) or "none"
-                raise InputError(f"{where}: no such setting (there are: {known})")
+                raise InputError(
+                    f"{where}: no such setting (there are: {known})"
+                )
             self.check(name, value, where)
 
-    def check(self, name: str, value: Any, where: str) -> None:
+    def check(self, name: str, value: Any, where: str) -> None:  # noqa: B027
         """Checks a setting.
 
         Raises:
             InputError: its value is not usable.
         """
-
-    def expect(self, pair: Pair, jobs: Jobs) -> None:
-        """Notes the descriptions that `measure` will need."""
 
     @abc.abstractmethod
     def measure(self, pair: Pair, jobs: Jobs) -> Part:

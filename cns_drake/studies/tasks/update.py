@@ -50,7 +50,9 @@ class MapTask(Task):
         known = (TRUTH, *BASELINES)
         for one in value if isinstance(value, list) else [value]:
             if one not in known:
-                raise InputError(f"{where}: {one!r} is none of {', '.join(known)}")
+                raise InputError(
+                    f"{where}: {one!r} is none of {', '.join(known)}"
+                )
 
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
         methods = self.settings["methods"]
@@ -58,9 +60,7 @@ class MapTask(Task):
             # M3C2 needs the extra map-update.
             has_m3c2 = find_spec("py4dgeo") is not None
             methods = [
-                one
-                for one in (TRUTH, *BASELINES)
-                if one != "m3c2" or has_m3c2
+                one for one in (TRUTH, *BASELINES) if one != "m3c2" or has_m3c2
             ]
         arguments = (
             *(pair.database.source, pair.query.source),
