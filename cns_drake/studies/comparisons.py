@@ -223,6 +223,11 @@ class PairOfDrives:
             )
 
     def _check_side(self, side: str, changes: Changes) -> None:
+        if "fresh" in changes:
+            raise InputError(
+                f"{self.source}: {side}.fresh: it is a field of both, and of no"
+                " case"
+            )
         others = _DATABASE_FIELDS if side == "query" else _QUERY_FIELDS
         for name in others:
             if name in changes:
@@ -243,7 +248,7 @@ class PairOfDrives:
         """Returns a drive with its changed fields."""
         drive = self._unchanged[side]
         left = dict(changes)
-        for name in (*_QUERY_FIELDS, "distractors", "fresh"):
+        for name in (*_QUERY_FIELDS, "distractors"):
             left.pop(name, None)
         if "lidar" in left:
             drive = drive.with_lidar_preset(left.pop("lidar"))
@@ -419,7 +424,7 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
 def moved(
     drive: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a drive with its LiDARs moved [m] and turned to the left [deg]."""
+    """Returns a drive with LiDARs moved [m] and turned to the left [deg]."""
     lidars = {}
     for name, config in drive.lidars.items():
         (x, y, z), (roll, pitch, yaw) = config.xyz, config.rpy_deg

@@ -32,6 +32,7 @@ from cns_drake.studies.comparisons import (
 )
 from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
+    FRESH,
     Condition,
     Experiment,
     MadeMap,
@@ -75,8 +76,6 @@ TASKS: Mapping[str, type[Task]] = {
         *(MapTask, ChangeTask, CostTask),
     )
 }
-# The factor of the fresh versions of the shipped maps.
-FRESH = "both.fresh"
 _STAGE = "database.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
