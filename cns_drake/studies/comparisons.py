@@ -419,7 +419,7 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
 def moved(
     drive: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a drive with its LiDARs moved [m] and turned to the left [deg]."""
+    """Returns a drive with LiDARs moved [m] and turned to the left [deg]."""
     lidars = {}
     for name, config in drive.lidars.items():
         (x, y, z), (roll, pitch, yaw) = config.xyz, config.rpy_deg

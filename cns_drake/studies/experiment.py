@@ -98,8 +98,9 @@ class Experiment(Section):
             made; by default the shipped maps.
         files: folder of the files that `maps` import.
         drives: `same-route`: the last drive of a map queries a database of its
-            own route; `stages`: it queries each earlier drive; `first-and-last`:
-            the last drive, through the last stage, queries the first one.
+            own route; `stages`: it queries each earlier drive;
+            `first-and-last`: the last drive, through the last stage, queries
+            the first one.
         both: fields of both drives; lists are factors.
         database: fields of the drive that makes the database.
         query: fields of the drive that asks.

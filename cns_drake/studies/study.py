@@ -32,6 +32,7 @@ from cns_drake.studies.comparisons import (
 )
 from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
+    LEVEL,
     Condition,
     Experiment,
     MadeMap,
@@ -40,6 +41,7 @@ from cns_drake.studies.experiment import (
     conditions,
     method_variants,
 )
+from cns_drake.studies.frozen import check_frozen
 from cns_drake.studies.made_maps import MadeMaps, made_map_step
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import draw_fresh_cities
@@ -351,6 +353,12 @@ class Study:
                         one.parts[task.name] = part
             jobs |= planned.jobs
             measured += found
+        if self.experiment.frozen is not None:
+            prints: dict[tuple[str, int], list[str]] = {}
+            for one in measured:
+                key = one.map_name, one.factors.get(LEVEL, 0)
+                prints.setdefault(key, []).append(one.fingerprint)
+            check_frozen(self.experiment.frozen, prints)
         return jobs, measured
 
     def _named(self, drive: Scenario) -> NamedDrive:
