@@ -9,11 +9,10 @@ from typing import Annotated, Literal
 import typer
 
 from cns_drake.base import terminal
+from cns_drake.base.commands import Jobs, Scheduler, SessionSpacing
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.command_line.options import Jobs, Scheduler
 from cns_drake.command_line.simulating import DriveNames, family_members
-from evaluation.command_line.options import SessionSpacing
 from evaluation.recognition.protocol import RetrievalProtocol
 
 _Recorded = Annotated[

@@ -38,7 +38,8 @@ NO_CAUSE = "none"
 _MOST_CONDITIONS = 20_000
 
 Changes = Mapping[str, Any]
-Case = dict[Literal["both", "database", "query"], dict[str, Any]]
+Side = Literal["both", "database", "query"]
+Case = dict[Side, dict[str, Any]]
 
 
 def _in_a_tuple(value: Any) -> Any:
@@ -357,7 +358,7 @@ class _Values(list):
 
 
 def _leaves(
-    fields: Mapping[str, Any], above: tuple[str, ...]
+    fields: Mapping[Any, Any], above: tuple[str, ...]
 ) -> Iterator[tuple[str, Any]]:
     """Yields path -> value, or values, of nested fields."""
     for name, value in fields.items():

@@ -268,8 +268,8 @@ class Study:
             cities = draw_fresh_cities(
                 [one], versions, self.output / "cities", self.cluster
             )
-            for number, city in zip(versions, cities, strict=True):
-                yield _Drives(one, {FRESH: number}, self._pairs(city))
+            for number, folder in zip(versions, cities, strict=True):
+                yield _Drives(one, {FRESH: number}, self._pairs(folder))
             return
         if path.is_dir() and not MapFolder(path).drives():
             for city in group_cities(find_recordings(path, self.on_note)):
