@@ -400,8 +400,8 @@ def _nested(path: str, value: Any) -> Any:
 def _shown(value: Any) -> Any:
     """Returns a factor's value as a table holds it: a number or text."""
     if isinstance(value, dict | list):
-        text = json.dumps(value, separators=(",", ": "))
-        return text.replace('"', "").strip("{}")
+        text = json.dumps(value, separators=(",", ": ")).replace('"', "")
+        return text.strip("{}") or "none"
     return value
 
 

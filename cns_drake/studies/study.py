@@ -82,6 +82,11 @@ FRESH = "both.fresh"
 _STAGE = "database.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
+# Tables that earlier versions wrote.
+_FORMER = (
+    *("ladder.csv", "years.csv", "lifetimes.csv", "size.csv", "trend.csv"),
+    *("map_pairs.csv", "map_update.csv", "localisation.csv"),
+)
 
 
 @dataclass(frozen=True)
@@ -178,6 +183,12 @@ class Study:
 
     def run(self, maps: Sequence[str] = ()) -> Path:
         """Does the work; returns the path of the page."""
+        for name in _FORMER:
+            if (self.output / name).exists():
+                raise InputError(
+                    f"{self.output / name}: results of an older version; give"
+                    " another folder"
+                )
         drives = list(self._drives(maps))
         for some in drives:
             if some.city is None:
