@@ -33,6 +33,7 @@ RESULTS, QUERIES = "results.csv", "queries.csv"
 SETTINGS = "methods."
 _BEFORE = ("experiment", "map", "database", "query", "seed")
 _BEHIND = ("task", "method", "gate", "protocol")
+KEYS = (*_BEFORE, *_BEHIND)
 _MEASURED = ("metric", "value", "low", "high", "n")
 # Columns of a query -> what kind of value they have.
 _ANSWERS = {
@@ -124,7 +125,7 @@ class Key:
     protocol: str
 
     def __getitem__(self, column: str) -> object:
-        """Returns the value of a column; None for a factor without one."""
+        """Returns the value of a column, or `label`; None without one."""
         if column in _COLUMNS:
             return getattr(self, column)
         return self.factors.get(column)
@@ -146,7 +147,7 @@ class Key:
         The settings of a method, such as `methods.ring++.crop`, are left out
         with `method`.
         """
-        known = [n for n in (*_BEFORE, *_BEHIND) if n not in names]
+        known = [name for name in KEYS if name not in names]
         without_settings = "method" in names
         applying = (
             (name, value)
@@ -213,7 +214,9 @@ class Answers(Key):
         )
 
 
-_COLUMNS = frozenset(one.name for one in (*fields(Row), *fields(Answers)))
+_COLUMNS = frozenset(
+    ("label", *(one.name for one in (*fields(Row), *fields(Answers))))
+)
 
 
 @dataclass(frozen=True)
@@ -241,7 +244,7 @@ class Results:
                 cannot be. The line, the column and the fault are named.
         """
         file = path / RESULTS if path.is_dir() else path
-        table = _Cells.read(file, (*_BEFORE, *_BEHIND, *_MEASURED))
+        table = _Cells.read(file, (*KEYS, *_MEASURED))
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for one in table.lines():
@@ -320,9 +323,7 @@ class QueryRows:
             InputError: as `Results.read`.
         """
         file = path / QUERIES if path.is_dir() else path
-        table = _Cells.read(
-            file, (*_BEFORE, *_BEHIND, *_NEEDED_ANSWERS), tuple(_ANSWERS)
-        )
+        table = _Cells.read(file, (*KEYS, *_NEEDED_ANSWERS), tuple(_ANSWERS))
         names = [name for name in _ANSWERS if name in table.columns]
         # One key may be spelled in several ways.
         spelled: dict[tuple[str, ...], list[_Line]] = {}
