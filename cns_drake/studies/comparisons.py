@@ -142,9 +142,9 @@ class PairOfDrives:
         chosen: list[Mapping[str, Changes]] = [condition.changes]
         missing = None
         for levels in condition.causes:
-            for fields in levels:
+            for at_level in levels:
                 try:
-                    chosen.append(self._possible(fields))
+                    chosen.append(self._possible(at_level))
                     break
                 except MissingError as error:
                     missing = error

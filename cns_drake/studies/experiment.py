@@ -423,7 +423,7 @@ class _Values(list):
 
 
 def _leaves(
-    fields: Mapping[str, Any], above: tuple[str, ...]
+    fields: Mapping[Any, Any], above: tuple[str, ...]
 ) -> Iterator[tuple[str, Any]]:
     """Yields path -> value, or values, of nested fields."""
     for name, value in fields.items():
@@ -479,8 +479,8 @@ def _nested(path: str, value: Any) -> Any:
 def _shown(value: Any) -> Any:
     """Returns a factor's value as a table holds it: a number or text."""
     if isinstance(value, dict | list):
-        text = json.dumps(value, separators=(",", ": "))
-        return text.replace('"', "").strip("{}")
+        text = json.dumps(value, separators=(",", ": ")).replace('"', "")
+        return text.strip("{}") or "none"
     return value
 
 
