@@ -15,9 +15,16 @@ import itertools
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_type_hints
 
-from pydantic import BeforeValidator, Field, PlainValidator, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    create_model,
+    model_validator,
+)
 
 from cns_drake.base.errors import InputError, validated
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
@@ -535,8 +542,30 @@ def _at_level(case: Case, level: int) -> Case:
     return fields
 
 
-def base_protocol(fields: Changes, source: object) -> RetrievalProtocol:
+# The fields of a protocol that a study can vary. Both gates are measured in any
+# case; matches are by distance, and drives differ.
+_ProtocolFields = create_model(
+    "_ProtocolFields",
+    __config__=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False),
+    **{
+        name: (kind, None)
+        for name, kind in get_type_hints(
+            RetrievalProtocol, localns={"PlaceScan": Literal["middle", "first"]}
+        ).items()
+        if name not in ("gate", "overlap", "exclude_recent")
+    },
+)
+
+
+def base_protocol(
+    fields: Changes, source: object, place: str = "protocol"
+) -> RetrievalProtocol:
     """Returns the protocol of a condition's fields.
+
+    Args:
+        fields: field -> value; `base` is the protocol that has all others.
+        source: file of the experiment, for errors.
+        place: where the fields are in it.
 
     Raises:
         InputError: a field is unknown or out of range.
@@ -546,19 +575,15 @@ def base_protocol(fields: Changes, source: object) -> RetrievalProtocol:
     known = {**PROTOCOLS, "recorded": RetrievalProtocol()}
     if base not in known:
         raise InputError(
-            f"{source}: protocol.base: {base!r} is none of {', '.join(known)}"
+            f"{source}: {place}.base: {base!r} is none of {', '.join(known)}"
         )
-    unknown = set(values) - set(RetrievalProtocol.__dataclass_fields__)
-    if unknown or "gate" in values:
-        name = min(unknown or {"gate"})
-        raise InputError(f"{source}: protocol.{name}: no such field")
+    validated(_ProtocolFields, values, f"{source}: {place}")
     try:
         return replace(known[base], **values)
     except InputError as error:
-        fault = str(error).removeprefix("--").replace("-", "_", 2)
-        raise InputError(f"{source}: protocol.{fault}") from None
-    except TypeError:
-        raise InputError(f"{source}: protocol: not a number") from None
+        option, _, fault = str(error).removeprefix("--").partition(":")
+        name = option.replace("-", "_")
+        raise InputError(f"{source}: {place}.{name}:{fault}") from None
 
 
 @dataclass(frozen=True)
