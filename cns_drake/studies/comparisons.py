@@ -148,9 +148,13 @@ class PairOfDrives:
                     chosen.append(self._possible(at_level))
                     break
                 except MissingError as error:
-                    missing = error
+                    fault = error
+            else:
+                missing = fault
         if missing and len(chosen) == 1:
             raise missing
+        if missing:
+            self.on_note(str(missing))
         fields: Any = {}
         for one in chosen:
             for side, values in one.items():
@@ -208,6 +212,8 @@ class PairOfDrives:
                 found[side] = left
         if missing and not found:
             raise missing
+        if missing:
+            self.on_note(str(missing))
         return found
 
     def _check_stage(self, side: str, stage: Any) -> None:

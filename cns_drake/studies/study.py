@@ -33,6 +33,7 @@ from cns_drake.studies.comparisons import (
 )
 from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
+    CAUSE,
     FRESH,
     LEVEL,
     Condition,
@@ -424,10 +425,8 @@ class Study:
                     try:
                         compared = pair.build(condition, seed)
                     except MissingError as error:
-                        label = "condition"
-                        if condition.causes:
-                            label = str(condition.factors["cause"])
-                        noted.setdefault(f"{error}: no {label}")
+                        label = condition.factors.get(CAUSE, "a condition")
+                        noted.setdefault(f"{label} left out: {error}")
                         break
                     # A condition without random draws is measured once.
                     key = f"{condition.factors} {compared.fingerprint()}"
