@@ -251,6 +251,7 @@ class Study:
         found = {}
         for variant in method_variants(wanted):
             name = variant.name
+            place = f"methods.{name}."
             if name.endswith(".py"):
                 path = Path(name).absolute()
                 name = next(n for n, one in known.items() if one.file == path)
@@ -260,7 +261,12 @@ class Study:
                 )
             choice = replace(known[name], settings=variant.settings)
             choice.make()  # A wrong setting is found before anything slow.
-            found[choice.key] = choice, replace(variant, name=name)
+            columns = {
+                f"methods.{name}.{column.removeprefix(place)}": one
+                for column, one in variant.factors.items()
+            }
+            variant = replace(variant, name=name, factors=columns)
+            found[choice.key] = choice, variant
         return found
 
     def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
