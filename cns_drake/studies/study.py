@@ -36,6 +36,7 @@ from cns_drake.studies.experiment import (
     CAUSE,
     FRESH,
     LEVEL,
+    SIDES,
     Condition,
     Experiment,
     MadeMap,
@@ -482,19 +483,17 @@ class Study:
 
     def _recorded(self, city: City) -> Iterator[_Measured]:
         """Yields the pairs of recordings; nothing but their stage varies."""
-        allowed = {_STAGE, *_protocol_factors(self._conditions)}
-        for name in self._conditions[0].factors:
-            if name not in allowed:
-                raise InputError(
-                    f"{self.source}: {name}: the recordings of {city.name} are"
-                    " as they are; simulated drives alone can vary it"
-                )
+        self._check_recordable(city)
         for pair in city.change_pairs():
             control = city.unchanged_pair(*pair)
             for condition in self._conditions:
-                stage = condition.factors.get(_STAGE, OWN)
+                stage = condition.changes.get("database", {}).get("stage", OWN)
                 sources = pair if stage == OWN else control
-                if stage not in (OWN, LAST) or sources is None:
+                if sources is None:
+                    self.on_note(
+                        f"{city.name}: no drive on the route of {pair[0].name}"
+                        f" in the stage of {pair[1].name}"
+                    )
                     continue
                 database, query = map(_recording, sources)
                 protocol = self._protocol_of(condition)
@@ -510,6 +509,29 @@ class Study:
                         *(database, query, database),
                         protocol,
                     ),
+                )
+
+    def _check_recordable(self, city: City) -> None:
+        """Checks that no condition changes more than recordings can have."""
+        for condition in self._conditions:
+            sides = {n: condition.changes.get(n, {}) for n in SIDES}
+            given = [f"{side}.{name}" for side in sides for name in sides[side]]
+            given += [CAUSE] if condition.causes else []
+            for name in given:
+                if name != _STAGE:
+                    name = next(
+                        (n for n in condition.factors if n.startswith(name)),
+                        name,
+                    )
+                    raise InputError(
+                        f"{self.source}: {name}: the recordings of {city.name}"
+                        " are as they are; simulated drives alone can vary it"
+                    )
+            stage = sides["database"].get("stage", OWN)
+            if stage not in (OWN, LAST):
+                raise InputError(
+                    f"{self.source}: {_STAGE}: {stage!r}: recordings have"
+                    f" {OWN} and {LAST}"
                 )
 
     def _announce(self, jobs: Mapping[str, Job]) -> None:
@@ -603,10 +625,6 @@ class Study:
 
 def _recording(info: RecordingInfo) -> NamedDrive:
     return NamedDrive(info.name, info.source)
-
-
-def _protocol_factors(cells: Sequence[Condition]) -> list[str]:
-    return [name for name in cells[0].factors if name.startswith("protocol.")]
 
 
 def _base_name(database: Scenario) -> str:
