@@ -27,11 +27,14 @@ if TYPE_CHECKING:
     from evaluation.recognition.metrics import Interval
     from evaluation.recognition.place_recognition import PlaceRecognition
 
+# Command of an earlier version -> what takes its place.
+RENAMED = {"ranking": "compare --rankings"}
+
 app = terminal.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
-    renamed={"ranking": "compare --rankings"},
+    renamed=RENAMED,
 )
 
 

@@ -42,7 +42,7 @@ from evaluation.results.table import (
 
 _BASELINES = Path(__file__).with_name("baselines")
 _SHIPPED = "shipped"
-# Of these metrics less is better.
+# Metrics of which less is better.
 _LESS = re.compile(
     r"translation_\w+|rotation_\w+|\w+_ms|no_\w+|other_city|too_far|elsewhere"
     r"|lost"

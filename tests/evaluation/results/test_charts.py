@@ -224,8 +224,8 @@ def test_all_letters_can_be_read(chart, results, width):
     figure = charts.draw(chart, results, width).figure
     FigureCanvasAgg(figure).draw()
     assert figure.get_figwidth() * 96 == pytest.approx(width)
-    # Of what is drawn nothing is cut off; 12 px on a phone of 360 px, with
-    # margins of 16 px.
+    # Nothing that is drawn is cut off. Letters have 12 px, also on a phone of
+    # 360 px with margins of 16 px.
     box = figure.get_tightbbox()
     assert box.x0 >= -0.01
     assert box.x1 <= figure.get_figwidth() + 0.01
