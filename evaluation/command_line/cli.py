@@ -32,10 +32,14 @@ if TYPE_CHECKING:
     from evaluation.recognition.metrics import Interval
     from evaluation.recognition.place_recognition import PlaceRecognition
 
+# Command of an earlier version -> what takes its place.
+RENAMED = {"ranking": "compare --rankings"}
+
 app = terminal.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
+    renamed=RENAMED,
 )
 
 
@@ -306,41 +310,63 @@ def report(
     print(path)
 
 
-@app.command(epilog=example("cns-eval ranking simulated/report real/report"))
+@app.command(epilog=example("cns-eval compare mine/results.csv"))
 @explained
-def ranking(
-    first: Annotated[Path, typer.Argument(metavar="REPORT")],
-    second: Annotated[Path, typer.Argument(metavar="REPORT")],
+def compare(
+    tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
+    metric: str = "auc",
     protocol: Annotated[
-        str | None, typer.Option(metavar="fair|paper|recorded")
+        str | None, typer.Option(metavar="fair|paper|recorded|own")
     ] = None,
+    gate: Annotated[bool, typer.Option("--gate")] = False,
+    rankings: Annotated[bool, typer.Option("--rankings")] = False,
     json: options.Json = False,
 ) -> None:
-    """Whether two reports rank methods alike.
+    """Methods of several tables of results, ranked.
 
-    The reports may be of simulated and of real drives. Prints the mean AUC of
-    each method in both, and Kendall's tau, with their 95 % intervals. A report
-    is a folder with a queries.csv, or that file.
+    RESULTS are files like results.csv, or folders that hold one. Their methods
+    are ranked beside those that ship, by means over the conditions that all
+    tables have, with 95 % intervals. Where methods have a queries.csv beside
+    them, their differences have p-values. Kendall's tau says how far two tables
+    rank alike.
 
     Args:
-        protocol: Protocol of the queries that count; by default fair, or the
-            only one there is.
+        metric: Column metric of the rows to compare.
+        protocol: Compare only rows by this protocol.
+        gate: Compare rows with the gate, instead of those without.
+        rankings: Only compare the rankings, each of its own conditions, as
+            those of simulated and of real drives.
     """
-    from evaluation.recognition.rank_agreement import rank_agreement
+    from evaluation.results import comparing
 
-    found = rank_agreement(first, second, protocol=protocol)
+    found = comparing.compare(
+        tables, metric, protocol, gate=gate, rankings=rankings
+    )
+    for note in found.notes:
+        terminal.note(note)
     rows = [
-        (
-            method,
-            f"{found.first[k]:.4f} {_interval_text(found.first_intervals[k])}"
-            f"  {found.second[k]:.4f}"
-            f" {_interval_text(found.second_intervals[k])}",
-        )
-        for k, method in enumerate(found.methods)
+        (one.method, f"{number(one.value)}  {_interval_text(one.interval)}")
+        for one in found.ranked
     ]
-    low, high = map(number, (found.interval.low, found.interval.high))
-    tau = f"{number(found.tau)}  (95 %: {low} to {high})"
-    rows = [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
+    if rows:
+        where = f"mean of {found.conditions} conditions"
+        rows.insert(0, ("method", f"{metric}, {where}  [95 %]"))
+    for one in found.differences:
+        interval = _interval_text(one.difference.interval)
+        rows.append(
+            (
+                f"{one.first} - {one.second}",
+                f"{number(one.difference.value)}  {interval}"
+                f"  p {number(one.p_value)}",
+            )
+        )
+    for alike in found.agreements:
+        rows.append(
+            (
+                f"Kendall's tau, {alike.first} and {alike.second}",
+                f"{number(alike.tau)}  {_interval_text(alike.interval)}",
+            )
+        )
     options.show(found.to_json(), rows, json=json)
 
 

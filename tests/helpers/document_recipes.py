@@ -327,13 +327,25 @@ RECIPES = {
         after=("exports",),
         prints=("report/report.",),
     ),
-    "help: ranking": Recipe(
-        "cns-eval ranking simulated/report",
-        changes=(
-            ("simulated/report real/report", "output/report output/report"),
-        ),
-        after=("own city",),
-        prints=("Kendall's tau",),
+    "table of an entrant": Recipe("experiment,map,database", file="mine.csv"),
+    "compare": Recipe(
+        ".venv/bin/cns-eval compare mine.csv",
+        after=("table of an entrant",),
+        prints=("mine ", "layered-overlap "),
+    ),
+    "help: compare": Recipe(
+        "cns-eval compare mine/results.csv",
+        changes=(("mine/results.csv", "mine.csv"),),
+        after=("table of an entrant",),
+        prints=("mine ", "layered-overlap "),
+    ),
+    "means of a table": Recipe(
+        "from pathlib import Path\n\nfrom evaluation.results",
+        changes=(('"results.csv"', '"mine.csv"'),),
+        after=("table of an entrant",),
+        file="means.py",
+        command=".venv/bin/python means.py",
+        prints=("('mine', False) 0.895",),
     ),
     "help: trend of recordings": Recipe(
         "cns-eval trend family/riverside_01_m*",
@@ -847,6 +859,9 @@ NOT_RUN = {
     "cns-drake fresh": "draws shipped cities and drives through them, for many "
     "minutes; test_fresh_cities draws a small one",
     ".venv/bin/cns-drake fresh": "as the command without a path",
+    ".venv/bin/cns-drake study stages --method heights.py": "drives through "
+    "shipped cities, for an hour",
+    "method           auc, mean": "is what the recipe compare prints",
     "cns-drake levels mine": "needs these hours; test_levels has such tables",
     "cns-drake levels ours": "needs the same hours",
     "cns-eval pr --method map-closures": "needs an extra",
