@@ -33,12 +33,21 @@ if TYPE_CHECKING:
     from evaluation.recognition.place_recognition import PlaceRecognition
 
 # Command of an earlier version -> what takes its place.
-RENAMED = {"ranking": "compare --rankings"}
+RENAMED = {
+    "ranking": "compare --rankings",
+    "trend": "cns-drake study FILE.yaml FOLDER",
+}
 
 app = terminal.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
+    groups={
+        "Measure change": ("tcr",),
+        "Recognise places": ("pr", "scores", "report", "compare"),
+        "Localise, and keep maps": ("localise", "map-update", "map-sessions"),
+        "Look at drives": ("drives", "trajectory"),
+    },
     renamed=RENAMED,
 )
 
@@ -55,7 +64,7 @@ def tcr(
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
-    """Structural change of two drives or maps.
+    """Measure the structural change between two drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
@@ -130,7 +139,7 @@ def pr(
     *,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Place recognition between two drives.
+    """Recognise the places of one drive in another.
 
     Measures how well the scans of QUERY find their place in DATABASE. Both are
     recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in
@@ -227,7 +236,7 @@ def scores(
     gate: Annotated[bool, typer.Option("--gate")] = False,
     radius: float = DEFAULT_PROTOCOL.radius,
 ) -> None:
-    """Scores of all pairs of scans of folders.
+    """Score all pairs of scans of two folders.
 
     Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
     place; searches that only save time are left out. An empty score means that
@@ -322,7 +331,7 @@ def compare(
     rankings: Annotated[bool, typer.Option("--rankings")] = False,
     json: options.Json = False,
 ) -> None:
-    """Methods of several tables of results, ranked.
+    """Rank the methods of tables of results.
 
     RESULTS are files like results.csv, or folders that hold one. Their methods
     are ranked beside those that ship, by means over the conditions that all
