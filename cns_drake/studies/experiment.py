@@ -28,8 +28,13 @@ _FOLDER = Path(__file__).with_name("experiments")
 SIDES = ("both", "database", "query")
 # Places in the file of an experiment where a list of values is a factor.
 _FACTORED = (*SIDES, "protocol")
-# Fields whose value is a list itself; a list of lists is a factor.
-_LISTS = frozenset({"viewpoint", "without", "xyz", "rpy_deg"})
+# Fields whose value may be a list -> what is in it; other lists are factors.
+_LISTS: Mapping[str, tuple[type, ...]] = {
+    "viewpoint": (int, float),
+    "without": (str,),
+    "xyz": (int, float),
+    "rpy_deg": (int, float),
+}
 # A list of so many evenly spaced numbers.
 _SPREAD = {"from", "to", "count"}
 # Factors of experiments with cases: the name of the case, and its level.
@@ -54,6 +59,13 @@ def _by_name(value: Any) -> Any:
     return {str(name): {} for name in value}
 
 
+def _with_base(value: Any) -> Any:
+    """Returns the name of a protocol as a mapping without other fields."""
+    return {"base": value} if isinstance(value, str) else value
+
+
+# Fields with a short form -> what writes it out.
+_SHORT = {"tasks": _by_name, "methods": _by_name, "protocol": _with_base}
 _Settings = Annotated[dict[str, dict[str, Any]], BeforeValidator(_by_name)]
 
 
@@ -142,10 +154,9 @@ class Experiment(Section):
         tuple[Annotated[int, Field(ge=0, lt=2**31)], ...],
         BeforeValidator(_in_a_tuple),
     ] = Field(default=(1,), min_length=1)
-    protocol: Annotated[
-        dict[str, Any],
-        BeforeValidator(lambda v: {"base": v} if isinstance(v, str) else v),
-    ] = Field(default_factory=dict)
+    protocol: Annotated[dict[str, Any], BeforeValidator(_with_base)] = Field(
+        default_factory=dict
+    )
     baseline: dict[str, Any] = Field(default_factory=dict)
     frozen: str | None = None
     charts: tuple[dict[str, Any], ...] = ()
@@ -215,6 +226,10 @@ def load_experiment(
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of an experiment's fields")
     values.setdefault("name", path.stem)
+    # A single field that replaces another one leaves the rest.
+    for name, written_out in _SHORT.items():
+        if name in values:
+            values[name] = written_out(values[name])
     if quick:
         values = _merged(values, values.get("quick") or {})
     for one in overrides:
@@ -374,7 +389,8 @@ def _leaves(
 
 def _is_single(name: str, value: Sequence[Any]) -> bool:
     """Returns whether a list is one value of a field."""
-    return name in _LISTS and not any(isinstance(v, list) for v in value)
+    kinds = _LISTS.get(name)
+    return kinds is not None and all(isinstance(v, kinds) for v in value)
 
 
 def _spread(path: str, value: Mapping[str, Any]) -> list[float]:
