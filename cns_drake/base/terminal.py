@@ -1,6 +1,6 @@
 """Output of the command line: results, progress, and one-line errors."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 import json
 import math
@@ -43,6 +43,7 @@ def make_program(
     summary: str,
     epilog: str,
     renamed: Mapping[str, str] | None = None,
+    groups: Mapping[str, Sequence[str]] | None = None,
 ) -> typer.Typer:
     """Returns a program without commands, to which they are added.
 
@@ -52,6 +53,8 @@ def make_program(
     Args:
         renamed: command of an earlier version -> what to call now, after the
             program's name. Such a command is bad usage, and says so.
+        groups: heading of the help -> its commands; by default all commands
+            stand under one.
     """
 
     class Program(TyperGroup):
@@ -61,6 +64,23 @@ def make_program(
                     f"'{name} {cmd_name}' is now '{name} {renamed[cmd_name]}'"
                 )
             return super().get_command(ctx, cmd_name)
+
+        def format_commands(self, ctx: Any, formatter: Any) -> None:
+            if groups is None:
+                super().format_commands(ctx, formatter)
+            widest = max(map(len, self.commands))
+            for heading, names in (groups or {}).items():
+                limit = formatter.width - widest - 6
+                with formatter.section(heading):
+                    formatter.write_dl(
+                        [
+                            (
+                                f"{one:<{widest}}",
+                                self.commands[one].get_short_help_str(limit),
+                            )
+                            for one in names
+                        ]
+                    )
 
     app = plain_app(cls=Program, help=summary, epilog=epilog)
 

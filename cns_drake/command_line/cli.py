@@ -7,10 +7,10 @@ at once. Interrupts wait during imports.
 from collections.abc import Callable
 
 from cns_drake.base import terminal
+from cns_drake.base.commands import explained
 from cns_drake.base.terminal import example
 from cns_drake.command_line import learning, simulating, studying
 from cns_drake.command_line.maps import age, city, import_city, list_drives
-from evaluation.command_line.options import explained
 
 # Command -> its example, line by line.
 _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
@@ -57,6 +57,16 @@ app = terminal.make_program(
     "cns-drake",
     "Cities that change, driven and recorded by simulated LiDAR.",
     example("cns-drake simulate metropolis_01 --output drives"),
+    groups={
+        "Make cities": ("import", "age", "city"),
+        "Drive through them": (
+            *("list", "simulate", "scan", "generate", "repair"),
+        ),
+        "Study what change costs": (
+            *("study", "reproduce", "train", "map-truth"),
+        ),
+        "Convert for other programs": ("export", "export-pairs"),
+    },
     renamed={
         "ladder": "study ladder",
         "levels": "study levels",

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import typer
 
 from cns_drake.base import terminal
+from cns_drake.base.commands import Jobs, Scheduler, SessionSpacing
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.command_line.options import Jobs, Scheduler
 from cns_drake.command_line.simulating import DriveNames, family_members
-from evaluation.command_line.options import SessionSpacing
+from evaluation.recognition.protocol import RetrievalProtocol
 
 _Recorded = Annotated[
     str, typer.Argument(metavar="RECORDING|NAME|SCENARIO.yaml")
@@ -78,13 +78,17 @@ def train(
 def export_pairs(
     names: DriveNames = None,
     *,
-    format: Annotated[Literal["pointnetvlad", "overlap"], typer.Option()],
+    format: Annotated[
+        Literal["pointnetvlad", "overlap", "overlap-table"], typer.Option()
+    ],
     output: Annotated[Path, typer.Option()],
     vary: Annotated[Path | None, typer.Option(metavar="FAMILY.yaml")] = None,
     held_out: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     spacing: Annotated[float, typer.Option(min=0.1, metavar="METRES")] = 10.0,
     scans: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
-    max_range: Annotated[float, typer.Option(min=1.0, metavar="METRES")] = 50.0,
+    max_range: Annotated[
+        float | None, typer.Option(min=1.0, metavar="METRES")
+    ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -94,14 +98,16 @@ def export_pairs(
     are exact. After an interruption the same command goes on.
 
     Args:
-        format: Clouds and pickles of PointNetVLAD, or scans with exact
-            overlaps.
+        format: Clouds and pickles of PointNetVLAD; scans with exact overlaps;
+            or only the table of exact overlaps that cns-eval pr
+            --exact-overlaps reads, of a database and a query.
         output: Folder of the set; created if need be.
         vary: Export the members of a family, too.
         held_out: A drive for the evaluation alone; may be repeated.
         spacing: Between two clouds of a drive.
         scans: Merge N consecutive scans into each cloud, a submap.
-        max_range: Leave out points with a greater x, y or z.
+        max_range: Leave out points with a greater x, y or z; by default 50, for
+            the table 100.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -119,7 +125,23 @@ def export_pairs(
     learned = [load_scenario(name) for name in names or ()]
     if vary is not None:
         learned += family_members(vary, output, cluster)
-    options = pair_export.ExportOptions(format, spacing, scans, max_range)
+    if format == "overlap-table":
+        if len(learned) != 2 or tested:
+            raise InputError(
+                "--format overlap-table: give two drives, database and query"
+            )
+        protocol = RetrievalProtocol(
+            query_spacing=spacing, max_range=max_range or 100.0
+        )
+        print(
+            pair_export.write_overlap_table(
+                learned[0], learned[1], output, protocol, terminal.track
+            )
+        )
+        return
+    options = pair_export.ExportOptions(
+        format, spacing, scans, max_range or 50.0
+    )
     for path in pair_export.export_pairs(
         learned, tested, output, options, cluster
     ):

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cns_drake.base.commands import Jobs
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
-from cns_drake.command_line.options import Jobs
 from cns_drake.imports.options import (
     REPORT_NAME,
     DriveOn,

@@ -1,6 +1,5 @@
 """Options that several commands and the diagram scripts share."""
 
-from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -37,22 +36,6 @@ Graphviz = Annotated[
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace an existing recording.")
 ]
-Jobs = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        help="Work on this machine, on N jobs side by side; by default one "
-        "for each core.",
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Work on the cluster of this Dask scheduler; by default "
-        "DASK_SCHEDULER_ADDRESS, if set.",
-    ),
-]
 Maps = Annotated[
     list[str] | None,
     typer.Argument(
@@ -62,22 +45,6 @@ Maps = Annotated[
 ]
 
 
-class Task(str, Enum):
-    """What drives are compared for."""
-
-    PLACE = "place"
-    LOCALISE = "localise"
-    MAP = "map"
-
-
-TaskName = Annotated[
-    Task,
-    typer.Option(
-        "--task",
-        help="Recognise places, localise scans in the map of the older "
-        "drive, or find what of that map must be updated.",
-    ),
-]
 MethodFiles = Annotated[
     list[Path] | None,
     typer.Option(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress_bars import count_progress, show_progress
@@ -238,8 +239,8 @@ def generate(
     *,
     output: options.Output,
     frames: options.Frames = None,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
+    jobs: commands.Jobs = None,
+    scheduler: commands.Scheduler = None,
     overwrite: options.Overwrite = False,
     vary: Annotated[Path | None, typer.Option(metavar="FAMILY.yaml")] = None,
 ) -> None:

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from cns_drake.base import commands
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
 from cns_drake.command_line import options
-from evaluation.command_line.options import Costs, Settings, with_named_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol_options import with_named_protocol
 
 
 @with_named_protocol
@@ -20,13 +21,13 @@ def reproduce(
     maps: options.Maps = None,
     *,
     output: options.Output,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
+    jobs: commands.Jobs = None,
+    scheduler: commands.Scheduler = None,
     pages: Annotated[bool | None, typer.Option("--pages/--no-pages")] = None,
     quick: Annotated[bool, typer.Option("--quick")] = False,
     method: options.MethodFiles = None,
-    parameter: Settings = None,
-    costs: Costs = True,
+    parameter: commands.MethodSettings = None,
+    costs: commands.Costs = True,
     protocol: RetrievalProtocol,
 ) -> None:
     """Simulate a map, evaluate it and report.
@@ -71,8 +72,8 @@ def study(
     override: Annotated[
         list[str] | None, typer.Option("--set", metavar="FIELD=VALUE")
     ] = None,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
+    jobs: commands.Jobs = None,
+    scheduler: commands.Scheduler = None,
     list_all: Annotated[bool, typer.Option("--list")] = False,
     show: Annotated[bool, typer.Option("--show")] = False,
 ) -> None:

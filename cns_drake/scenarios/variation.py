@@ -148,7 +148,7 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
 def vary(
     base: Scenario,
     family: Family,
-    source: Path,
+    source: Path | str,
     redraw: Redraw | None = None,
 ) -> list[Scenario]:
     """Returns the members of a family; `source` is its file.
@@ -248,7 +248,7 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
 
 
 def _check_redrawable(
-    base: Scenario, family: Family, last: str, source: Path
+    base: Scenario, family: Family, last: str, source: Path | str
 ) -> None:
     """Checks that the city can be drawn anew."""
     why = (
@@ -269,7 +269,7 @@ def _check_redrawable(
 
 
 def _difference(
-    base: Scenario, stage: str, other: str, source: Path
+    base: Scenario, stage: str, other: str, source: Path | str
 ) -> frozenset[str]:
     """Returns the structures of a stage that another one lacks."""
     names = []
@@ -322,7 +322,7 @@ def _is_on_a_lot(row: Mapping[str, str]) -> bool:
 
 
 def _draw_losses(
-    table: Path, parts: Mapping[str, float], seed: int, source: Path
+    table: Path, parts: Mapping[str, float], seed: int, source: Path | str
 ) -> frozenset[str]:
     """Draws the missing structures, each class independently.
 

@@ -142,9 +142,9 @@ class PairOfDrives:
         chosen: list[Mapping[str, Changes]] = [condition.changes]
         missing = None
         for levels in condition.causes:
-            for fields in levels:
+            for at_level in levels:
                 try:
-                    chosen.append(self._possible(fields))
+                    chosen.append(self._possible(at_level))
                     break
                 except MissingError as error:
                     missing = error
@@ -419,7 +419,7 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
 def moved(
     drive: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a drive with its LiDARs moved [m] and turned to the left [deg]."""
+    """Returns a drive with LiDARs moved [m] and turned to the left [deg]."""
     lidars = {}
     for name, config in drive.lidars.items():
         (x, y, z), (roll, pitch, yaw) = config.xyz, config.rpy_deg

@@ -43,7 +43,8 @@ NO_CAUSE = "none"
 _MOST_CONDITIONS = 20_000
 
 Changes = Mapping[str, Any]
-Case = dict[Literal["both", "database", "query"], dict[str, Any]]
+Side = Literal["both", "database", "query"]
+Case = dict[Side, dict[str, Any]]
 
 
 def _in_a_tuple(value: Any) -> Any:
@@ -110,8 +111,9 @@ class Experiment(Section):
             made; by default the shipped maps.
         files: folder of the files that `maps` import.
         drives: `same-route`: the last drive of a map queries a database of its
-            own route; `stages`: it queries each earlier drive; `first-and-last`:
-            the last drive, through the last stage, queries the first one.
+            own route; `stages`: it queries each earlier drive;
+            `first-and-last`: the last drive, through the last stage, queries
+            the first one.
         both: fields of both drives; lists are factors.
         database: fields of the drive that makes the database.
         query: fields of the drive that asks.
@@ -371,7 +373,7 @@ class _Values(list):
 
 
 def _leaves(
-    fields: Mapping[str, Any], above: tuple[str, ...]
+    fields: Mapping[Any, Any], above: tuple[str, ...]
 ) -> Iterator[tuple[str, Any]]:
     """Yields path -> value, or values, of nested fields."""
     for name, value in fields.items():
@@ -414,8 +416,8 @@ def _nested(path: str, value: Any) -> Any:
 def _shown(value: Any) -> Any:
     """Returns a factor's value as a table holds it: a number or text."""
     if isinstance(value, dict | list):
-        text = json.dumps(value, separators=(",", ": "))
-        return text.replace('"', "").strip("{}")
+        text = json.dumps(value, separators=(",", ": ")).replace('"', "")
+        return text.strip("{}") or "none"
     return value
 
 

@@ -137,7 +137,7 @@ class MadeMaps:
     _ages: dict[tuple[Path, tuple[tuple[str, float], ...], int], set[int]] = (
         field(default_factory=dict)
     )
-    _steps: dict[Path, Step] = field(default_factory=dict)
+    _steps: dict[Path, RedrawCity] = field(default_factory=dict)
 
     def want_age(
         self, drive: Scenario, years: Any, rates: Any, seed: int
@@ -189,10 +189,12 @@ class MadeMaps:
             )
             for (path, rates, seed), years in self._ages.items()
         ]
+        every: list[tuple[Path, Step]] = [(one.folder, one) for one in steps]
+        every += self._steps.items()
         run_jobs(
             [
-                Job(f"city {step.folder.name}", step, cost=15.0)
-                for step in (*steps, *self._steps.values())
+                Job(f"city {folder.name}", step, cost=15.0)
+                for folder, step in every
             ],
             cluster,
         )

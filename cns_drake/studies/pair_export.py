@@ -24,6 +24,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import encode_bin
+from cns_drake.base.progress import Track, silent
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.simulation.simulated_drive import DriveSimulation
@@ -31,6 +32,10 @@ from cns_drake.studies.exact_overlap import exact_overlaps
 from cns_drake.transient.world_structures import GROUND_CLASSES
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.maps.voxel_maps import thin
+from evaluation.recognition.overlap_truth import (
+    compared_frames,
+    write_overlaps,
+)
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.parts import MakePart, Part
 
@@ -64,6 +69,35 @@ class ExportOptions:
     spacing: float = 10.0
     scans: int = 1
     max_range: float = 50.0
+
+
+def write_overlap_table(
+    database: Scenario,
+    query: Scenario,
+    output: Path,
+    protocol: RetrievalProtocol,
+    track: Track = silent,
+) -> Path:
+    """Writes `<output>/overlaps.csv`: the overlap of queries with places.
+
+    Args:
+        database: the drive of the places, in whose city rays are cast.
+        query: the drive of the queries.
+        output: the folder; made if need be.
+        protocol: gives queries, places and range.
+        track: reports progress.
+
+    Raises:
+        InputError: the drives are of two maps, or cannot be simulated.
+    """
+    # Before minutes of work.
+    make_folder(output)
+    places, queries = (DriveSimulation(one)() for one in (database, query))
+    found = exact_overlaps(places, queries, protocol, track)
+    path = output / "overlaps.csv"
+    frames = compared_frames(places, queries, protocol)
+    write_overlaps(path, *frames, found)
+    return path
 
 
 def export_pairs(

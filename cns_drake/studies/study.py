@@ -32,6 +32,7 @@ from cns_drake.studies.comparisons import (
 )
 from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
+    LEVEL,
     Condition,
     Experiment,
     MadeMap,
@@ -40,6 +41,7 @@ from cns_drake.studies.experiment import (
     conditions,
     method_variants,
 )
+from cns_drake.studies.frozen import check_frozen
 from cns_drake.studies.made_maps import MadeMaps, made_map_step
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import draw_fresh_cities
@@ -80,6 +82,11 @@ FRESH = "both.fresh"
 _STAGE = "database.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
+# Tables that earlier versions wrote.
+_FORMER = (
+    *("ladder.csv", "years.csv", "lifetimes.csv", "size.csv", "trend.csv"),
+    *("map_pairs.csv", "map_update.csv", "localisation.csv"),
+)
 
 
 @dataclass(frozen=True)
@@ -176,6 +183,12 @@ class Study:
 
     def run(self, maps: Sequence[str] = ()) -> Path:
         """Does the work; returns the path of the page."""
+        for name in _FORMER:
+            if (self.output / name).exists():
+                raise InputError(
+                    f"{self.output / name}: results of an older version; give"
+                    " another folder"
+                )
         drives = list(self._drives(maps))
         for some in drives:
             if some.city is None:
@@ -266,8 +279,8 @@ class Study:
             cities = draw_fresh_cities(
                 [one], versions, self.output / "cities", self.cluster
             )
-            for number, city in zip(versions, cities, strict=True):
-                yield _Drives(one, {FRESH: number}, self._pairs(city))
+            for number, folder in zip(versions, cities, strict=True):
+                yield _Drives(one, {FRESH: number}, self._pairs(folder))
             return
         if path.is_dir() and not MapFolder(path).drives():
             for city in group_cities(find_recordings(path, self.on_note)):
@@ -351,6 +364,12 @@ class Study:
                         one.parts[task.name] = part
             jobs |= planned.jobs
             measured += found
+        if self.experiment.frozen is not None:
+            prints: dict[tuple[str, int], list[str]] = {}
+            for one in measured:
+                key = one.map_name, one.factors.get(LEVEL, 0)
+                prints.setdefault(key, []).append(one.fingerprint)
+            check_frozen(self.experiment.frozen, prints)
         return jobs, measured
 
     def _named(self, drive: Scenario) -> NamedDrive:

@@ -13,13 +13,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import terminal
+from cns_drake.base import commands, terminal
+from cns_drake.base.commands import explained
 from cns_drake.base.terminal import example, number
 from evaluation.command_line import options
 from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
 from evaluation.command_line.trajectories import drives, trajectory
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol_options import (
+    with_named_protocol,
+    with_protocol,
+)
 
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
@@ -37,7 +42,7 @@ app = terminal.make_program(
 @app.command(
     epilog=example("cns-eval tcr drives/metropolis_01 drives/metropolis_04")
 )
-@options.explained
+@explained
 def tcr(
     source: Annotated[Path, typer.Argument(metavar="A")],
     target: Annotated[Path, typer.Argument(metavar="B")],
@@ -84,7 +89,7 @@ def tcr(
 
 
 app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(
-    options.explained(drives)
+    explained(drives)
 )
 
 
@@ -94,8 +99,8 @@ app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(
         "    --method scan-context++",
     )
 )
-@options.explained
-@options.with_protocol
+@explained
+@with_protocol
 def pr(
     database: Annotated[Path, typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
@@ -207,7 +212,7 @@ def pr(
         "    --query kitti/sequences/04/velodyne",
     )
 )
-@options.explained
+@explained
 def scores(
     method: options.MethodName,
     database: Annotated[Path, typer.Option()],
@@ -255,21 +260,21 @@ app.command(
         "cns-eval localise drives/metropolis_01 \\",
         "    drives/metropolis_04 --method gicp --start 1",
     )
-)(options.explained(localise))
+)(explained(localise))
 
 
 @app.command(epilog=example("cns-eval report drives --output report"))
-@options.explained
-@options.with_named_protocol
+@explained
+@with_named_protocol
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option()],
     method: options.OwnMethods = None,
-    parameter: options.Settings = None,
+    parameter: commands.MethodSettings = None,
     lidar: options.LidarName = None,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
-    costs: options.Costs = True,
+    jobs: commands.Jobs = None,
+    scheduler: commands.Scheduler = None,
+    costs: commands.Costs = True,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -302,7 +307,7 @@ def report(
 
 
 @app.command(epilog=example("cns-eval ranking simulated/report real/report"))
-@options.explained
+@explained
 def ranking(
     first: Annotated[Path, typer.Argument(metavar="REPORT")],
     second: Annotated[Path, typer.Argument(metavar="REPORT")],
@@ -344,17 +349,17 @@ app.command(
         "cns-eval trajectory drives/metropolis_04 \\",
         "    results/latest/metropolis_04_poses_tum.txt",
     )
-)(options.explained(trajectory))
+)(explained(trajectory))
 
 app.command(epilog=example("cns-eval map-update maps --baseline distance"))(
-    options.explained(map_update)
+    explained(map_update)
 )
 app.command(
     epilog=example(
         "cns-eval map-sessions mulran/KAIST01 mulran/KAIST02 \\",
         "    --output kaist",
     )
-)(options.explained(map_sessions))
+)(explained(map_sessions))
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import terminal
+from cns_drake.base import commands, terminal
 from evaluation.command_line import options
 
 
@@ -30,7 +30,7 @@ def localise(
     odometry_drift: Annotated[float, typer.Option(metavar="PART")] = 0.01,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
-    jobs: options.Jobs = None,
+    jobs: commands.Jobs = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     json: options.Json = False,
 ) -> None:

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
-from evaluation.command_line.options import Json, LidarName, SessionSpacing
+from cns_drake.base.commands import SessionSpacing
+from evaluation.command_line.options import Json, LidarName
 
 
 class BaselineName(str, Enum):

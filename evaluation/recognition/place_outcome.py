@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.recognition.description import DescribedDrive
 from evaluation.recognition.fault_kinds import NEARLY
+from evaluation.recognition.metrics import (
+    UNKNOWN,
+    Interval,
+    percentile_interval,
+    pr_curve,
+    resampled_metrics,
+    resampled_weights,
+)
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
+from evaluation.recognition.survival import kept_share
 
 # Kinds of wrong best places, in order of precedence.
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
@@ -59,7 +67,7 @@ class PlaceOutcome:
         method: str,
         is_gated: bool,
         retrieval: Retrieval,
-        query: DescribedDrive,
+        query: tuple[np.ndarray, np.ndarray],
         drives: Sequence[str],
         overlaps: np.ndarray,
         radius: float,
@@ -70,7 +78,7 @@ class PlaceOutcome:
             method: that made the scores.
             is_gated: whether they were gated.
             retrieval: retrieval of Q queries and D places.
-            query: the drive of the queries.
+            query: (Q,) stamps [ns] and (Q, 3) places [m] of the queries.
             drives: D names of the drives of the places; that of the query's
                 own city comes first.
             overlaps: (Q,) of the best match of each query.
@@ -87,8 +95,8 @@ class PlaceOutcome:
                 retrieval.scores, retrieval.matches, retrieval.query_blocks
             ),
             query_frames=retrieval.query_frames,
-            stamps_ns=query.queries.stamps_ns,
-            p_WQs=query.queries.p_WSs,
+            stamps_ns=query[0],
+            p_WQs=query[1],
             match_drives=names,
             match_frames=np.where(
                 best >= 0, retrieval.database_frames[best], -1
@@ -129,3 +137,81 @@ class PlaceOutcome:
             "",
             np.select(wrong, FAULTS[:-1], FAULTS[-1]),
         ).tolist()
+
+    def columns(self) -> dict[str, np.ndarray | list]:
+        """Returns the columns of `queries.csv` for each of the Q queries."""
+        outcomes = self.outcomes
+        blocks = outcomes.blocks
+        return {
+            "query_frame": self.query_frames,
+            "query_stamp_ns": self.stamps_ns,
+            "query_x": self.p_WQs[:, 0],
+            "query_y": self.p_WQs[:, 1],
+            "query_z": self.p_WQs[:, 2],
+            "block": np.arange(len(outcomes)) if blocks is None else blocks,
+            "correct": outcomes.is_right,
+            "has_match": outcomes.has_match,
+            "score": outcomes.best_scores,
+            "first_right_rank": outcomes.known_ranks,
+            "why": self.faults(),
+            "match_drive": self.match_drives,
+            "match_frame": self.match_frames,
+            "distance": self.distances,
+            "translation_error": self.pose_errors.translation,
+            "rotation_error_deg": self.pose_errors.rotation_deg,
+            "overlap": self.overlaps,
+            "visible_change": 1.0 - self.overlaps,
+        }
+
+
+def place_numbers(
+    now: PlaceOutcome, before: PlaceOutcome | None
+) -> Iterator[tuple[str, float, Interval]]:
+    """Yields name, value and 95 % interval of the numbers of a method.
+
+    Intervals are by bootstrap over blocks of the route; a sample has the same
+    ones in the baseline.
+
+    Args:
+        now: its outcome in a condition.
+        before: its outcome in the baseline, for what is kept, lost and found.
+    """
+    outcomes = now.outcomes
+    curve = pr_curve(outcomes)
+    with_match = int(outcomes.has_match.sum())
+    strict = curve.strict_auc(with_match)
+    weights = resampled_weights(len(outcomes), blocks=outcomes.blocks)
+    areas, recalls, stricts = resampled_metrics(outcomes, weights)
+    interval = percentile_interval
+    yield "auc", curve.auc, interval(areas)
+    yield "auc_strict", strict, interval(stricts)
+    yield "r1", outcomes.recall_at(1), interval(recalls)
+    if before is not None:
+        then = pr_curve(before.outcomes)
+        strict_then = then.strict_auc(int(before.outcomes.has_match.sum()))
+        shares = [UNKNOWN] * 2
+        if is_paired := len(before.outcomes) == len(outcomes):
+            drawn = resampled_metrics(before.outcomes, weights)
+            drawn_auc, _, drawn_strict = drawn
+            shares = [
+                interval(kept_share(one, other))
+                for one, other in (
+                    (areas, drawn_auc),
+                    (stricts, drawn_strict),
+                )
+            ]
+        yield "kept", float(kept_share(curve.auc, then.auc)), shares[0]
+        yield "kept_strict", float(kept_share(strict, strict_then)), shares[1]
+        if is_paired:
+            right, was = outcomes.is_right, before.outcomes.is_right
+            yield "lost", float((was & ~right).sum()), UNKNOWN
+            yield "found", float((right & ~was).sum()), UNKNOWN
+    yield "with_match", float(with_match), UNKNOWN
+    yield "places", float(outcomes.num_places), UNKNOWN
+    why = now.faults()
+    for name in FAULTS:
+        yield name, float(why.count(name)), UNKNOWN
+    yield "hidden", float(now.num_hidden), UNKNOWN
+    known = now.overlaps[~np.isnan(now.overlaps)]
+    if len(known):
+        yield "visible_change", 1.0 - float(known.mean()), UNKNOWN

@@ -1,4 +1,181 @@
-def write_page(results, queries, folder, **k):
-    p = folder / "index.html"
-    p.write_text("x")
-    return p
+"""One page of an experiment: what it found, its charts, numbers and file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+import math
+from pathlib import Path
+import re
+import tempfile
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from cns_drake.base.files import make_folder, write_text
+from cns_drake.base.version import __version__
+from evaluation.report.drawing import save
+from evaluation.report.tables import in_table_order
+from evaluation.results import charts as drawing
+from evaluation.results.summaries import means
+from evaluation.results.table import KEYS, QueryRows, Results
+
+_TASKS = {
+    "place": "Place recognition",
+    "pose": "Poses of places that were found",
+    "localise": "Localisation in the map",
+    "map": "What of the map changed",
+    "change": "Structural change",
+    "cost": "Costs",
+}
+_DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3"}
+
+
+def write_page(
+    results: Results,
+    queries: QueryRows | None,
+    folder: Path,
+    *,
+    title: str,
+    about: str = "",
+    charts: Sequence[Mapping[str, Any]] = (),
+    experiment_text: str = "",
+    notes: Iterable[str] = (),
+) -> Path:
+    """Writes `index.html`, which needs no other file, and the charts for print.
+
+    Args:
+        results: the table, beside the page as `results.csv`.
+        queries: that of queries, beside it as `queries.csv`; None without.
+        folder: to write into.
+        title: of the page.
+        about: the question, in words.
+        charts: see `charts`; the headline is what the first one shows.
+        experiment_text: the experiment as YAML.
+        notes: what else a reader has to know, such as settings.
+
+    Returns:
+        The path of the page.
+
+    Raises:
+        InputError: a chart cannot be drawn, or a file cannot be written.
+    """
+    make_folder(folder)
+    shown = []
+    for number, chart in enumerate(charts, start=1):
+        alone = drawing.draw(chart, results, alone=True)
+        save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
+        svgs = {
+            name: _svg(
+                drawing.draw(chart, results, width).figure, f"{name}{number}"
+            )
+            for name, width in (
+                ("wide", drawing.WIDE),
+                ("narrow", drawing.NARROW),
+            )
+        }
+        shown.append({"message": alone.message, "legend": alone.legend, **svgs})
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["shown"] = _shown
+    answers = queries.answers if queries else ()
+    text = environment.get_template("page.html").render(
+        title=title,
+        about=about,
+        headline=shown[0]["message"] if shown else title,
+        charts=shown,
+        summary=[_summary(results, task) for task in results.distinct("task")],
+        table=_wide_table(results),
+        experiment_text=experiment_text,
+        notes=list(notes),
+        protocols=list(filter(None, results.distinct("protocol"))),
+        queries=sum(len(one.columns["correct"]) for one in answers),
+        version=__version__,
+        wide=drawing.WIDE,
+        dashes=_DASHES,
+    )
+    path = folder / "index.html"
+    write_text(path, text)
+    return path
+
+
+def _svg(figure: Any, prefix: str) -> Markup:
+    """Returns a drawing as an element whose ids no other drawing has."""
+    with tempfile.TemporaryDirectory() as folder:
+        stem = Path(folder) / "chart"
+        save(figure, stem, ("svg",))
+        text = stem.with_suffix(".svg").read_text()
+    text = text[text.index("<svg") :]
+    return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
+
+
+def _summary(results: Results, task: str) -> dict[str, Any]:
+    """Returns the means of a task's metrics, without and with the gate."""
+    rows = results.where(task=task).rows
+    metrics = list(dict.fromkeys(row.metric for row in rows))
+    found = {
+        one.key: one
+        for one in means(rows, "label", "gate", "metric")
+        if one.number
+    }
+    names = in_table_order(row.label for row in rows)
+    lines = [
+        {
+            "name": (drawing.titled(name) or "–")
+            + (", with the gate" if gate else ""),
+            "cells": [found.get((name, gate, metric)) for metric in metrics],
+        }
+        for gate in sorted({row.gate for row in rows})
+        for name in names
+        if any((name, gate, metric) in found for metric in metrics)
+    ]
+    return {
+        "name": _TASKS.get(task, task),
+        "metrics": list(map(drawing.words, metrics)),
+        "rows": lines,
+    }
+
+
+def _wide_table(results: Results) -> dict[str, Any]:
+    """Returns a line for each condition and method, a column a metric.
+
+    Columns that have the same value in all lines are left out.
+    """
+    lines: dict[tuple, dict[str, Any]] = {}
+    for row in results.rows:
+        line = lines.setdefault(row.but(), {})
+        if not line:
+            line.update((n, row[n]) for n in (*KEYS, *results.factors))
+        line[row.metric] = row.value
+    metrics = results.distinct("metric")
+    varied = [
+        name
+        for name in (*KEYS, *results.factors)
+        if len({line[name] for line in lines.values()}) > 1
+    ]
+    names = [*varied, *metrics]
+    cells = [[line.get(name) for name in names] for line in lines.values()]
+    is_text = [
+        any(isinstance(v, str) for v in column)
+        for column in zip(*cells, strict=True)
+    ]
+    return {
+        "header": list(zip(names, is_text, strict=True)),
+        "rows": [[_shown(value) for value in line] for line in cells],
+    }
+
+
+def _shown(value: object) -> str:
+    """Returns a value for a reader."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, float):
+        return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.0f}"
+    return str(value)

@@ -145,8 +145,8 @@ def kept_rows(
         if one.metric == "auc":
             interval = kept_interval(answers.at(one, baseline), answers.at(one))
         metric = KEPT[one.task, one.metric]
-        ends = {"low": interval.low, "high": interval.high}
-        found.append(replace(one, metric=metric, value=share, **ends))
+        kept = replace(one, metric=metric, value=share)
+        found.append(replace(kept, low=interval.low, high=interval.high))
     return found
 
 
@@ -519,8 +519,8 @@ def check_same_queries(one: Answers, other: Answers) -> None:
     Raises:
         InputError: otherwise.
     """
-    frames = [a.columns["query_frame"] for a in (one, other)]
-    if not np.array_equal(*frames):
+    frames, others = (a.columns["query_frame"] for a in (one, other))
+    if not np.array_equal(frames, others):
         raise InputError(
             f"{one.experiment}: {one.database}, {one.query}: {one.label} and"
             f" {other.label} answered different queries"

@@ -33,6 +33,7 @@ RESULTS, QUERIES = "results.csv", "queries.csv"
 SETTINGS = "methods."
 _BEFORE = ("experiment", "map", "database", "query", "seed")
 _BEHIND = ("task", "method", "gate", "protocol")
+KEYS = (*_BEFORE, *_BEHIND)
 _MEASURED = ("metric", "value", "low", "high", "n")
 # Columns of a query -> what kind of value they have.
 _ANSWERS = {
@@ -124,7 +125,7 @@ class Key:
     protocol: str
 
     def __getitem__(self, column: str) -> object:
-        """Returns the value of a column; None for a factor without one."""
+        """Returns the value of a column, or `label`; None without one."""
         if column in _COLUMNS:
             return getattr(self, column)
         return self.factors.get(column)
@@ -146,7 +147,7 @@ class Key:
         The settings of a method, such as `methods.ring++.crop`, are left out
         with `method`.
         """
-        known = [n for n in (*_BEFORE, *_BEHIND) if n not in names]
+        known = [name for name in KEYS if name not in names]
         without_settings = "method" in names
         applying = (
             (name, value)
@@ -213,7 +214,9 @@ class Answers(Key):
         )
 
 
-_COLUMNS = frozenset(one.name for one in (*fields(Row), *fields(Answers)))
+_COLUMNS = frozenset(
+    ("label", *(one.name for one in (*fields(Row), *fields(Answers))))
+)
 
 
 @dataclass(frozen=True)
@@ -241,7 +244,7 @@ class Results:
                 cannot be. The line, the column and the fault are named.
         """
         file = path / RESULTS if path.is_dir() else path
-        table = _Cells.read(file, (*_BEFORE, *_BEHIND, *_MEASURED))
+        table = _Cells.read(file, (*KEYS, *_MEASURED))
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for one in table.lines():
@@ -320,34 +323,23 @@ class QueryRows:
             InputError: as `Results.read`.
         """
         file = path / QUERIES if path.is_dir() else path
-        table = _Cells.read(
-            file, (*_BEFORE, *_BEHIND, *_NEEDED_ANSWERS), tuple(_ANSWERS)
-        )
+        table = _Cells.read(file, (*KEYS, *_NEEDED_ANSWERS), tuple(_ANSWERS))
         names = [name for name in _ANSWERS if name in table.columns]
-        # The same key has the same cells in all its lines, but for spelling.
-        spelled: dict[tuple[str, ...], dict[str, Any]] = {}
-        found: dict[tuple[object, ...], tuple[dict[str, Any], list]] = {}
-        lines: dict[object, int] = {}
+        # One key may be spelled in several ways.
+        spelled: dict[tuple[str, ...], list[_Line]] = {}
+        found: dict[tuple[object, ...], tuple[dict, list[_Line]]] = {}
         for one in table.lines():
             cells = one.cells_of((*_BEFORE, *table.factors, *_BEHIND))
             if cells not in spelled:
-                spelled[cells] = one.key(table.factors)
-            key = spelled[cells]
-            identity = Key(**key).but()
-            answer = [one.value(name, _ANSWERS[name]) for name in names]
-            _check_answer(
-                one, key["task"], dict(zip(names, answer, strict=True))
-            )
-            frame = (identity, answer[names.index("query_frame")])
-            first = lines.setdefault(frame, one.number)
-            if first != one.number:
-                raise one.fault("query_frame", f"the same is in line {first}")
-            found.setdefault(identity, (key, []))[1].append(answer)
+                key = one.key(table.factors)
+                _, lines = found.setdefault(Key(**key).but(), (key, []))
+                spelled[cells] = lines
+            spelled[cells].append(one)
         return cls(
             table.factors,
             tuple(
-                Answers(**key, columns=_arrays(names, rows))
-                for key, rows in found.values()
+                Answers(**key, columns=_answered(lines, names, key["task"]))
+                for key, lines in found.values()
             ),
         )
 
@@ -400,13 +392,39 @@ def _answer_cell(value: Any, kind: type) -> str:
     return str(int(value)) if kind in (bool, int) else _cell(value)
 
 
-def _arrays(names: Sequence[str], rows: list) -> dict[str, np.ndarray]:
-    columns = zip(*rows, strict=True)
-    return {
-        name: np.array(column, dtype=object if kind is str else kind)
-        for name, column in zip(names, columns, strict=True)
-        for kind in (_ANSWERS[name],)
-    }
+def _answered(
+    lines: Sequence[_Line], names: Iterable[str], task: str
+) -> dict[str, np.ndarray]:
+    """Returns the columns of a key's lines, which fit each other."""
+    columns: dict[str, np.ndarray] = {}
+    for name in names:
+        kind = _ANSWERS[name]
+        values = [one.value(name, kind) for one in lines]
+        columns[name] = np.array(values, dtype=object if kind is str else kind)
+    frames = columns["query_frame"]
+    again = np.ones(len(frames), dtype=bool)
+    again[np.unique(frames, return_index=True)[1]] = False
+    right, has_match = columns["correct"], columns["has_match"]
+    rank = columns.get("first_right_rank", np.full(len(frames), -1))
+    is_place = task == "place"
+    for name, is_wrong, fault in (
+        ("query_frame", frames < 0, "empty"),
+        ("query_frame", again, "this query is there twice"),
+        ("correct", is_place & right & ~has_match, "1, without a match"),
+        (
+            "score",
+            is_place & right & np.isnan(columns["score"]),
+            "empty, but the best place is right",
+        ),
+        (
+            "first_right_rank",
+            is_place & (rank >= 0) & ((rank == 1) != right),
+            "1 means correct, and the reverse",
+        ),
+    ):
+        if is_wrong.any():
+            raise lines[int(is_wrong.argmax())].fault(name, fault)
+    return columns
 
 
 def _measured(one: _Line) -> dict[str, Any]:
@@ -436,18 +454,6 @@ def _measured(one: _Line) -> dict[str, Any]:
         "high": high,
         "n": None if n < 0 else n,
     }
-
-
-def _check_answer(one: _Line, task: str, answer: Mapping[str, Any]) -> None:
-    if task != "place":
-        return
-    if answer["correct"] and not answer["has_match"]:
-        raise one.fault("correct", "1, but the query has no match")
-    if answer["correct"] and math.isnan(answer["score"]):
-        raise one.fault("score", "a place that is right needs a number")
-    rank = answer.get("first_right_rank", -1)
-    if rank >= 0 and (rank == 1) != answer["correct"]:
-        raise one.fault("first_right_rank", f"{rank} does not fit correct")
 
 
 @dataclass(frozen=True)
@@ -551,13 +557,17 @@ class _Cells:
         except csv.Error as error:
             raise InputError(f"{file}: not CSV: {error}") from None
         for number, row in [(1, names), *rows]:
-            for k, cell in enumerate(row):
-                if not cell.isprintable():
-                    name = names[k] if number > 1 and k < len(names) else k + 1
-                    raise InputError(
-                        f"{file}: line {number}: column {name!r}:"
-                        f" {cell!r} has a control character"
-                    )
+            if not "".join(row).isprintable():
+                k, cell = next(
+                    (k, cell)
+                    for k, cell in enumerate(row)
+                    if not cell.isprintable()
+                )
+                name = names[k] if number > 1 and k < len(names) else k + 1
+                raise InputError(
+                    f"{file}: line {number}: {name}: {cell!r} has a control"
+                    " character"
+                )
         needed = tuple(needed)
         missing = [name for name in needed if name not in names]
         for former, command in _FORMER:

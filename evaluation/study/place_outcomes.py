@@ -97,7 +97,7 @@ def measure_places(
                 choice.key,
                 is_gated,
                 one,
-                asked,
+                (asked.queries.stamps_ns, asked.queries.p_WSs),
                 drives,
                 overlaps,
                 protocol.radius,

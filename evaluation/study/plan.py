@@ -18,6 +18,7 @@ from evaluation.report import page, result_tables
 from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.survival import draw_survival
+from evaluation.results.table import RESULTS
 from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
@@ -30,6 +31,7 @@ from evaluation.study.collection import (
 )
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.parts import MakePart, StudyFiles
+from evaluation.study.report_rows import report_rows
 from evaluation.study.surveys import Further, Survey
 
 # Expected seconds: for the maps of a drive of 3000 scans, for its places or
@@ -98,7 +100,8 @@ class Study:
 
         Files: `report.html`, which holds everything; `report.md`; `survival`,
         `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
-        .csv (all numbers), .md and .tex; `metrics.csv`, the metrics of other
+        .csv (all numbers), .md and .tex; `results.csv`, the one table of all
+        studies; `metrics.csv`, the metrics of other
         benchmarks; `differences.csv`, the differences between methods;
         `why.csv`, the reasons for wrong best places; `queries.csv` and
         `queries_unchanged.csv`, every query of the pairs and of their controls;
@@ -143,6 +146,7 @@ class Study:
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
+        report_rows(report).write_csv(self.output / RESULTS)
         return page.write_report(report, self.output)
 
     def _pairs(self, city: City) -> list[Pair]:

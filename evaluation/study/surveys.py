@@ -385,7 +385,10 @@ class Survey(Step):
             reporter.track,
             with_scans=self.with_scans,
             with_map=self.with_map,
-            further=[(one.make(), *others) for _, one, *others in further],
+            further=[
+                (one.make(), roles, protocol)
+                for _, one, roles, protocol in further
+            ],
             keys=[*(one.key for one in methods), *(key for key, *_ in further)],
         )
 

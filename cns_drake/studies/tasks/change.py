@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class ChangeTask(Task):
     """TCR_sym of the two drives, or of the query's way through both cities."""
 
     name = "change"
-    defaults: Mapping[str, Any] = {"spacing": None}
+    defaults: ClassVar[Mapping[str, Any]] = {"spacing": None}
 
     def check(self, name: str, value: Any, where: str) -> None:
         if value is not None:

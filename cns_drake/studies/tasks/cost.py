@@ -25,10 +25,7 @@ class CostTask(Task):
         needs: list[str] = []
         database, query = (
             jobs.described(drive, role, pair.protocol, needs, kept=True)
-            for drive, role in (
-                (pair.database, "places"),
-                (pair.query, "queries"),
-            )
+            for drive, role in pair.roles
         )
         assert isinstance(database, tuple)
         assert isinstance(query, tuple)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class LocaliseTask(Task):
 
     name = "localise"
     headline = "success_03m_1deg"
-    defaults: Mapping[str, Any] = {
+    defaults: ClassVar[Mapping[str, Any]] = {
         "methods": list(SHIPPED),
         "starts": [[2.0, 10.0]],
         "spacing": None,

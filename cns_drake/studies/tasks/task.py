@@ -81,6 +81,11 @@ class Pair:
     distractors: int = 0
     is_as_before: bool = False
 
+    @property
+    def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
+        """Both drives, each with the role of its scans."""
+        return (self.database, "places"), (self.query, "queries")
+
 
 @dataclass
 class Jobs:
@@ -103,7 +108,7 @@ class Jobs:
 
     def expect(self, pair: Pair) -> None:
         """Notes that a pair will need descriptions of its drives."""
-        for drive, role in _roles(pair):
+        for drive, role in pair.roles:
             name = _description_name(drive, role, pair.protocol)
             self._uses.setdefault(name, set()).add(pair.name)
 
@@ -174,10 +179,6 @@ class Jobs:
         step = MakePart(part, function, arguments)
         self.jobs[name] = Job(name, step, tuple(needs), cost)
         return part
-
-
-def _roles(pair: Pair) -> tuple[tuple[NamedDrive, Role], ...]:
-    return (pair.database, "places"), (pair.query, "queries")
 
 
 def _description_name(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 import tempfile
-from typing import Any
+from typing import Any, ClassVar
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
@@ -41,7 +41,7 @@ class MapTask(Task):
     """Which points of two maps are kept, gone, new or not observed."""
 
     name = "map"
-    defaults: Mapping[str, Any] = {"methods": None, "spacing": 5.0}
+    defaults: ClassVar[Mapping[str, Any]] = {"methods": None, "spacing": 5.0}
 
     def check(self, name: str, value: Any, where: str) -> None:
         if name == "spacing":

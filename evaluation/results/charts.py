@@ -1,0 +1,468 @@
+"""Four kinds of charts, each described by a mapping in an experiment's file.
+
+- `dumbbell` (`over`, `metric`): at the first and the last value of a factor.
+- `lines` (`over`, `metric`): over a numeric factor, with a band from the least
+  to the greatest of seeds.
+- `matrix` (`over`, `metric`, `strips`): methods over the values of a factor, of
+  which each may have a strip for each value of another one.
+- `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
+  smooth line and its 95 % band.
+
+All other keys are columns of the table with the values that are shown. By
+default the task is `place`, the gate 0. Methods keep their colours, and the
+title is what the chart shows, in words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+import math
+import textwrap
+from typing import Any
+
+from matplotlib import colormaps, rc_context
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from evaluation.report.drawing import METHOD_STYLES, plain
+from evaluation.report.tables import in_table_order, title
+from evaluation.results.summaries import correlations, means, paired_values
+from evaluation.results.table import Results, Row
+
+# Widths [px] on a screen and on a phone.
+WIDE, NARROW = 860, 358
+_PX = 1.0 / 96.0
+# [pt]; more than 12 px, on a phone of 360 px as well.
+_FONT = 10.0
+_ROW = 22.0
+# Styles of methods that are not shipped; the first are those of reports.
+_OTHERS = (
+    ("#000000", "-.", "X"),
+    ("#8C564B", ":", "p"),
+    ("#882255", "-", "<"),
+    ("#44AA99", "--", ">"),
+    ("#999933", "-.", "h"),
+    ("#6F6F6F", ":", "*"),
+)
+_METRICS = {
+    "auc": "AUC",
+    "auc_strict": "AUC strict",
+    "r1": "R@1",
+    "kept": "kept share",
+    "tcr_sym": "TCR_sym",
+    "miou": "mean IoU",
+    "query_ms": "time of a query [ms]",
+}
+# Told apart by all kinds of colour vision, and light enough for letters.
+_COLOURS = LinearSegmentedColormap.from_list(
+    "shares", colormaps["RdYlBu"](np.linspace(0.15, 0.8, 64))
+)
+_BANDWIDTH = 0.15
+_RESAMPLES = 1000
+_LEAST_POINTS = 5
+_GRID = 60
+# Beyond this ratio of its values, an axis is logarithmic.
+_WIDE_RANGE = 50.0
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A chart.
+
+    Attributes:
+        message: what it shows, in words.
+        figure: the drawing.
+        legend: name -> colour, line style and marker; empty where the drawing
+            has the names.
+    """
+
+    message: str
+    figure: Figure
+    legend: Mapping[str, tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
+class _Chart:
+    """What a chart is made of."""
+
+    keys: Mapping[str, str]
+    results: Results
+    rows: Sequence[Row]
+    styles: Mapping[str, tuple[str, str, str]]
+    width: int
+
+    @property
+    def metric(self) -> str:
+        return self.keys.get("metric", self.keys.get("y", ""))
+
+    @property
+    def maps(self) -> list[str]:
+        return list(dict.fromkeys(row.map for row in self.rows))
+
+    def panels(self, height: float) -> tuple[Figure, list[Axes]]:
+        """Returns a figure with a panel for each map, of a height [px]."""
+        columns = 1 if self.width < WIDE else min(2, len(self.maps))
+        lines = math.ceil(len(self.maps) / columns)
+        figure = self.figure(lines * height)
+        grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
+        for axes in grid.flat[len(self.maps) :]:
+            axes.axis("off")
+        for axes, name in zip(grid.flat, self.maps, strict=False):
+            axes.set_title(plain(name), loc="left")
+        return figure, list(grid.flat[: len(self.maps)])
+
+    def figure(self, height: float) -> Figure:
+        size = self.width * _PX, height * _PX
+        return Figure(figsize=size, layout="constrained")
+
+
+def draw(
+    chart: Mapping[str, Any],
+    results: Results,
+    width: int = WIDE,
+    *,
+    alone: bool = False,
+) -> Drawn:
+    """Draws a chart of a table.
+
+    Args:
+        chart: a mapping as above.
+        results: the table.
+        width: of the drawing [px].
+        alone: whether it has its message and legend with it.
+
+    Raises:
+        InputError: there is no such kind or column, or no such row.
+    """
+    kind = chart.get("kind")
+    if kind not in _KINDS:
+        raise InputError(
+            f"charts: kind: {kind!r} is none of {', '.join(_KINDS)}"
+        )
+    draw_kind, needed, optional = _KINDS[kind]
+    for name in needed:
+        if not isinstance(chart.get(name), str):
+            raise InputError(f"charts: {kind}: {name}: a name is needed")
+    keys = {n: chart[n] for n in (*needed, *optional) if n in chart}
+    metric = keys.get("metric", keys.get("y"))
+    chosen = {n: v for n, v in chart.items() if n != "kind" and n not in keys}
+    for name in (*chosen, *(keys[n] for n in keys if n in ("over", "strips"))):
+        if not any(row[name] is not None for row in results.rows):
+            raise InputError(f"charts: {kind}: {name}: the table has none")
+    chosen = {"task": "place", "gate": 0, **chosen}
+    rows = results.where(chosen, metric=metric).rows
+    rows = tuple(row for row in rows if not math.isnan(row.value))
+    if not rows:
+        raise InputError(f"charts: {kind}: the table has no {metric} like that")
+    names = in_table_order(row.label for row in rows)
+    drawn = _Chart(keys, results, rows, styles(names), width)
+    legend = drawn.styles if kind in ("lines", "scatter") else {}
+    with rc_context({"font.size": _FONT, "axes.titlesize": "medium"}):
+        message, figure = draw_kind(drawn)
+        if alone:
+            figure.suptitle(plain(textwrap.fill(message, width // 9)))
+        if alone and legend:
+            handles = [
+                Line2D([], [], color=c, linestyle=s, marker=m, label=plain(one))
+                for one, (c, s, m) in legend.items()
+            ]
+            figure.legend(handles=handles, loc="outside right center")
+    return Drawn(message, figure, legend)
+
+
+def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
+    """Returns title -> colour, line style and marker of each method."""
+    others = [name for name in labels if name not in METHOD_STYLES]
+    return {
+        titled(name): METHOD_STYLES.get(name)
+        or _OTHERS[others.index(name) % len(_OTHERS)]
+        for name in labels
+    }
+
+
+def titled(label: str) -> str:
+    """Returns a method as its authors write it, with its settings."""
+    method, comma, settings = label.partition(",")
+    return f"{title(method)}{comma}{settings}"
+
+
+def words(name: str) -> str:
+    """Returns the name of a metric or a factor in words."""
+    return _METRICS.get(name, name.rpartition(".")[2].replace("_", " "))
+
+
+def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
+    over = chart.keys["over"]
+    values = chart.results.distinct(over)
+    before, after = values[0], values[-1]
+    found = {
+        (titled(one.key[0]), *one.key[1:]): one.value
+        for one in means(chart.rows, "label", "map", over)
+    }
+    places: list[tuple[str, float]] = []
+    figure = chart.figure(
+        (len(chart.styles) * (len(chart.maps) + 1) + 3) * _ROW
+    )
+    axes = figure.subplots()
+    for name, (colour, _, marker) in chart.styles.items():
+        places.append((name, len(places)))
+        for one in chart.maps:
+            y = float(len(places))
+            places.append((one, y))
+            ends = [
+                found.get((name, one, v), math.nan) for v in (before, after)
+            ]
+            axes.plot(ends, [y, y], color=colour, lw=2.5, alpha=0.5)
+            axes.plot(ends[0], y, marker, color=colour, mfc="white", ms=7)
+            axes.plot(ends[1], y, marker, color=colour, ms=7)
+    axes.set_yticks([y for _, y in places], [plain(one) for one, _ in places])
+    for label in axes.get_yticklabels():
+        if label.get_text() in map(plain, chart.styles):
+            label.set_fontweight("bold")
+    axes.set_ylim(len(places) - 0.4, -0.7)
+    axes.set_xlabel(
+        plain(
+            f"{words(chart.metric)}; {words(over)} {before} (hollow), {after}"
+            " (filled)"
+        )
+    )
+    axes.grid(axis="x", alpha=0.3)
+    axes.tick_params(length=0)
+    shares = {}
+    for name in chart.styles:
+        both = [
+            np.mean([found.get((name, one, v), math.nan) for one in chart.maps])
+            for v in (before, after)
+        ]
+        shares[name] = (
+            float(both[1] / both[0]),
+            f"{both[1]:.2f} of {both[0]:.2f}",
+        )
+    best, worst = _ends(shares)
+    return (
+        f"{best[0]} keeps most of its {words(chart.metric)} ({best[1]}),"
+        f" {worst[0]} least ({worst[1]})",
+        figure,
+    )
+
+
+def _ends(found: Mapping[str, tuple[float, str]]) -> list[tuple[str, str]]:
+    """Returns the methods with the most and the least, and what they have.
+
+    Args:
+        found: method -> its number, and that in words.
+    """
+    order = sorted(
+        found.items(), key=lambda one: (math.isnan(one[1][0]), -one[1][0])
+    )
+    known = [one for one in order if not math.isnan(one[1][0])] or order
+    return [(name, text) for name, (_, text) in (known[0], known[-1])]
+
+
+def _lines(chart: _Chart) -> tuple[str, Figure]:
+    over = chart.keys["over"]
+    figure, panels = chart.panels(280.0)
+    last: dict[str, list[float]] = {}
+    at = sorted({_number(row, over) for row in chart.rows})
+    for axes, name in zip(panels, chart.maps, strict=True):
+        rows = [row for row in chart.rows if row.map == name]
+        for label, (colour, style, marker) in chart.styles.items():
+            some = [row for row in rows if titled(row.label) == label]
+            points = sorted(means(some, over), key=lambda one: one.key)
+            x = [one.key[0] for one in points]
+            y, low, high = (
+                [getattr(one, end) for one in points]
+                for end in ("value", "least", "greatest")
+            )
+            axes.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
+            axes.plot(x, y, linestyle=style, marker=marker, color=colour, ms=5)
+            if x[-1:] == at[-1:]:
+                last.setdefault(label, []).append(y[-1])
+        _spread(axes, at)
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3)
+    figure.supxlabel(plain(words(over)), fontsize=_FONT)
+    figure.supylabel(plain(words(chart.metric)), fontsize=_FONT)
+    found = {n: (np.mean(v), f"{np.mean(v):.2f}") for n, v in last.items()}
+    best, worst = _ends(found)
+    return (
+        f"At {at[-1]:g} {words(over)}, the {words(chart.metric)} is greatest with"
+        f" {best[0]} ({best[1]}) and least with {worst[0]} ({worst[1]})",
+        figure,
+    )
+
+
+def _number(row: Row, column: str) -> float:
+    value = row[column]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"charts: {column}: {value!r} is no number")
+    return float(value)
+
+
+def _spread(axes: Axes, at: Sequence[float]) -> None:
+    """Makes an axis logarithmic whose values need it."""
+    above = [one for one in at if one > 0.0]
+    if min(at) >= 0.0 and above and max(above) / min(above) > _WIDE_RANGE:
+        axes.set_xscale("symlog", linthresh=min(above))
+        axes.set_xticks(list(at), [f"{one:g}" for one in at])
+        axes.minorticks_off()
+
+
+def _matrix(chart: _Chart) -> tuple[str, Figure]:
+    over, strips = chart.keys["over"], chart.keys.get("strips")
+    values = list(dict.fromkeys(row[over] for row in chart.rows))
+    figure, panels = chart.panels((len(values) + 4) * _ROW)
+    names = list(chart.styles)
+    weakest: list[tuple[float, str, str]] = []
+    for axes, one in zip(panels, chart.maps, strict=True):
+        cells: dict[tuple[int, int], list[tuple[Any, float]]] = {}
+        of_map = [row for row in chart.rows if row.map == one]
+        for mean in means(of_map, "label", over, strips or over):
+            x = names.index(titled(mean.key[0]))
+            cell = cells.setdefault((x, values.index(mean.key[1])), [])
+            cell.append((mean.key[2], mean.value))
+        for (x, y), some in cells.items():
+            shares = [share for _, share in sorted(some, key=_level)]
+            for k, share in enumerate(shares):
+                axes.add_patch(
+                    Rectangle(
+                        (x + k / len(shares), y),
+                        1.0 / len(shares),
+                        1.0,
+                        color=_COLOURS(min(share, 1.0)),
+                        lw=0,
+                    )
+                )
+            text = f"{100.0 * shares[-1]:.0f}"
+            axes.text(x + 0.5, y + 0.5, text, ha="center", va="center")
+            weakest.append((shares[-1], names[x], _word(values[y])))
+        axes.set(xlim=(0, len(names)), ylim=(len(values), 0))
+        middles = np.arange(len(names)) + 0.5
+        axes.set_xticks(middles, map(plain, names), rotation=45, ha="right")
+        for label in axes.get_xticklabels():
+            label.set_rotation_mode("anchor")
+        axes.set_yticks(
+            np.arange(len(values)) + 0.5, [plain(_word(v)) for v in values]
+        )
+        axes.tick_params(length=0)
+        axes.vlines(range(1, len(names)), 0, len(values), "white", lw=2)
+        axes.hlines(range(1, len(values)), 0, len(names), "white", lw=2)
+        axes.spines[:].set_visible(False)
+    text = f"{words(chart.metric)} in per cent"
+    if strips is not None:
+        text += f"; a strip for each {words(strips)}, the number of the last"
+    text = textwrap.fill(text, chart.width // 8)
+    figure.supxlabel(plain(text), fontsize=_FONT)
+    share, name, worst = min(weakest)
+    return (
+        f"The worst case is {name} under {worst}: {words(chart.metric)}"
+        f" {share:.2f}",
+        figure,
+    )
+
+
+def _level(cell: tuple[Any, float]) -> tuple[bool, Any]:
+    return isinstance(cell[0], str), cell[0]
+
+
+def _word(value: object) -> str:
+    return str(value).replace("_", " ")
+
+
+def _scatter(chart: _Chart) -> tuple[str, Figure]:
+    x_name, y_name = chart.keys["x"], chart.keys["y"]
+    shown = {row.but() for row in chart.rows}
+    points = [
+        (row, at)
+        for row, at in paired_values(chart.results, x_name, y_name)
+        if row.but() in shown
+    ]
+    if not points:
+        raise InputError(f"charts: scatter: no {y_name} has a {x_name}")
+    figure = chart.figure(380.0)
+    axes = figure.subplots()
+    for label, (colour, style, marker) in chart.styles.items():
+        known = sorted(
+            (at, row.value) for row, at in points if titled(row.label) == label
+        )
+        if not known:
+            continue
+        x, y = np.array(known).T
+        axes.plot(x, y, marker, color=colour, ms=5, alpha=0.55, mew=0)
+        if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
+            axes.plot(x, y, style, color=colour)
+            continue
+        grid = np.linspace(x[0], x[-1], _GRID)
+        low, high = smooth_band(x, y, grid)
+        axes.fill_between(grid, low, high, color=colour, alpha=0.18, lw=0)
+        axes.plot(grid, smooth(x, y, grid), style, color=colour)
+    axes.set(xlabel=plain(words(x_name)), ylabel=plain(words(y_name)))
+    axes.grid(alpha=0.3)
+    # The sign of a correlation with the metric itself, not with its failure.
+    selected = Results.of(
+        [row for row in chart.results.rows if row.metric != y_name]
+        + list(chart.rows)
+    )
+    found = {
+        titled(one.method): (-one.rho[0][0], f"{-one.rho[0][0]:+.2f}")
+        for one in correlations(selected, [x_name], y_name)
+    }
+    best, worst = _ends(found)
+    return (
+        f"Rank correlation of {words(y_name)} with {words(x_name)}: from"
+        f" {worst[1]} ({worst[0]}) to {best[1]} ({best[0]})",
+        figure,
+    )
+
+
+def smooth(x: np.ndarray, y: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Returns the local linear regression of y over x at places (M,).
+
+    Not all x are equal. Gaussian weights; Fan and Gijbels, Local Polynomial
+    Modelling (1996), equation 3.1 with p = 1.
+    """
+    width = _BANDWIDTH * max(np.ptp(grid), 1e-12)
+    offset = x[None, :] - grid[:, None]
+    weight = np.exp(-0.5 * (offset / width) ** 2)
+    s0, s1, s2 = ((weight * offset**power).sum(axis=1) for power in (0, 1, 2))
+    t0, t1 = ((weight * offset**power) @ y for power in (0, 1))
+    determinant = s0 * s2 - s1**2
+    # One distinct value of x has no slope, only a mean.
+    flat = determinant <= 1e-12 * s0 * width**2 * s0
+    safe = np.where(flat, 1.0, determinant)
+    return np.where(flat, t0 / s0, (s2 * t0 - s1 * t1) / safe)
+
+
+def smooth_band(
+    x: np.ndarray, y: np.ndarray, grid: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the 95 % band of `smooth` by resampling points."""
+    rng = np.random.default_rng(0)
+    curves = np.empty((_RESAMPLES, len(grid)))
+    for k in range(_RESAMPLES):
+        drawn = rng.integers(len(x), size=len(x))
+        curves[k] = smooth(x[drawn], y[drawn], grid)
+    low, high = np.percentile(curves, [2.5, 97.5], axis=0)
+    return low, high
+
+
+# Kind -> how it is drawn, names that it needs, and others.
+_KINDS: Mapping[
+    Any,
+    tuple[
+        Callable[[_Chart], tuple[str, Figure]],
+        tuple[str, ...],
+        tuple[str, ...],
+    ],
+] = {
+    "dumbbell": (_dumbbell, ("over", "metric"), ()),
+    "lines": (_lines, ("over", "metric"), ()),
+    "matrix": (_matrix, ("over", "metric"), ("strips",)),
+    "scatter": (_scatter, ("x", "y"), ()),
+}

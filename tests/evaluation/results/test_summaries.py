@@ -1,0 +1,281 @@
+"""Summaries of tables whose numbers are known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+
+from cns_drake.base.errors import InputError
+from evaluation.recognition.metrics import Interval
+from evaluation.results import summaries
+from evaluation.results.table import Answers, QueryRows, Results, Row
+
+YEARS, SNOW = "database.years", "query.transient.snow"
+BLOCKS = np.repeat(np.arange(5), 4)
+
+
+def key(factors, method="btc", seed=1, task="place", gate=False, town="town"):
+    return {
+        "experiment": "e",
+        "map": town,
+        "database": f"{town}_01",
+        "query": f"{town}_02",
+        "seed": seed,
+        "factors": factors,
+        "task": task,
+        "method": method,
+        "gate": gate,
+        "protocol": "fair",
+    }
+
+
+def row(value, factors, metric="auc", **names):
+    return Row(**key(factors, **names), metric=metric, value=value, n=20)
+
+
+def answers(right, factors, **names):
+    """Answers with equal scores to queries that all have a match.
+
+    AUC is the part that is right: precision at recall 1.
+    """
+    right = np.asarray(right, dtype=bool)
+    number = len(right)
+    return Answers(
+        **key(factors, **names),
+        columns={
+            "query_frame": np.arange(number),
+            "block": BLOCKS[:number],
+            "correct": right,
+            "has_match": np.ones(number, dtype=bool),
+            "score": np.full(number, 0.5),
+        },
+    )
+
+
+def firsts(number):
+    return np.arange(20) < number
+
+
+def shares_of_samples(unchanged, changed):
+    """Returns kept shares of samples of five blocks, drawn as all are."""
+    draws = np.random.default_rng([0, 5]).integers(5, size=(1000, 5))
+    parts = [
+        np.reshape(one, (5, 4)).sum(axis=1) for one in (changed, unchanged)
+    ]
+    after, before = (part[draws].sum(axis=1) for part in parts)
+    return after / before
+
+
+def test_means_stand_between_the_least_and_the_greatest():
+    rows = [
+        row(0.1 * seed + year / 100.0, {YEARS: year}, seed=seed)
+        for seed in (1, 2, 4)
+        for year in (0, 5)
+    ]
+    rows.append(row(math.nan, {YEARS: 5}, seed=5))
+    rows.append(row(math.nan, {YEARS: 9}))
+    first, second, third = summaries.means(rows, YEARS, "method")
+    assert first.key == (0, "btc")
+    assert first[1:] == pytest.approx((0.7 / 3.0, 0.1, 0.4, 3))
+    assert second[1:] == pytest.approx((0.7 / 3.0 + 0.05, 0.15, 0.45, 3))
+    assert math.isnan(third.value)
+    assert third.number == 0
+
+
+def test_kept_is_a_share_of_the_baseline_of_the_same_seed():
+    results = Results.of(
+        [
+            row(0.8, {SNOW: 0, YEARS: 5}, seed=1),
+            row(0.5, {SNOW: 0, YEARS: 5}, seed=2),
+            row(0.4, {SNOW: 0.2, YEARS: 5}, seed=1),
+            row(0.4, {SNOW: 0.2, YEARS: 5}, seed=2),
+            row(0.4, {SNOW: 0.2, YEARS: 5}, seed=3),
+            row(0.4, {SNOW: 0.2, YEARS: 9}, seed=1),
+            row(0.9, {SNOW: 0, YEARS: 5}, metric="r1"),
+            row(0.0, {SNOW: 0}, method="solid"),
+            row(0.3, {SNOW: 0.2}, method="solid"),
+            row(0.5, {SNOW: 0}, metric="pose_success", task="pose"),
+            row(0.1, {SNOW: 0.2}, metric="pose_success", task="pose"),
+        ]
+    )
+    rows = summaries.kept_rows(results, {SNOW: 0})
+    values = [one.value for one in rows]
+    expected = [1.0, 1.0, 0.5, 0.8, 0.5, math.nan, math.nan, math.nan, 1.0, 0.2]
+    assert values == pytest.approx(expected, nan_ok=True)
+    assert {one.metric for one in rows} == {"kept"}
+    assert rows[-1].task == "pose"
+    pooled = summaries.kept_rows(results, {SNOW: 0}, pooled=True)
+    # Three seeds with snow, two without.
+    assert pooled[1].value == pytest.approx(0.4 / 0.65)
+
+
+def test_intervals_of_kept_are_of_the_same_blocks():
+    before, after = firsts(16), firsts(9)
+    queries = QueryRows.of(
+        [answers(before, {SNOW: 0}), answers(after, {SNOW: 1})]
+    )
+    results = Results.of([row(0.8, {SNOW: 0}), row(0.45, {SNOW: 1})])
+    none, snow = summaries.kept_rows(results, {SNOW: 0}, queries)
+    assert (none.low, none.high) == (1.0, 1.0)
+    limits = np.percentile(shares_of_samples(before, after), [2.5, 97.5])
+    assert (snow.low, snow.high) == pytest.approx(tuple(limits))
+    # With other queries nothing is paired.
+    fewer = QueryRows.of(
+        [answers(before, {SNOW: 0}), answers(after[:8], {SNOW: 1})]
+    )
+    _, snow = summaries.kept_rows(results, {SNOW: 0}, fewer)
+    assert math.isnan(snow.low)
+    assert snow.value == pytest.approx(0.5625)
+
+
+def test_two_causes_cost_more_than_the_product():
+    cause = "cause"
+    level = {"level": 1}
+    queries = QueryRows.of(
+        [
+            answers(firsts(20), {cause: "none", "level": 0}),
+            answers(firsts(2), {cause: "snow", "level": 1}),
+            answers(firsts(10), {cause: "snow", "level": 2}),
+            answers(firsts(16), {cause: "leaves", **level}),
+            answers(firsts(4), {cause: "snow+leaves", "level": 2}),
+            answers(firsts(4), {cause: "snow+rain", "level": 2}),
+        ]
+    )
+    (one,) = summaries.excesses(queries, {cause: "none", "level": 0})
+    assert one.names == ("snow", "leaves")
+    assert one.kept == pytest.approx((0.5, 0.8, 0.2))
+    assert one.value == pytest.approx(0.2)
+    assert one.interval.low < 0.2 < one.interval.high
+
+
+def test_two_factors_together():
+    queries = QueryRows.of(
+        [
+            answers(firsts(number), {SNOW: snow, YEARS: years})
+            for snow, years, number in (
+                (0, 0, 20),
+                (1, 0, 12),
+                (0, 5, 15),
+                (1, 5, 9),
+            )
+        ]
+    )
+    (one,) = summaries.excesses(queries, {SNOW: 0, YEARS: 0})
+    assert one.names == (SNOW, YEARS)
+    assert one.kept == pytest.approx((0.6, 0.75, 0.45))
+    assert one.value == pytest.approx(0.0)
+
+
+def test_lifetimes_of_seeds_surround_that_of_the_mean():
+    kept = {0: {0: 1.0}, 10: {1: 0.8, 2: 0.6}, 20: {1: 0.4, 2: 0.2}}
+    rows = [
+        row(value, {YEARS: year}, metric="kept", seed=seed)
+        for year, some in kept.items()
+        for seed, value in some.items()
+    ]
+    tenth, half = summaries.lifetimes(Results.of(rows), YEARS)
+    assert (tenth.share, half.share) == (0.9, 0.5)
+    # Means are 1, 0.7 and 0.3.
+    assert tenth.value == pytest.approx(10.0 / 3.0)
+    assert (tenth.low, tenth.high) == pytest.approx((2.5, 5.0))
+    assert half.value == pytest.approx(15.0)
+    assert (half.low, half.high) == pytest.approx((12.5, 17.5))
+    (never,) = summaries.lifetimes(Results.of(rows), YEARS, [0.1])
+    assert math.isinf(never.value)
+    assert never.last == 20
+
+
+def test_a_lifetime_needs_all_shares():
+    times = [0.0, 1.0, 2.0]
+    assert summaries.lifetime(times, [1.0, 0.5, 0.2], 0.5) == 1.0
+    assert summaries.lifetime(times, [1.0, 0.5 + 1e-9, 0.2], 0.5) > 1.0
+    assert math.isnan(summaries.lifetime(times, [1.0, math.nan, 0.2], 0.5))
+
+
+def test_growth_of_a_power_law():
+    rows = []
+    for number in (100, 200, 800):
+        at = {"database.distractors": number - 50}
+        rows += [
+            row(float(number), at, metric="places"),
+            row(float(number), at, metric="places", gate=True),
+            row(3.0 * number**1.5, at, metric="query_ms", task="cost"),
+        ]
+    first, *rest = summaries.growths(Results.of(rows), "places", "query_ms")
+    assert math.isnan(first.exponent)
+    assert [one.at for one in rest] == [200.0, 800.0]
+    assert [one.exponent for one in rest] == pytest.approx([1.5, 1.5])
+
+
+def test_rank_correlations_are_those_of_scipy():
+    rng = np.random.default_rng(3)
+    rows, drawn = [], []
+    for k in range(25):
+        stage, tcr = {"database.stage": f"s{k}"}, rng.random()
+        seen, auc = rng.random(), np.round(rng.random(), 1)
+        drawn.append((tcr, seen, 1.0 - auc))
+        rows += [
+            row(tcr, stage, metric="tcr_sym", task="change", method=""),
+            row(seen, stage, metric="visible_change"),
+            row(auc, stage),
+        ]
+    # A condition without one of them does not count.
+    rows.append(row(0.5, {"database.stage": "alone"}))
+    results = Results.of(rows)
+    (one,) = summaries.correlations(results, ("tcr_sym", "visible_change"))
+    tcr, seen, failure = np.transpose(drawn)
+    expected = [spearmanr(failure, x).statistic for x in (tcr, seen)]
+    assert [value for value, _ in one.rho] == pytest.approx(expected)
+    assert one.number == 25
+    value, interval = one.difference
+    assert value == pytest.approx(expected[1] - expected[0])
+    assert interval.low < value < interval.high
+
+
+def test_differences_are_corrected_together():
+    right = {"a": firsts(20), "b": np.arange(20) % 4 < 2, "c": firsts(20)}
+    queries = QueryRows.of(
+        [answers(one, {SNOW: 0}, method=name) for name, one in right.items()]
+    )
+    found = summaries.method_differences(queries)
+    names = [(d.first.method, d.second.method) for d in found]
+    assert names == [("a", "b"), ("a", "c"), ("b", "c")]
+    values = [d.difference.value for d in found]
+    assert values == pytest.approx([0.5, 0.0, -0.5])
+    assert found[1].p_value == 1.0
+    other = answers(firsts(8)[:8], {SNOW: 0}, method="d")
+    with pytest.raises(InputError, match="a and d answered different queries"):
+        summaries.method_differences(
+            QueryRows.of([*queries.answers[:1], other])
+        )
+
+
+def test_a_ranking_counts_what_all_methods_have():
+    rows = [
+        row(value, {SNOW: snow}, method=method, town=town)
+        for method, town, snow, value in (
+            ("a", "x", 0, 0.9),
+            ("a", "x", 1, 0.7),
+            ("a", "y", 0, 0.2),
+            ("b", "x", 0, 0.5),
+            ("b", "x", 1, 0.5),
+            ("b", "y", 0, 0.5),
+            ("a", "y", 1, 0.9),
+            ("b", "y", 1, math.nan),
+        )
+    ]
+    found, samples = summaries.ranking(rows)
+    assert [one.method for one in found] == ["a", "b"]
+    assert [one.value for one in found] == pytest.approx([0.6, 0.5])
+    # Maps are drawn: both, or one of them twice.
+    assert set(np.round(samples[:, 0], 9)) == {0.2, 0.6, 0.8}
+    assert found[0].interval == Interval(0.2, 0.8)
+    assert found[1].interval == Interval(0.5, 0.5)
+
+
+def test_a_ranking_of_one_condition_has_its_intervals():
+    one = Row(**key({}), metric="auc", value=0.5, low=0.4, high=0.7)
+    found, _ = summaries.ranking([one])
+    assert found[0].interval == Interval(0.4, 0.7)
+    assert summaries.ranking([one, row(0.1, {SNOW: 1}, method="b")])[0] == []

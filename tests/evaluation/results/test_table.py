@@ -1,0 +1,350 @@
+"""The tables of results and of queries, written by hand and by programs."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from evaluation.results.table import Answers, Key, QueryRows, Results, Row
+
+FACTOR = "query.transient.snow"
+HEADER = (
+    f"experiment,map,database,query,seed,{FACTOR},task,method,gate,protocol,"
+    "metric,value,low,high,n"
+)
+LINE = "e,town,town_01,town_02,1,0.2,place,btc,0,fair,auc,0.25,0.125,0.5,80"
+QUERY_HEADER = (
+    "experiment,map,database,query,seed,task,method,gate,protocol,"
+    "query_frame,correct,has_match,score,first_right_rank"
+)
+QUERY_LINE = "e,town,town_01,town_02,1,place,btc,0,fair,7,1,1,0.5,1"
+
+
+def write(path, *lines):
+    path.write_text("".join(f"{line}\n" for line in lines))
+    return path
+
+
+def replaced(line, header, column, cell):
+    names = header.split(",")
+    cells = line.split(",")
+    cells[names.index(column)] = cell
+    return ",".join(cells)
+
+
+def key(**changes):
+    values = {
+        "experiment": "e",
+        "map": "town",
+        "database": "town_01",
+        "query": "town_02",
+        "seed": 1,
+        "factors": {FACTOR: 0.2},
+        "task": "place",
+        "method": "btc",
+        "gate": False,
+        "protocol": "fair",
+    }
+    return {**values, **changes}
+
+
+def test_a_line_becomes_a_row(tmp_path):
+    results = Results.read(write(tmp_path / "results.csv", HEADER, LINE))
+    row = Row(**key(), metric="auc", value=0.25, low=0.125, high=0.5, n=80)
+    assert results == Results((FACTOR,), (row,))
+    assert Results.read(tmp_path) == results
+    assert row[FACTOR] == 0.2
+    assert row["database.years"] is None
+
+
+def test_numbers_keep_all_digits_and_bytes(tmp_path):
+    rng = np.random.default_rng(0)
+    values = rng.random(200)
+    rows = [
+        Row(**key(seed=k), metric="auc", value=value, n=np.int64(k))
+        for k, value in enumerate(values)
+    ]
+    first, second = tmp_path / "a.csv", tmp_path / "b.csv"
+    Results.of(rows).write_csv(first)
+    found = Results.read(first)
+    assert [row.value for row in found.rows] == values.tolist()
+    found.write_csv(second)
+    assert first.read_bytes() == second.read_bytes()
+    assert first.read_text().splitlines()[0] == HEADER
+    # A reader of its own.
+    with first.open() as file:
+        lines = list(csv.DictReader(file))
+    assert [float(line["value"]) for line in lines] == values.tolist()
+    assert {line["low"] for line in lines} == {""}
+
+
+@pytest.mark.parametrize(
+    ("cell", "value"),
+    [
+        ("", None),
+        ("3", 3),
+        ("-2", -2),
+        ("0.10", 0.1),
+        ("1e-3", 0.001),
+        ("true", True),
+        ("FALSE", False),
+        ("avia", "avia"),
+        ("01", "01"),
+        ("nan", "nan"),
+    ],
+)
+def test_values_of_factors(tmp_path, cell, value):
+    path = write(
+        tmp_path / "r.csv", HEADER, replaced(LINE, HEADER, FACTOR, cell)
+    )
+    (row,) = Results.read(path).rows
+    assert row[FACTOR] == value
+    assert type(row[FACTOR]) is type(value)
+
+
+def test_columns_may_have_any_order(tmp_path):
+    order = np.random.default_rng(1).permutation(15)
+    lines = [
+        ",".join(np.array(line.split(","))[order]) for line in (HEADER, LINE)
+    ]
+    shuffled = Results.read(write(tmp_path / "a.csv", *lines))
+    plain = Results.read(write(tmp_path / "b.csv", HEADER, LINE))
+    assert shuffled.rows == plain.rows
+
+
+def test_programs_with_floats_for_whole_numbers(tmp_path):
+    """As pandas writes a column with an empty cell, and truth values."""
+    line = replaced(LINE, HEADER, "n", "80.0")
+    line = replaced(line, HEADER, "seed", "1.0")
+    line = replaced(line, HEADER, "gate", "True")
+    (row,) = Results.read(write(tmp_path / "r.csv", HEADER, line)).rows
+    assert (row.n, row.seed, row.gate) == (80, 1, True)
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "words"),
+    [
+        ("value", "1.0001", ["value", "0 to 1"]),
+        ("value", "-0.0001", ["value", "0 to 1"]),
+        ("value", "nan", ["value", "'nan' is no number"]),
+        ("value", "1e999", ["value", "no number"]),
+        ("value", "", ["value", "needs a number"]),
+        ("low", "0.51", ["low", "more than high"]),
+        ("low", "", ["low", "high"]),
+        ("high", "", ["low", "high"]),
+        ("high", "inf", ["high", "no number"]),
+        ("n", "8.5", ["n: '8.5'", "whole"]),
+        ("n", "-8", ["n: '-8'", "whole"]),
+        ("n", "eighty", ["n: 'eighty'"]),
+        ("seed", "1.5", ["seed: '1.5'"]),
+        ("seed", "", ["seed: empty"]),
+        ("seed", "99999999999999999999", ["seed"]),
+        ("gate", "2", ["gate: '2' is neither 0 nor 1"]),
+        ("gate", "", ["gate"]),
+        ("metric", "", ["metric: empty"]),
+        ("map", " ", ["map: empty"]),
+        ("task", "", ["task: empty"]),
+        ("method", "", ["method: empty"]),
+        ("protocol", "mine", ["protocol: 'mine'", "fair"]),
+        ("method", "bt\x07c", ["method", "control character"]),
+        ("map", '"to\nwn"', ["map", "control character"]),
+        ("value", "0.2,5", ["16 cells instead of 15"]),
+    ],
+)
+def test_values_that_cannot_be(tmp_path, column, cell, words):
+    wrong = replaced(LINE, HEADER, column, cell)
+    good = replaced(LINE, HEADER, "seed", "3")
+    path = write(tmp_path / "r.csv", HEADER, good, wrong)
+    with pytest.raises(InputError) as raised:
+        Results.read(path)
+    for word in (str(path), "line 3" if "\n" not in cell else "line 4", *words):
+        assert word in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("metric", "value", "fits"),
+    [
+        ("kept", "1.2", True),
+        ("kept", "-0.1", False),
+        ("visible_change", "-0.5", True),
+        ("visible_change", "-1.5", False),
+        ("tcr_sym", "1.5", False),
+        ("miou", "2", False),
+        ("query_ms", "-1", False),
+        ("elevation", "-7", True),
+        ("tcr_sym", "", True),
+    ],
+)
+def test_ranges_of_metrics(tmp_path, metric, value, fits):
+    line = replaced(LINE, HEADER, "metric", metric)
+    line = replaced(line, HEADER, "value", value)
+    path = write(tmp_path / "r.csv", HEADER, line)
+    if fits:
+        (row,) = Results.read(path).rows
+        assert math.isnan(row.value) == (value == "")
+    else:
+        with pytest.raises(InputError, match=f"value: .*{metric} is"):
+            Results.read(path)
+
+
+def test_a_number_twice_is_refused(tmp_path):
+    again = replaced(LINE, HEADER, "value", "0.3")
+    path = write(tmp_path / "r.csv", HEADER, LINE, again)
+    with pytest.raises(InputError, match=r"line 3: .* line 2"):
+        Results.read(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        (HEADER.replace(",n", ""), "no column 'n'"),
+        (HEADER.replace(",low", ",value"), "no column 'low'"),
+        (HEADER + ",map", "column 'map' is there twice"),
+        (HEADER + ",", "has no name"),
+        ("", "no column 'experiment'"),
+        (
+            "map,db,query,cause,level,method,gate,auc,r1,kept",
+            "cns-drake study ladder",
+        ),
+        ("map,year,seed,task,method,gate,value,kept", "cns-drake study years"),
+        (
+            "map,db,query,method,auc_unchanged,auc_changed,kept",
+            "cns-drake study stages",
+        ),
+        (
+            "database,method,tcr_sym,auc,auc_low,auc_high,recall_at_1",
+            "cns-drake study trend",
+        ),
+        (
+            "map,method,others,places,queries,auc,r1,query_ms,build_ms",
+            "cns-drake study size",
+        ),
+        ("version,map,db,query,method,auc,kept", "cns-drake study fresh"),
+    ],
+)
+def test_tables_with_other_columns(tmp_path, header, words):
+    row = ",".join("1" for _ in header.split(","))
+    path = write(tmp_path / "r.csv", header, row)
+    with pytest.raises(InputError, match=words) as raised:
+        Results.read(path)
+    assert str(raised.value).startswith(f"{path}: ")
+
+
+def test_files_that_are_no_table(tmp_path):
+    empty = write(tmp_path / "empty.csv", HEADER)
+    with pytest.raises(InputError, match="no rows"):
+        Results.read(empty)
+    latin = tmp_path / "latin.csv"
+    latin.write_bytes(HEADER.encode() + b"\n\xe9")
+    with pytest.raises(InputError, match="UTF-8"):
+        Results.read(latin)
+    quoted = write(tmp_path / "quoted.csv", HEADER, 'e,"to"wn')
+    with pytest.raises(InputError, match="not CSV"):
+        Results.read(quoted)
+
+
+def test_selection():
+    rows = [
+        Row(**key(seed=s, factors={FACTOR: f}), metric=m, value=0.5)
+        for s in (1, 2)
+        for f in (0, 0.2)
+        for m in ("auc", "r1")
+    ]
+    results = Results.of(rows)
+    assert len(results.where(metric="auc").rows) == 4
+    assert len(results.where({FACTOR: (0, 0.2)}, seed=2).rows) == 4
+    assert len(results.where({FACTOR: 0.2, "metric": "r1"}).rows) == 2
+    assert results.distinct(FACTOR) == [0, 0.2]
+    assert results.distinct("method") == ["btc"]
+
+
+def test_what_identifies_a_condition():
+    round_crop = {"methods.ring++.crop": "round", "level": 2, "cause": None}
+    one = Key(**key(method="ring++", factors=round_crop))
+    other = Key(**key(factors={"level": 2}))
+    assert one.label == "ring++, crop round"
+    assert one.but("method") == other.but("method")
+    assert one.but() != Key(**key(method="ring++")).but()
+
+
+def make_answers(**changes):
+    return Answers(
+        **key(**changes),
+        columns={
+            "query_frame": np.array([0, 10, 20]),
+            "query_stamp_ns": np.array([0, 1, 2]) + 1_700_000_000_000_000_001,
+            "query_x": np.array([0.1, 1.0 / 3.0, -5.0]),
+            "block": np.array([0, 0, 1]),
+            "correct": np.array([True, False, False]),
+            "has_match": np.array([True, True, False]),
+            "score": np.array([-1.0, 0.5, math.nan]),
+            "first_right_rank": np.array([1.0, 4.0, math.inf]),
+            "why": np.array(["", "elsewhere", "no_place"], dtype=object),
+            "match_frame": np.array([5, 7, -1]),
+        },
+    )
+
+
+def test_queries_are_read_as_written(tmp_path):
+    one, other = make_answers(), make_answers(method="solid", factors={})
+    first, second = tmp_path / "queries.csv", tmp_path / "b.csv"
+    QueryRows.of([one, other]).write_csv(first)
+    found = QueryRows.read(tmp_path)
+    assert found.factors == (FACTOR,)
+    for read, made in zip(found.answers, (one, other), strict=True):
+        assert read.but() == made.but()
+        for name, column in made.columns.items():
+            expected = np.where(column == math.inf, -1, column)
+            assert read.columns[name].tolist()[:2] == expected.tolist()[:2]
+        assert math.isnan(read.columns["score"][2])
+        assert np.isnan(read.columns["overlap"]).all()
+        outcomes = read.outcomes
+        assert outcomes.first_right_ranks.tolist() == [1.0, 4.0, math.inf]
+        assert outcomes.blocks.tolist() == [0, 0, 1]
+        assert outcomes.recall_at(1) == 0.5
+    found.write_csv(second)
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_few_columns_of_queries_are_enough(tmp_path):
+    lines = [
+        QUERY_LINE.replace("fair,7", f"fair,{frame}") for frame in (20, 10, 0)
+    ]
+    # Lines of another method stand between.
+    lines.insert(1, lines[0].replace("btc", "solid"))
+    path = write(tmp_path / "queries.csv", QUERY_HEADER, *lines)
+    btc, solid = QueryRows.read(path).answers
+    assert btc.columns["query_frame"].tolist() == [20, 10, 0]
+    assert len(solid.outcomes) == 1
+    assert btc.outcomes.blocks is None
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "words"),
+    [
+        ("correct", "yes", "correct: 'yes' is neither"),
+        ("has_match", "0", "correct: 1, without a match"),
+        ("score", "", "score: empty"),
+        ("score", "nan", "score: 'nan' is no number"),
+        ("first_right_rank", "2", "first_right_rank: 1 means correct"),
+        ("first_right_rank", "1.5", "first_right_rank: '1.5'"),
+        ("query_frame", "", "query_frame: empty"),
+        ("query_frame", "6", "query_frame: this query is there twice"),
+    ],
+)
+def test_answers_that_cannot_be(tmp_path, column, cell, words):
+    good = replaced(QUERY_LINE, QUERY_HEADER, "query_frame", "6")
+    wrong = replaced(QUERY_LINE, QUERY_HEADER, column, cell)
+    path = write(tmp_path / "q.csv", QUERY_HEADER, good, wrong)
+    with pytest.raises(InputError, match=words) as raised:
+        QueryRows.read(path)
+    assert str(raised.value).startswith(f"{path}: line 3: ")
+
+
+def test_former_tables_of_queries(tmp_path):
+    header = "map,db,query,method,correct,has_match,score"
+    path = write(tmp_path / "queries.csv", header, "a,01,02,btc,1,1,0.5")
+    with pytest.raises(InputError, match="earlier version"):
+        QueryRows.read(path)
