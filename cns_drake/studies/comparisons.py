@@ -35,7 +35,7 @@ _DATABASE_FIELDS = ("distractors", "lateral")
 _SEEDED = ("transient", "traffic", "ride", "driver")
 # Stages by their place in the life of a map.
 OWN, LAST, FIRST, EARLIER = "own", "last", "first", "earlier "
-# So many earlier stages have a name: `earlier 1` and on.
+# Number of names for earlier stages: `earlier 1` to `earlier 4`.
 _STEPS = 4
 # No driver keeps exactly to a line: the LiDAR of the database is this far ahead
 # of the query's [m].
