@@ -161,7 +161,10 @@ class PairOfDrives:
         }
         for side, changes in sides.items():
             self._check_side(side, changes)
-            drive = self._changed(side, changes, seed)
+            # What one drive is older, the other one's city has lived on.
+            other = sides["query" if side == "database" else "database"]
+            age = other.get("years", 0), other.get("rates", 1.0)
+            drive = self._changed(side, changes, age, seed)
             built[side] = self._named(side, drive, condition, seed)
         changed = {
             name: sides["query"][name]
@@ -239,11 +242,16 @@ class PairOfDrives:
                     f" {most}"
                 )
 
-    def _changed(self, side: str, changes: Changes, seed: int) -> Scenario:
-        """Returns a drive with its changed fields."""
+    def _changed(
+        self, side: str, changes: Changes, age: tuple[Any, Any], seed: int
+    ) -> Scenario:
+        """Returns a drive with its changed fields.
+
+        The age is the years that its city has lived on, and their rates.
+        """
         drive = self._unchanged[side]
         left = dict(changes)
-        for name in (*_QUERY_FIELDS, "distractors", "fresh"):
+        for name in (*_QUERY_FIELDS, "distractors", "fresh", "years", "rates"):
             left.pop(name, None)
         if "lidar" in left:
             drive = drive.with_lidar_preset(left.pop("lidar"))
@@ -273,14 +281,13 @@ class PairOfDrives:
         stage = self._stage(drive, left.pop("stage", OWN))
         if stage != drive.stage:
             drive = drive.replaced(stage=stage)
-        years, rates = left.pop("years", 0), left.pop("rates", 1.0)
-        if years:
+        if age[0]:
             if drive.stage != self.query.stage:
                 raise InputError(
-                    f"{self.source}: {side}.years: stage {LAST} ages, not"
-                    f" {drive.stage}"
+                    f"{self.source}: years: stage {LAST} ages, not the stage"
+                    f" {drive.stage} of the {side}"
                 )
-            folder, stage = self.age(drive, years, rates, seed)
+            folder, stage = self.age(drive, *age, seed)
             drive = drive.replaced(map=folder, stage=stage)
         if "version" in left:
             folder, stage = self.redraw(drive, left.pop("version"))
@@ -407,8 +414,9 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
     labels = []
     cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
     for path, value in factors.items():
-        if path.partition(".")[0] in (side, "both"):
-            name = path.rpartition(".")[2]
+        name = path.rpartition(".")[2]
+        is_own = path.partition(".")[0] in (side, "both")
+        if is_own != (name in ("years", "rates")) or path.startswith("both."):
             text = str(value).replace(".", "p").replace("-", "m")
             labels.append(f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', text)}")
     if cause != NO_CAUSE:
