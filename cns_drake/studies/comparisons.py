@@ -36,7 +36,7 @@ _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
 # Stages by their place in the life of a map.
 OWN, LAST, FIRST, EARLIER = "own", "last", "first", "earlier "
-# Earlier stages are told apart in so many steps.
+# Number of names for earlier stages: `earlier 1` to `earlier 4`.
 _STEPS = 4
 # No driver keeps exactly to a line: the LiDAR of the database is this far ahead
 # of the query's [m].

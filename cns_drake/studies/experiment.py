@@ -36,8 +36,14 @@ _FOLDER = Path(__file__).with_name("experiments")
 SIDES = ("both", "database", "query")
 # Places in the file of an experiment where a list of values is a factor.
 _FACTORED = (*SIDES, "protocol")
-# Fields whose value is a list itself; a list of lists is a factor.
-_LISTS = frozenset({"viewpoint", "without", "route", "xyz", "rpy_deg"})
+# Fields whose value may be a list -> what is in it; other lists are factors.
+_LISTS: Mapping[str, tuple[type, ...]] = {
+    "viewpoint": (int, float),
+    "without": (str,),
+    "route": (dict,),
+    "xyz": (int, float),
+    "rpy_deg": (int, float),
+}
 # A list of so many evenly spaced numbers.
 _SPREAD = {"from", "to", "count"}
 # The factor of the fresh versions of the shipped maps.
@@ -456,9 +462,8 @@ def _leaves(
 
 def _is_single(name: str, value: Sequence[Any]) -> bool:
     """Returns whether a list is one value of a field."""
-    # Viewpoints have names, too.
-    some = (list, str) if name == "viewpoint" else list
-    return name in _LISTS and not any(isinstance(v, some) for v in value)
+    kinds = _LISTS.get(name)
+    return kinds is not None and all(isinstance(v, kinds) for v in value)
 
 
 def _spread(path: str, value: Mapping[str, Any]) -> list[float]:

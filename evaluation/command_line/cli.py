@@ -152,8 +152,8 @@ def pr(
         truth: Definition of a match: a place within the radius, or one whose
             scan shows at least this part of the query's scan.
         overlaps: Write the overlap of each query with each place.
-        exact_overlaps: Read these overlaps from a table of cns-drake overlap;
-            by default they are found from the scans.
+        exact_overlaps: Read exact overlaps from this table, which cns-drake
+            export-pairs writes; by default they are found from the scans.
         turn_queries: Turn each query by a random yaw.
         tilt_queries: Tilt each query by a random roll and pitch of up to this.
         hide_sector: Hide a random sector of this angle from each query, as a
