@@ -35,6 +35,7 @@ from cns_drake.scenarios.scenario import (
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.odometry.config import OdometrySection
+from cns_drake.studies.experiment import Experiment, MadeMap
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 
@@ -77,6 +78,7 @@ CITY: Sections = {
     "A stage": stages.Stage,
     "A growth": stages.Growth,
 }
+EXPERIMENT: Sections = {"Experiment": Experiment, "A map to make": MadeMap}
 METHODS: Sections = {
     "All methods": MethodConfig,
     **{
@@ -84,8 +86,16 @@ METHODS: Sections = {
         for name in (*shipped_methods(), "learned")
     },
 }
-# Fields without a default that whoever reads the file fills in.
-_FILLED_IN = {(Scenario, "name"): "the file's name"}
+# What stands for the default where the model's own does not say it.
+_FILLED_IN = {
+    (Scenario, "name"): "the file's name",
+    (Experiment, "name"): "the file's name",
+    (Experiment, "maps"): "all shipped maps",
+    (Experiment, "tasks"): "`place`",
+    (Experiment, "methods"): "all that ship",
+    (Experiment, "protocol"): "`fair`",
+    (Experiment, "baseline"): "the first values",
+}
 
 
 def pages() -> dict[str, str]:
@@ -110,6 +120,13 @@ def pages() -> dict[str, str]:
             "lists archetypes and objects.",
             CITY,
         ),
+        "experiment.md": _fields_page(
+            "Fields of an experiment",
+            "[Studies](../studies.md) explains them with examples, and lists "
+            "what can vary and the settings of tasks. Paths are relative to "
+            "the working folder.",
+            EXPERIMENT,
+        ),
         "methods.md": _fields_page(
             "Settings of the methods",
             "[Methods](../methods.md) shows how to set them.",
@@ -126,7 +143,7 @@ def _fields_page(title: str, introduction: str, sections: Sections) -> str:
         description, meanings = explain_fields(model)
         rows = [
             (
-                f"`{name}`",
+                f"`{field.alias or name}`",
                 describe_default(model, name),
                 _values(model, name),
                 meanings[name] + _links(field.annotation, links),

@@ -34,7 +34,6 @@ os.fsync = os.fstat
 _LONGEST = (
     "test_recipes.py",
     "test_city_generation.py",
-    "test_types.py",
     "test_processors.py",
 )
 
@@ -50,7 +49,7 @@ def pytest_addoption(parser):
     parser.addoption(
         "--fuzz",
         type=int,
-        default=3000,
+        default=300,
         help="how many files test_fuzz damages (default: %(default)s)",
     )
     parser.addoption(

@@ -77,25 +77,25 @@ def study(
     list_all: Annotated[bool, typer.Option("--list")] = False,
     show: Annotated[bool, typer.Option("--show")] = False,
 ) -> None:
-    """Run an experiment: what changes cost each method.
+    """Measure what a change costs each method.
 
-    An experiment is a file that names maps, what differs between the drive of
-    the database and that of the query, tasks and methods. Writes results.csv, a
-    row a number, queries.csv, a row a query, and a page, index.html. Drives are
-    simulated without a recording. After an interruption the same command goes
-    on where it was.
+    An experiment is a file that says what differs between two drives, that of
+    the database and that of the query; which tasks to measure; and by which
+    methods. The drives are simulated, and not recorded. Writes results.csv (a
+    row a number), queries.csv (a row a query) and a page, index.html. After an
+    interruption the same command goes on where it was.
 
     Args:
         name: A shipped experiment, or a file of your own.
         maps: Maps, by name or folder, in place of the experiment's.
         output: Folder for the results; created if need be.
-        quick: A smaller experiment, as its section `quick` says.
-        task: Measure place, pose, localise, map, change or cost, in place of
-            the experiment's tasks; may be repeated.
-        method: Run only the method of this name, or one of your own from a
-            Python file; may be repeated.
-        override: Another value of a field, such as database.years=[0,5]; may be
-            repeated.
+        quick: Measure less, as the experiment's section `quick` says.
+        task: Measure only this task: place, pose, localise, map, change or
+            cost; may be repeated.
+        method: Run only this method, by name, or one of your own by its Python
+            file; may be repeated.
+        override: Replace a field of the experiment, nested ones with dots, such
+            as database.years=[0,5]; may be repeated.
         list_all: List the shipped experiments, and stop.
         show: Print the experiment's file, ready to copy, and stop.
     """

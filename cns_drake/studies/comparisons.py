@@ -36,7 +36,7 @@ _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
 # Stages by their place in the life of a map.
 OWN, LAST, FIRST, EARLIER = "own", "last", "first", "earlier "
-# Earlier stages are told apart in so many steps.
+# Number of names for earlier stages: `earlier 1` to `earlier 4`.
 _STEPS = 4
 # No driver keeps exactly to a line: the LiDAR of the database is this far ahead
 # of the query's [m].
@@ -122,6 +122,9 @@ class PairOfDrives:
             if drive.driver.departs and drive.driver.seed is None:
                 driver = drive.driver.replaced(seed=drive.name)
                 self._unchanged[side] = drive.replaced(driver=driver)
+        self._last_stage = max(
+            str(one.stage) for one in (self.database, self.query)
+        )
         self._plain = dict(self._unchanged)
         if self.same_route:
             self._plain["database"] = moved(
@@ -166,7 +169,10 @@ class PairOfDrives:
         }
         for side, changes in sides.items():
             self._check_side(side, changes)
-            drive = self._changed(side, changes, seed)
+            # What one drive is older, the other one's city has lived on.
+            other = sides["query" if side == "database" else "database"]
+            age = other.get("years", 0), other.get("rates", 1.0)
+            drive = self._changed(side, changes, age, seed)
             built[side] = self._named(side, drive, condition, seed)
         changed = {
             name: sides["query"][name]
@@ -253,11 +259,18 @@ class PairOfDrives:
                     f" {most}"
                 )
 
-    def _changed(self, side: str, changes: Changes, seed: int) -> Scenario:
-        """Returns a drive with its changed fields."""
+    def _changed(
+        self, side: str, changes: Changes, age: tuple[Any, Any], seed: int
+    ) -> Scenario:
+        """Returns a drive with its changed fields.
+
+        The age is the years that its city has lived on, and their rates.
+        """
         drive = self._unchanged[side]
         left = dict(changes)
-        for name in (*_QUERY_FIELDS, "distractors"):
+        if "rates" in left and "years" not in left:
+            raise InputError(f"{self.source}: {side}.rates: those of no years")
+        for name in (*_QUERY_FIELDS, "distractors", "years", "rates"):
             left.pop(name, None)
         if "lidar" in left:
             try:
@@ -299,16 +312,13 @@ class PairOfDrives:
         stage = self._stage(side, drive, left.pop("stage", OWN))
         if stage != drive.stage:
             drive = drive.replaced(stage=stage)
-        if "rates" in left and "years" not in left:
-            raise InputError(f"{self.source}: {side}.rates: those of no years")
-        years, rates = left.pop("years", 0), left.pop("rates", 1.0)
-        if years:
-            if drive.stage != self.query.stage:
+        if age[0]:
+            if drive.stage != self._last_stage:
                 raise InputError(
-                    f"{self.source}: {side}.years: stage {LAST} ages, not"
-                    f" {drive.stage}"
+                    f"{self.source}: years: stage {LAST} ages, not the stage"
+                    f" {drive.stage} of the {side}"
                 )
-            drive = self._elsewhere(side, drive, self.age, years, rates, seed)
+            drive = self._elsewhere(side, drive, self.age, *age, seed)
         if "version" in left:
             version = left.pop("version")
             drive = self._elsewhere(side, drive, self.redraw, version)
@@ -359,7 +369,7 @@ class PairOfDrives:
 
     def _stage(self, side: str, drive: Scenario, wanted: Any) -> str:
         """Returns the stage that a name or a place among stages means."""
-        own, last = str(drive.stage), str(self.query.stage)
+        own, last = str(drive.stage), self._last_stage
         stages = sorted(map_folder(drive).stages())
         if wanted in (OWN, LAST, FIRST):
             return {OWN: own, LAST: last, FIRST: min(stages, default=own)}[
@@ -431,13 +441,36 @@ class PairOfDrives:
         content = fingerprint(drive.replaced(name="").model_dump(mode="json"))
         known = self._known[side]
         if content not in known:
-            name = drive.name
-            if drive != self._plain[side]:
+            name, plain = drive.name, self._plain[side]
+            if not self.same_route and drive == plain.replaced(
+                stage=drive.stage
+            ):
+                if drive != plain:
+                    drive = control_drive(plain, str(drive.stage))
+                    name = drive.name
+            elif drive != plain:
                 name += f"_{_ending(side, condition, seed)}"
             if name in {one.name for one in known.values()}:
                 name += f"_{content[:6]}"
             known[content] = drive.replaced(name=name)
         return known[content]
+
+
+def control_drive(drive: Scenario, stage: str) -> Scenario:
+    """Returns the control of a drive: its route, through another stage.
+
+    The driver is the same. All change between the control and that stage's own
+    drive is due to the routes, and not to the city.
+    """
+    driver = drive.driver
+    if driver.departs and driver.seed is None:
+        driver = driver.replaced(seed=drive.name)
+    return drive.replaced(
+        name=f"{drive.name}_stage_{stage}",
+        stage=stage,
+        title=f"Control: the route of {drive.name} in stage {stage}",
+        driver=driver,
+    )
 
 
 def _joined(fields: Any, changes: Any) -> Any:
@@ -456,8 +489,9 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
     labels = []
     cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
     for path, value in factors.items():
-        if path.partition(".")[0] in (side, "both"):
-            name = path.rpartition(".")[2]
+        name = path.rpartition(".")[2]
+        is_own = path.partition(".")[0] in (side, "both")
+        if is_own != (name in ("years", "rates")) or path.startswith("both."):
             text = str(value).replace(".", "p").replace("-", "m")
             labels.append(f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', text)}")
     if cause != NO_CAUSE:

@@ -36,8 +36,14 @@ _FOLDER = Path(__file__).with_name("experiments")
 SIDES = ("both", "database", "query")
 # Places in the file of an experiment where a list of values is a factor.
 _FACTORED = (*SIDES, "protocol")
-# Fields whose value is a list itself; a list of lists is a factor.
-_LISTS = frozenset({"viewpoint", "without", "route", "xyz", "rpy_deg"})
+# Fields whose value may be a list -> what is in it; other lists are factors.
+_LISTS: Mapping[str, tuple[type, ...]] = {
+    "viewpoint": (int, float),
+    "without": (str,),
+    "route": (dict,),
+    "xyz": (int, float),
+    "rpy_deg": (int, float),
+}
 # A list of so many evenly spaced numbers.
 _SPREAD = {"from", "to", "count"}
 # The factor of the fresh versions of the shipped maps.
@@ -151,7 +157,8 @@ class Experiment(Section):
             made; by default the shipped maps.
         files: folder of the files that `maps` import.
         drives: `same-route`: the last drive of a map queries a database of its
-            own route; `stages`: it queries each earlier drive;
+            own route; `stages`: it queries each earlier drive; `both-ways`:
+            likewise, and two drives of a map query each other;
             `first-and-last`: the last drive, through the last stage, queries
             the first one.
         both: fields of both drives; lists are factors.
@@ -184,7 +191,9 @@ class Experiment(Section):
         BeforeValidator(_in_a_tuple),
     ] = Field(default=None, min_length=1)
     files: str | None = None
-    drives: Literal["same-route", "stages", "first-and-last"] = "same-route"
+    drives: Literal["same-route", "stages", "both-ways", "first-and-last"] = (
+        "same-route"
+    )
     both: dict[str, Any] = Field(default_factory=dict)
     database: dict[str, Any] = Field(default_factory=dict)
     query: dict[str, Any] = Field(default_factory=dict)
@@ -456,9 +465,8 @@ def _leaves(
 
 def _is_single(name: str, value: Sequence[Any]) -> bool:
     """Returns whether a list is one value of a field."""
-    # Viewpoints have names, too.
-    some = (list, str) if name == "viewpoint" else list
-    return name in _LISTS and not any(isinstance(v, some) for v in value)
+    kinds = _LISTS.get(name)
+    return kinds is not None and all(isinstance(v, kinds) for v in value)
 
 
 def _spread(path: str, value: Mapping[str, Any]) -> list[float]:

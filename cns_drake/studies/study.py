@@ -82,7 +82,7 @@ TASKS: Mapping[str, type[Task]] = {
         *(MapTask, ChangeTask, CostTask),
     )
 }
-_STAGE = "database.stage"
+_STAGE = "both.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
 # Tables that earlier versions wrote.
@@ -340,7 +340,10 @@ class Study:
             query = drives[-1]
             return [(query.replaced(name=f"{query.name}_database"), query)]
         query = max(drives, key=lambda drive: drive.stage or "")
-        return [(one, query) for one in drives if one is not query]
+        pairs = [(one, query) for one in drives if one is not query]
+        if kind == "both-ways" and len(drives) == 2:
+            pairs += [(query, one) for one, _ in pairs]
+        return pairs
 
     def _plan(
         self, drives: Iterable[_Drives]
@@ -484,10 +487,13 @@ class Study:
     def _recorded(self, city: City) -> Iterator[_Measured]:
         """Yields the pairs of recordings; nothing but their stage varies."""
         self._check_recordable(city)
-        for pair in city.change_pairs():
+        pairs = city.change_pairs()
+        if self.experiment.drives == "both-ways" and len(pairs) == 1:
+            pairs += [(later, earlier) for earlier, later in pairs]
+        for pair in pairs:
             control = city.unchanged_pair(*pair)
             for condition in self._conditions:
-                stage = condition.changes.get("database", {}).get("stage", OWN)
+                stage = condition.changes.get("both", {}).get("stage", OWN)
                 sources = pair if stage == OWN else control
                 if sources is None:
                     self.on_note(
@@ -527,7 +533,7 @@ class Study:
                         f"{self.source}: {name}: the recordings of {city.name}"
                         " are as they are; simulated drives alone can vary it"
                     )
-            stage = sides["database"].get("stage", OWN)
+            stage = sides["both"].get("stage", OWN)
             if stage not in (OWN, LAST):
                 raise InputError(
                     f"{self.source}: {_STAGE}: {stage!r}: recordings have"

@@ -401,6 +401,6 @@ class StudyFiles:
         return RecognitionFiles(self.output / "parts" / "recognition" / name)
 
     def part(self, kind: str, *names: str) -> Part:
-        """Returns the part of a kind (`changes`), named by drives or a rung."""
+        """Returns the part of a kind, such as `changes`, of drives."""
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")

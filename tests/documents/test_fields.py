@@ -8,12 +8,16 @@ from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from docs import reference_pages
-from docs.reference_pages import CITY, FAMILY, METHODS, SCENARIO
+from docs.reference_pages import CITY, EXPERIMENT, FAMILY, METHODS, SCENARIO
 
 PAGES = reference_pages.pages()
 # Each once, in one order for all processes of a run.
 MODELS = [
-    *dict.fromkeys((*SCENARIO.values(), *FAMILY.values(), *CITY.values()))
+    *dict.fromkeys(
+        model
+        for sections in (SCENARIO, FAMILY, CITY, EXPERIMENT)
+        for model in sections.values()
+    )
 ]
 MODELS += METHODS.values()
 

@@ -327,21 +327,25 @@ RECIPES = {
         after=("exports",),
         prints=("report/report.",),
     ),
-    "help: ranking": Recipe(
-        "cns-eval ranking simulated/report",
-        changes=(
-            ("simulated/report real/report", "output/report output/report"),
-        ),
-        after=("own city",),
-        prints=("Kendall's tau",),
+    "table of an entrant": Recipe("experiment,map,database", file="mine.csv"),
+    "compare": Recipe(
+        ".venv/bin/cns-eval compare mine.csv",
+        after=("table of an entrant",),
+        prints=("mine ", "layered-overlap "),
     ),
-    "help: trend of recordings": Recipe(
-        "cns-eval trend family/riverside_01_m*",
-        changes=(
-            ("riverside_01", "town_01"),
-            ("riverside_02", "town_02"),
-        ),
-        after=("family drives",),
+    "help: compare": Recipe(
+        "cns-eval compare mine/results.csv",
+        changes=(("mine/results.csv", "mine.csv"),),
+        after=("table of an entrant",),
+        prints=("mine ", "layered-overlap "),
+    ),
+    "means of a table": Recipe(
+        "from pathlib import Path\n\nfrom evaluation.results",
+        changes=(('"results.csv"', '"mine.csv"'),),
+        after=("table of an entrant",),
+        file="means.py",
+        command=".venv/bin/python means.py",
+        prints=("('mine', False) 0.895",),
     ),
     "Python": Recipe(
         "from evaluation import open_drive",
@@ -420,18 +424,15 @@ RECIPES = {
         makes=("drive.html",),
     ),
     "decay": Recipe(
-        "base: riverside_01\nmissing: [0, 0.3",
-        changes=(
-            ("riverside_01", "town/sequence_01.yaml"),
-            ("0, 0.3, 0.6", "0, 0.6"),
-        ),
+        "maps: riverside\ndrives: stages",
+        changes=(("riverside", "town"), ("0, 0.3, 0.6", "0, 0.6")),
         file="decay.yaml",
     ),
     "first finding": Recipe(
-        ".venv/bin/cns-drake trend --vary decay.yaml",
-        changes=(("riverside_02", "town/sequence_02.yaml"),),
+        ".venv/bin/cns-drake study decay.yaml",
         after=("decay", "start a city"),
-        makes=("decay/trend.csv", "decay/trend.png"),
+        prints=("decay/index.html",),
+        makes=("decay/results.csv",),
     ),
     "tutorial's study": Recipe(
         "cns-drake reproduce riverside --output output",
@@ -499,34 +500,73 @@ RECIPES = {
             ("riverside_02", "town_02"),
         ),
         after=("family", "start a city"),
-        prints=("family/town_01_m600_s0", "trend/trend.csv"),
-        makes=("family/scenarios/town_01_m600_s0.yaml", "trend/trend.pdf"),
+        prints=("family/town_01_m600_s0", "AUC"),
+        makes=("family/scenarios/town_01_m600_s0.yaml",),
     ),
     "family trend": Recipe(
-        ".venv/bin/cns-drake trend --vary family.yaml",
+        ".venv/bin/cns-drake study trend",
         changes=(
-            ("riverside_02", "town/sequence_02.yaml"),
-            ("--output trend", "--output simulated"),
+            (
+                "study trend",
+                "study trend town --set database.missing=[0,0.6] --set seeds=0",
+            ),
         ),
-        after=("family", "start a city"),
-        prints=("simulated/trend.csv",),
-        makes=("simulated/trend.pdf", "simulated/scenarios/*m600_s0.yaml"),
+        after=("start a city",),
+        prints=("trend/index.html",),
+        makes=("trend/results.csv",),
     ),
-    "help: trend": Recipe(
-        "cns-drake trend --vary family.yaml",
+    "experiments": Recipe(
+        ".venv/bin/cns-drake study --list",
+        prints=("map-pairs", "cases:"),
+    ),
+    "seasons": Recipe(
+        "about: Does an old map fail sooner",
         changes=(
-            ("riverside_02", "town/sequence_02.yaml"),
-            ("output trend", "output simulated"),
+            ("suburbia", "town"),
+            ("[btc, layered-overlap]", "[solid]"),
+            ("[1, 2, 3]", "[1]"),
         ),
-        after=("family trend",),
-        prints=("simulated/trend.csv",),
+        file="seasons.yaml",
+    ),
+    "study": Recipe(
+        ".venv/bin/cns-drake study seasons.yaml",
+        after=("seasons", "start a city"),
+        prints=("seasons/index.html",),
+        makes=("seasons/results.csv", "seasons/queries.csv"),
+    ),
+    "study in pandas": Recipe(
+        "import pandas as pd",
+        after=("study",),
+        file="seasons.py",
+        command=".venv/bin/python seasons.py",
+        makes=("seasons.png",),
+    ),
+    "study of recordings": Recipe(
+        ".venv/bin/cns-drake study stages output",
+        after=("own city",),
+        prints=("recorded/index.html",),
+        makes=("recorded/results.csv",),
+    ),
+    "cases": Recipe(
+        "about: What do leaves and snow cost",
+        changes=(("suburbia", "town"),),
+        file="winter.yaml",
     ),
     "ladder": Recipe(
-        ".venv/bin/cns-drake ladder metropolis",
-        changes=(("metropolis", "town --cause construction"),),
-        after=("start a city",),
-        prints=("ladder/ladder.csv", "Town, "),
-        makes=("ladder/ladder.png", "ladder/queries.csv"),
+        ".venv/bin/cns-drake study ladder metropolis",
+        # All causes of the ladder take many minutes.
+        changes=(("ladder metropolis --quick", "winter.yaml"),),
+        after=("cases", "start a city"),
+        prints=("ladder/index.html",),
+        makes=("ladder/results.csv",),
+    ),
+    "crossed causes": Recipe(
+        "about: Do snow and another lane",
+        file="crossed.yaml",
+    ),
+    "compare of a study": Recipe(
+        ".venv/bin/cns-eval compare ladder",
+        after=("ladder",),
     ),
     "age": Recipe(
         ".venv/bin/cns-drake age suburbia",
@@ -538,15 +578,13 @@ RECIPES = {
         makes=("old_suburbia/history.csv", "old_suburbia/rates.csv"),
     ),
     "years": Recipe(
-        ".venv/bin/cns-drake years suburbia",
+        ".venv/bin/cns-drake study years suburbia",
         changes=(
-            ("years suburbia", "years town"),
-            ("5 20", "20"),
-            ("output years", "output aged"),
+            ("suburbia --quick", "town --quick --set database.years=[0,20]"),
         ),
         after=("start a city",),
-        prints=("aged/years.csv", "20 years"),
-        makes=("aged/lifetimes.csv", "aged/years.png"),
+        prints=("years/index.html",),
+        makes=("years/results.csv",),
     ),
     "help: age": Recipe(
         "cns-drake age suburbia",
@@ -557,22 +595,6 @@ RECIPES = {
         ),
         after=("start a city",),
         makes=("pictured/history.csv", "pictured/pictures/film.jpg"),
-    ),
-    "help: years": Recipe(
-        "cns-drake years suburbia",
-        changes=(
-            ("years suburbia", "years town"),
-            ("5 20", "20"),
-            ("output years", "output aged"),
-        ),
-        after=("years",),
-        prints=("aged/years.csv",),
-    ),
-    "help: ladder": Recipe(
-        "cns-drake ladder metropolis",
-        changes=(("metropolis", "town --cause construction"),),
-        after=("ladder",),
-        prints=("ladder/ladder.csv",),
     ),
     "scattered losses": Recipe(
         ".venv/bin/cns-drake generate --vary worlds/downtown/hard_database",
@@ -655,6 +677,15 @@ RECIPES = {
         after=("method", "own city"),
         prints=("heights", "AUC"),
     ),
+    "own method in a study": Recipe(
+        ".venv/bin/cns-drake study ladder suburbia --quick --method",
+        changes=(
+            ("ladder suburbia --quick", "decay.yaml"),
+            ("ring++", "solid"),
+        ),
+        after=("method", "decay", "start a city"),
+        prints=("mine/index.html",),
+    ),
     "overlap": Recipe(
         ".venv/bin/cns-eval pr --truth",
         changes=(_FIRST, _LAST),
@@ -663,7 +694,7 @@ RECIPES = {
         makes=("overlaps.csv",),
     ),
     "exact overlap": Recipe(
-        ".venv/bin/cns-drake overlap",
+        ".venv/bin/cns-drake export-pairs metropolis_01 metropolis_04",
         changes=(
             (
                 "metropolis_01 metropolis_04",
@@ -671,20 +702,8 @@ RECIPES = {
             ),
         ),
         after=("own city",),
-        prints=("exact.csv",),
-        makes=("exact.csv",),
-    ),
-    "help: overlap": Recipe(
-        "cns-drake overlap metropolis_01",
-        changes=(
-            (
-                "metropolis_01 metropolis_04",
-                "town/sequence_01.yaml town/sequence_02.yaml",
-            ),
-            ("overlaps.csv", "exact.csv"),
-        ),
-        after=("own city",),
-        prints=("exact.csv",),
+        prints=("exact/overlaps.csv",),
+        makes=("exact/overlaps.csv",),
     ),
     "localisation": Recipe(
         ".venv/bin/cns-eval localise output/metropolis_01 "
@@ -835,20 +854,22 @@ NOT_RUN = {
     "them; `.ci/run` runs all",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
-    "cns-drake map-pairs suburbia_5": "ages and surveys a whole city, for "
-    "minutes; test_map_pairs reads its table",
-    "cns-drake ladder --levels": "hours of work; the recipe ladder climbs some "
-    "of it",
+    ".venv/bin/cns-drake study ladder suburbia --quick --output": "measures "
+    "20 causes, for many minutes; the recipe ladder has fewer",
+    "cns-drake study ladder suburbia": "the same command",
+    ".venv/bin/cns-drake study map-pairs": "ages and surveys a whole city, for "
+    "minutes; the recipe map truth has a small one",
+    ".venv/bin/cns-drake study size": "describes shipped drives, for many "
+    "minutes",
+    ".venv/bin/cns-drake study fresh": "draws shipped cities and drives "
+    "through them, for many minutes; test_fresh_cities draws a small one",
+    "cns-drake study levels": "takes hours",
+    "cns-eval compare mine": "needs these hours",
     "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
     "script of another project; test_traffic_recording records traffic",
-    "cns-drake size": "describes shipped drives, for many minutes; test_size "
-    "has small ones",
-    ".venv/bin/cns-drake size": "for the same reason",
-    "cns-drake fresh": "draws shipped cities and drives through them, for many "
-    "minutes; test_fresh_cities draws a small one",
-    ".venv/bin/cns-drake fresh": "as the command without a path",
-    "cns-drake levels mine": "needs these hours; test_levels has such tables",
-    "cns-drake levels ours": "needs the same hours",
+    ".venv/bin/cns-drake study stages --method heights.py": "drives through "
+    "shipped cities, for an hour",
+    "method           auc, mean": "is what the recipe compare prints",
     "cns-eval pr --method map-closures": "needs an extra",
     "cns-drake train": "needs an extra, and minutes; test_training trains",
     ".venv/bin/cns-drake train": "needs that extra, too",

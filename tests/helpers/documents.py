@@ -16,8 +16,9 @@ PROGRAMS = (
 )
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"`([^`]+)`")
-# A name such as `cns-drake scan`, which the table of commands explains.
-_MENTION = re.compile(r"(cns-drake|cns-eval) [a-z-]+")
+# A name such as `cns-drake scan`, which the table of commands explains, or
+# `cns-drake study ladder`.
+_MENTION = re.compile(r"(cns-drake|cns-eval) (study )?[a-z-]+")
 
 
 @dataclass(frozen=True)

@@ -58,13 +58,13 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
         tmp_path,
         folder,
         tasks=["place", "change"],
-        database={"stage": ["last", "own"]},
+        both={"stage": ["last", "own"]},
     )
     databases = {"own": "metropolis_01", "last": "metropolis_04_control"}
     query = folder / "metropolis_04"
     found = {}
     for stage, name in databases.items():
-        here = {"database.stage": stage}
+        here = {"both.stage": stage}
         found[stage] = values(results, **here, task="place", gate=False)
         alone = run(
             open_drive(folder / name),
@@ -105,14 +105,12 @@ def test_protocols_may_vary(folder, tmp_path):
 def test_the_last_stage_alone(folder, tmp_path):
     """A fixed stage counts, too."""
     fields = {"protocol": "recorded"}
-    one = measure(
-        tmp_path / "one", folder, database={"stage": "last"}, **fields
-    )
+    one = measure(tmp_path / "one", folder, both={"stage": "last"}, **fields)
     both = measure(
-        tmp_path / "both", folder, database={"stage": ["last", "own"]}, **fields
+        tmp_path / "both", folder, both={"stage": ["last", "own"]}, **fields
     )
     assert values(one, gate=False) == values(
-        both, **{"database.stage": "last"}, gate=False
+        both, **{"both.stage": "last"}, gate=False
     )
 
 
@@ -122,13 +120,13 @@ def test_drives_without_a_control(tmp_path):
     results = measure(
         tmp_path / "out",
         tmp_path / "drives",
-        database={"stage": ["last", "own"]},
+        both={"stage": ["last", "own"]},
         on_note=notes.append,
     )
     assert notes == [
         "town: no drive on the route of town_01 in the stage of town_02"
     ]
-    assert {row.factors["database.stage"] for row in results.rows} == {"own"}
+    assert {row.factors["both.stage"] for row in results.rows} == {"own"}
     assert "kept" not in {row.metric for row in results.rows}
 
 
@@ -144,13 +142,14 @@ def test_drives_without_a_control(tmp_path):
         ({"database": {"distractors": 9}}, "database.distractors: the rec"),
         ({"query": {"hide_sector": 90}}, "query.hide_sector: the recordings"),
         ({"query": {"stage": "last"}}, "query.stage: the recordings"),
+        ({"database": {"stage": "last"}}, "database.stage: the recordings"),
         ({"both": {"lidar": "vlp-16"}}, "both.lidar: the recordings"),
         ({"cases": {"a": {"database": {"stage": "last"}}}}, "cause: the rec"),
         (
             {"database": {"stage": "01"}},
             "database.stage: '01': recordings have",
         ),
-        ({"database": {"stage": ["own", "first"]}}, "database.stage: 'first'"),
+        ({"both": {"stage": ["own", "first"]}}, "both.stage: 'first'"),
         ({"both": {"fresh": [1]}}, "both.fresh: .*: no shipped map"),
     ],
 )

@@ -1,0 +1,166 @@
+"""What the page on studies says of experiments and tables is so."""
+
+import inspect
+import itertools
+import re
+
+from helpers import documents
+import pytest
+import yaml
+
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.studies import comparisons
+from cns_drake.studies.experiment import (
+    Experiment,
+    conditions,
+    load_experiment,
+    shipped_experiments,
+)
+from cns_drake.studies.study import TASKS
+from evaluation.recognition import place_outcome
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.table import Answers, QueryRows, Results, Row
+
+PAGE = documents.read("docs/studies.md")
+
+
+def codes(text):
+    return re.findall(r"`([^`]+)`", text)
+
+
+def first_codes(title):
+    rows = documents.table(PAGE, title)
+    return [name for row in rows for name in codes(row[0])]
+
+
+def test_shipped_experiments_are_listed_with_their_questions():
+    rows = documents.table(PAGE, "## Shipped experiments")
+    said = {codes(row[0])[0]: row[1] for row in rows}
+    assert said == {n: load_experiment(n).about for n in shipped_experiments()}
+
+
+def test_experiments_that_pages_name_ship():
+    named = {
+        piece.text.split()[2]
+        for page in documents.pages()
+        for piece in documents.inline(page)
+        if re.fullmatch(r"cns-drake study [a-z-]+", piece.text)
+    }
+    assert named
+    assert named <= shipped_experiments().keys()
+
+
+def test_all_fields_of_an_experiment_are_listed():
+    fields = first_codes("## Fields of an experiment")
+    assert sorted(fields) == sorted(Experiment.model_fields)
+
+
+def test_what_can_vary_exists():
+    named = first_codes("### What can vary")
+    scenario = [name for name in named if "." in name]
+    for name in scenario:
+        section, field = name.split(".")
+        annotation = Scenario.model_fields[section].annotation
+        assert field in annotation.model_fields, name
+    source = inspect.getsource(comparisons)
+    for name in set(named) - {*scenario, "protocol", "crop"}:
+        assert f'"{name}"' in source, name
+    fields = RetrievalProtocol.__dataclass_fields__
+    (values,) = (
+        row[2]
+        for row in documents.table(PAGE, "### What can vary")
+        if row[1] == "protocol"
+    )
+    assert {*codes(values)} <= fields.keys()
+
+
+def test_tasks_and_their_settings_are_listed():
+    rows = documents.table(PAGE, "## Tasks and metrics")
+    assert [codes(row[0])[0] for row in rows] == list(TASKS)
+    for row in rows:
+        task = TASKS[codes(row[0])[0]]
+        named = re.findall(r"`(\w+)`: ", row[2])
+        assert sorted(named) == sorted(task.defaults)
+        assert bool(named) == (row[2] != "none")
+
+
+def test_columns_of_the_tables_are_listed():
+    key = {
+        **dict.fromkeys(("experiment", "map", "database", "query"), "a"),
+        **{"seed": 1, "factors": {}, "task": "place", "method": "a"},
+        **{"gate": False, "protocol": "fair"},
+    }
+    said = first_codes("## The table of results")
+    row = Row(**key, metric="auc", value=1.0)
+    assert {*said, "factors"} == set(Row.__dataclass_fields__)
+    assert Results.of([row]).rows == (row,)
+    columns = first_codes("## The table of queries")
+    answers = Answers(**key, columns={})
+    assert QueryRows.of([answers]).answers == (answers,)
+    source = inspect.getsource(inspect.getmodule(Answers))
+    known = source.partition("_ANSWERS = {\n")[2].partition("\n}")[0]
+    assert columns == re.findall(r'"(\w+)":', known)
+
+
+def test_metrics_are_those_of_the_tasks():
+    tasks = {
+        name: inspect.getsource(inspect.getmodule(task))
+        for name, task in TASKS.items()
+    }
+    for name in ("place", "pose"):
+        tasks[name] += inspect.getsource(place_outcome)
+    task = ""
+    for row in documents.table(PAGE, "| task | metric | meaning |"):
+        task = (codes(row[0]) or [task])[0]
+        for metric in codes(row[1]):
+            parts = metric.split("_")
+            found = f'"{metric}"' in tasks[task]
+            # Some names are put together.
+            found |= parts[0] in ("iou", "precision", "recall")
+            assert found, metric
+
+
+@pytest.mark.parametrize(
+    ("page", "start", "number"),
+    [
+        ("docs/studies.md", "about: Does an old map", 6),
+        ("docs/studies.md", "about: What do leaves", 7),
+        ("docs/ladder.md", "about: Do snow", 4),
+        ("docs/tutorial.md", "maps: riverside", 3),
+    ],
+)
+def test_examples_have_their_conditions(tmp_path, page, start, number):
+    (block,) = (
+        block.text
+        for block in documents.fenced(documents.read(page))
+        if block.text.startswith(start)
+    )
+    path = tmp_path / "example.yaml"
+    path.write_text(block)
+    found = conditions(load_experiment(path))
+    assert len(found) == number
+    assert sum(one.is_baseline for one in found) == 1
+    # No two are the same.
+    for a, b in itertools.combinations(found, 2):
+        assert a.factors != b.factors
+
+
+def test_inline_examples_load(tmp_path):
+    found = 0
+    for page in documents.pages():
+        for piece in documents.inline(page):
+            if re.match(r"tasks: \{|- \{kind: ", piece.text):
+                path = tmp_path / "example.yaml"
+                path.write_text(piece.text)
+                assert load_experiment(path).tasks
+                found += 1
+    assert found >= 3
+    line = next(
+        piece.text
+        for piece in documents.inline(PAGE)
+        if piece.text.startswith("{name: old")
+    )
+    made = Experiment.model_validate(
+        {"name": "a", "maps": [yaml.safe_load(line)]}
+    )
+    assert made.maps[0].years == 20
