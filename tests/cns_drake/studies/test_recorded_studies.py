@@ -146,8 +146,8 @@ def test_drives_without_a_control(tmp_path):
         ({"both": {"lidar": "vlp-16"}}, "both.lidar: the recordings"),
         ({"cases": {"a": {"database": {"stage": "last"}}}}, "cause: the rec"),
         (
-            {"database": {"stage": "01"}},
-            "database.stage: '01': recordings have",
+            {"both": {"stage": "01"}},
+            "both.stage: .01.: recordings have",
         ),
         ({"both": {"stage": ["own", "first"]}}, "both.stage: 'first'"),
         ({"both": {"fresh": [1]}}, "both.fresh: .*: no shipped map"),
