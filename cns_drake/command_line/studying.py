@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -116,14 +116,15 @@ def study(
         path = shipped_experiments().get(name, Path(name))
         typer.echo(path.read_text("utf-8"), nl=False)
         return
-    overrides = list(override or ())
-    if task:
-        chosen = load_experiment(name, overrides, quick=quick).tasks
-        tasks = {one: chosen.get(one, {}) for one in task}
-        overrides.append(("tasks", tasks))  # type: ignore[arg-type]
-    if method:
-        overrides.append(("methods", list(method)))  # type: ignore[arg-type]
+    overrides = override or ()
     experiment = load_experiment(name, overrides, quick=quick)
+    chosen: list[str | tuple[str, Any]] = list(overrides)
+    for field, names in (("tasks", task), ("methods", method)):
+        if names:
+            # They keep their settings.
+            known = getattr(experiment, field) or {}
+            chosen.append((field, {one: known.get(one, {}) for one in names}))
+    experiment = load_experiment(name, chosen, quick=quick)
     if output is None:
         raise InputError("--output: missing")
     with uninterrupted():

@@ -82,7 +82,6 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
 def choose_methods(
     files: Iterable[Path] = (),
     settings: Iterable[str] = (),
-    only: Iterable[str] = (),
 ) -> tuple[MethodChoice, ...]:
     """Returns the methods of this package and those in files.
 
@@ -90,12 +89,11 @@ def choose_methods(
         files: Python files that register a method each, or names of optional
             methods of this package.
         settings: `METHOD.NAME=VALUE` of parameters without their defaults.
-        only: names of those to return; by default all.
 
     Raises:
         InputError: if a file registers no method, or one that is there
-            already, an optional method is not installed, a name is not known,
-            or a setting is not known or does not fit.
+            already, an optional method is not installed, or a setting is not
+            known or does not fit.
     """
     chosen = [MethodChoice(name) for name in shipped_methods()]
     stems = set()
@@ -114,13 +112,6 @@ def choose_methods(
         if choice.name in {one.name for one in chosen}:
             raise InputError(f"{path}: another method is named {choice.name!r}")
         chosen.append(choice)
-    names = [one.name for one in chosen]
-    wanted = list(only) or names
-    for name in wanted:
-        if name not in names:
-            known = ", ".join(names)
-            raise InputError(f"--only: no method {name!r} (known: {known})")
-    chosen = [one for one in chosen if one.name in wanted]
     named: dict[str, dict[str, Setting]] = {one.name: {} for one in chosen}
     for text in settings:
         key, value = parse_setting(text, _FORM)

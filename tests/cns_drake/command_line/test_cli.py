@@ -167,16 +167,6 @@ def test_weather_that_cannot_be(files, tmp_path, capfd, words, fault):
     assert line.startswith(f"cns-drake: error: {fault}")
 
 
-def test_a_trend_through_two_maps_measures_nothing(tmp_path, capfd):
-    family = tmp_path / "family.yaml"
-    family.write_text("base: suburbia_01\nmissing: [0.0]\n")
-    output = tmp_path / "output"
-    words = ["--vary", family, "--query", "riverside_01", "--output", output]
-    result = run_here(capfd, "trend", *words)
-    assert_one_line(result, "riverside_01: a drive through riverside, but sub")
-    assert {path.name for path in output.iterdir()} == {"scenarios"}
-
-
 def test_diagram_script_has_options():
     """Where the documents run one, `test_recipes` does."""
     shown = run("--help", script=DIAGRAMS / "metropolis_04.py")
@@ -215,13 +205,19 @@ def test_diagram_script_has_options():
             "--pose: not finite",
         ),
         (["reproduce", "atlantis"], "unknown map 'atlantis'"),
-        (["ladder", "--cause", "war"], "--cause: no cause 'war'"),
-        (["ladder", "--levels", "--quick"], "--levels: the levels are frozen"),
-        (["ladder", "atlantis"], "unknown map 'atlantis'"),
-        (
-            ["trend", "--vary", "f", "--query", "q", "--set", "solid.x=1"],
-            "solid: no parameter 'x'",
-        ),
+        (["study"], "study: give an experiment, or --list"),
+        (["study", "war"], "war: neither an experiment of this package"),
+        (["study", "{files}"], "neither an experiment"),
+        (["study", "{files}/file"], "file: not a mapping of an experiment"),
+        (["study", "{files}/typo.yaml"], "typo.yaml: .*: Extra inputs"),
+        (["study", "levels", "--quick"], "levels.yaml: quick: no fields"),
+        (["study", "ladder", "atlantis"], "unknown map 'atlantis'"),
+        (["study", "ladder", "--task", "dance"], "ladder: tasks: no task 'dan"),
+        (["study", "ladder", "--method", "bow"], "ladder: methods: no method"),
+        (["study", "ladder", "--method", "no.py"], "methods: .*no.py: no such"),
+        (["study", "ladder", "--set", "levels"], "'levels' is not FIELD=VALUE"),
+        (["study", "ladder", "--set", "levels=[]"], "ladder.yaml: levels: "),
+        (["study", "ladder", "--jobs", "0"], "--jobs"),
         (
             ["reproduce", "--quick", "--pages"],
             "--quick and --pages exclude each other",

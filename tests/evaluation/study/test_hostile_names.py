@@ -9,7 +9,7 @@ import pytest
 
 from cns_drake.base.files import file_name
 from evaluation.report.tables import Table
-from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.figures import change_stems
 
@@ -24,7 +24,7 @@ def test_a_report_stays_in_its_folder(tmp_path):
         drive(recordings / name, stage, "a", city=MAP)
     output = tmp_path / "deep" / "er" / "report"
     before = set(tmp_path.rglob("*"))
-    (solid,) = choose_methods(only=["solid"])
+    solid = MethodChoice("solid")
     page = studies.report(recordings, output, [solid])
     new = set(tmp_path.rglob("*")) - before
     assert all(output in path.parents or path == output for path in new)

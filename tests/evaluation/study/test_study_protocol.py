@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.chosen_methods import MethodChoice
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.usefixtures("unrendered_figures"),
 ]
 
-SOLID = choose_methods(only=["solid"])
+SOLID = (MethodChoice("solid"),)
 
 
 def read(path):

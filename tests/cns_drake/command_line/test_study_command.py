@@ -1,0 +1,123 @@
+"""`cns-drake study`: what it lists, shows and takes."""
+
+from pathlib import Path
+
+from helpers.eval_program import run_program
+import pytest
+
+from cns_drake.__main__ import main
+from cns_drake.command_line.cli import app
+from cns_drake.studies import study as study_module
+from cns_drake.studies.experiment import load_experiment, shipped_experiments
+
+
+def run(capsys, *words):
+    return run_program(capsys, "cns-drake", main, *words)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The experiments, and maps, of all calls; nothing is measured."""
+    calls = []
+
+    def run_study(experiment, output, cluster, maps, **options):
+        calls.append((experiment, tuple(maps), options["source"]))
+        return Path(output) / "index.html"
+
+    monkeypatch.setattr(study_module, "run_study", run_study)
+    return calls
+
+
+def test_all_shipped_experiments_are_listed(capsys):
+    status, out, err = run(capsys, "study", "--list")
+    assert (status, err) == (0, "")
+    lines = dict(line.split(maxsplit=1) for line in out.splitlines())
+    assert lines == {
+        name: load_experiment(name).about for name in shipped_experiments()
+    }
+    # One line each, on a terminal of 80 columns.
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_an_experiment_is_shown_ready_to_copy(capsys, tmp_path):
+    for name, path in shipped_experiments().items():
+        status, out, err = run(capsys, "study", name, "--show")
+        assert (status, err) == (0, "")
+        assert out == path.read_text()
+        copy = tmp_path / f"{name}.yaml"
+        copy.write_text(out)
+        assert load_experiment(copy) == load_experiment(name)
+
+
+def test_a_faulty_file_is_not_shown(capsys, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("seeds: []\n")
+    status, out, err = run(capsys, "study", path, "--show")
+    assert (status, out) == (2, "")
+    assert f"error: {path}: seeds: " in err
+    assert err.count("\n") == 1
+
+
+def test_options_replace_fields(capsys, tmp_path, asked):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        """
+        database: {years: [0, 5, 20]}
+        tasks: {place: {}, change: {spacing: 5.0}}
+        methods: {solid: {ranges: [20, 40]}, btc: {}}
+        protocol: recorded
+        quick: {database: {years: [0, 20]}}
+        """
+    )
+    words = ["study", path, "town", "village", "--output", tmp_path / "out"]
+    status, out, err = run(capsys, *words)
+    assert (status, err) == (0, "")
+    assert out == f"{tmp_path / 'out' / 'index.html'}\n"
+    words += ["--quick", "--task", "change", "--task", "pose"]
+    words += ["--method", "solid", "--set", "protocol.radius=5"]
+    words += ["--set", "seeds=[3, 4]", "--jobs", "2"]
+    assert run(capsys, *words)[0] == 0
+    (whole, maps, source), (quick, *_) = asked
+    assert whole == load_experiment(path)
+    assert (maps, source) == (("town", "village"), str(path))
+    # Tasks and methods keep the settings of the file.
+    assert quick.tasks == {"change": {"spacing": 5.0}, "pose": {}}
+    assert quick.methods == {"solid": {"ranges": [20, 40]}}
+    assert quick.database == {"years": [0, 20]}
+    assert quick.protocol == {"base": "recorded", "radius": 5}
+    assert quick.seeds == (3, 4)
+
+
+def test_an_output_is_needed(capsys, asked):
+    status, out, err = run(capsys, "study", "ladder")
+    assert (status, out) == (2, "")
+    assert err == "cns-drake: error: --output: missing\n"
+    assert not asked
+
+
+RENAMED = {
+    **{
+        name: f"study {name}"
+        for name in (
+            *("ladder", "levels", "size", "years", "fresh", "trend"),
+            "map-pairs",
+        )
+    },
+    "overlap": "export-pairs A B --format overlap-table",
+}
+
+
+@pytest.mark.parametrize("old", RENAMED)
+@pytest.mark.parametrize("rest", [(), ("--help",), ("a", "--output", "b")])
+def test_former_commands_name_the_new_one(capsys, old, rest):
+    status, out, err = run(capsys, old, *rest)
+    assert (status, out) == (2, "")
+    now = f"'cns-drake {old}' is now 'cns-drake {RENAMED[old]}'"
+    assert err == f"cns-drake: error: {now}\n"
+    name, *more = RENAMED[old].split()
+    assert name in {
+        one.name or one.callback.__name__.replace("_", "-")
+        for one in app.registered_commands
+    }
+    if name == "study":
+        assert more[0] in shipped_experiments()
