@@ -95,7 +95,7 @@ def study(
         method: Run only this method, by name, or one of your own by its Python
             file; may be repeated.
         override: Replace a field of the experiment, nested ones with dots, such
-            as query.years=[0,5]; may be repeated.
+            as database.years=[0,5]; may be repeated.
         list_all: List the shipped experiments, and stop.
         show: Print the experiment's file, ready to copy, and stop.
     """
