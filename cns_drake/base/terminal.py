@@ -52,7 +52,8 @@ def make_program(
 
     Args:
         renamed: command of an earlier version -> what to call now, after the
-            program's name. Such a command is bad usage, and says so.
+            program's name, or with the name of another program. Such a
+            command is bad usage, and says so.
         groups: heading of the help -> its commands; by default all commands
             stand under one.
     """
@@ -60,9 +61,10 @@ def make_program(
     class Program(TyperGroup):
         def get_command(self, ctx: Any, cmd_name: str) -> Any:
             if renamed is not None and cmd_name in renamed:
-                raise _UsageError(
-                    f"'{name} {cmd_name}' is now '{name} {renamed[cmd_name]}'"
-                )
+                new = renamed[cmd_name]
+                if not new.startswith("cns-"):
+                    new = f"{name} {new}"
+                raise _UsageError(f"'{name} {cmd_name}' is now '{new}'")
             return super().get_command(ctx, cmd_name)
 
         def format_commands(self, ctx: Any, formatter: Any) -> None:

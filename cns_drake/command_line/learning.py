@@ -92,7 +92,7 @@ def export_pairs(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Sets of scans for other trainers.
+    """Export sets of scans for other trainers.
 
     Drives are simulated without a recording; positives, negatives and overlaps
     are exact. After an interruption the same command goes on.
@@ -155,7 +155,7 @@ def map_truth(
     output: Annotated[Path, typer.Option(metavar="DIR")],
     spacing: SessionSpacing = 1.0,
 ) -> None:
-    """Maps of two drives, labelled by rays.
+    """Label the maps of two drives by rays.
 
     A is the older drive and B the newer one, of one place: recordings made by
     cns-drake, or scenarios, which are simulated. Each point of A's map is kept,

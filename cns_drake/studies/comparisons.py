@@ -33,6 +33,7 @@ _QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
 _DATABASE_FIELDS = ("distractors", "lateral")
 # Sections whose draws follow the seed of a condition.
 _SEEDED = ("transient", "traffic", "ride", "driver")
+_RETURNS = ("ideal", "calibrated")
 # Stages by their place in the life of a map.
 OWN, LAST, FIRST, EARLIER = "own", "last", "first", "earlier "
 # Number of names for earlier stages: `earlier 1` to `earlier 4`.
@@ -147,9 +148,13 @@ class PairOfDrives:
                     chosen.append(self._possible(at_level))
                     break
                 except MissingError as error:
-                    missing = error
+                    fault = error
+            else:
+                missing = fault
         if missing and len(chosen) == 1:
             raise missing
+        if missing:
+            self.on_note(str(missing))
         fields: Any = {}
         for one in chosen:
             for side, values in one.items():
@@ -173,6 +178,7 @@ class PairOfDrives:
         }
         if changed:
             changed["seed"] = seed
+            base_protocol(changed, self.source, "query")
         protocol = base_protocol(
             {**fields.get("protocol", {}), **changed}, self.source
         )
@@ -195,24 +201,27 @@ class PairOfDrives:
         found: dict[str, Changes] = {}
         for side, changes in fields.items():
             left = dict(changes)
-            for name, check in (
-                ("stage", self._check_stage),
-                ("traffic", self._check_roads),
-            ):
-                try:
-                    check(left.get(name))
-                except MissingError as error:
-                    missing = error
-                    del left[name]
+            try:
+                self._check_stage(side, left.get("stage"))
+            except MissingError as error:
+                missing = error
+                del left["stage"]
+            try:
+                self._check_roads(left.get("traffic"))
+            except MissingError as error:
+                missing = error
+                del left["traffic"]
             if left:
                 found[side] = left
         if missing and not found:
             raise missing
+        if missing:
+            self.on_note(str(missing))
         return found
 
-    def _check_stage(self, stage: Any) -> None:
+    def _check_stage(self, side: str, stage: Any) -> None:
         if stage is not None:
-            self._stage(self._unchanged["database"], stage)
+            self._stage(side, self._unchanged["database"], stage)
 
     def _check_roads(self, traffic: Any) -> None:
         folder = map_folder(self.query)
@@ -226,6 +235,11 @@ class PairOfDrives:
             )
 
     def _check_side(self, side: str, changes: Changes) -> None:
+        if "fresh" in changes:
+            raise InputError(
+                f"{self.source}: {side}.fresh: it is a field of both, and of no"
+                " case"
+            )
         others = _DATABASE_FIELDS if side == "query" else _QUERY_FIELDS
         for name in others:
             if name in changes:
@@ -251,17 +265,31 @@ class PairOfDrives:
         """
         drive = self._unchanged[side]
         left = dict(changes)
-        for name in (*_QUERY_FIELDS, "distractors", "fresh", "years", "rates"):
+        if "rates" in left and "years" not in left:
+            raise InputError(f"{self.source}: {side}.rates: those of no years")
+        for name in (*_QUERY_FIELDS, "distractors", "years", "rates"):
             left.pop(name, None)
         if "lidar" in left:
-            drive = drive.with_lidar_preset(left.pop("lidar"))
+            try:
+                drive = drive.with_lidar_preset(left.pop("lidar"))
+            except InputError as error:
+                fault = str(error).removeprefix("--lidar: ")
+                raise InputError(
+                    f"{self.source}: {side}.lidar: {fault}"
+                ) from None
         if "returns" in left:
-            weather = left.pop("weather", None)
-            if weather is not None:
-                weather = validated(
-                    WeatherConfig, weather, f"{self.source}: {side}.weather"
+            returns, weather = left.pop("returns"), left.pop("weather", None)
+            if returns not in _RETURNS:
+                raise InputError(
+                    f"{self.source}: {side}.returns: {returns!r} is neither"
+                    f" {' nor '.join(_RETURNS)}"
                 )
-            drive = drive.with_returns(left.pop("returns"), weather)
+            if weather is not None:
+                where = f"{self.source}: {side}.weather"
+                weather = validated(WeatherConfig, weather, where)
+                if returns != "calibrated" and weather != WeatherConfig():
+                    raise InputError(f"{where}: no effect on {returns} returns")
+            drive = drive.with_returns(returns, weather)
             left.setdefault("seed", seed)
         lateral = left.pop("lateral", 0.0)
         viewpoint = left.pop("viewpoint", None)
@@ -278,7 +306,7 @@ class PairOfDrives:
             drive = moved(drive, _AHEAD, *place)
         elif viewpoint is not None:
             drive = moved(drive, 0.0, *self._place(side, viewpoint))
-        stage = self._stage(drive, left.pop("stage", OWN))
+        stage = self._stage(side, drive, left.pop("stage", OWN))
         if stage != drive.stage:
             drive = drive.replaced(stage=stage)
         if age[0]:
@@ -287,11 +315,10 @@ class PairOfDrives:
                     f"{self.source}: years: stage {LAST} ages, not the stage"
                     f" {drive.stage} of the {side}"
                 )
-            folder, stage = self.age(drive, *age, seed)
-            drive = drive.replaced(map=folder, stage=stage)
+            drive = self._elsewhere(side, drive, self.age, *age, seed)
         if "version" in left:
-            folder, stage = self.redraw(drive, left.pop("version"))
-            drive = drive.replaced(map=folder, stage=stage)
+            version = left.pop("version")
+            drive = self._elsewhere(side, drive, self.redraw, version)
         family = {n: left.pop(n) for n in FAMILY_FIELDS if n in left}
         if family:
             drive = self._decayed(side, drive, family, seed)
@@ -301,7 +328,26 @@ class PairOfDrives:
         self._fit(drive, left)
         if left:
             drive = drive.with_fields(left, f"{self.source}: {side}")
+        for name in set(_SEEDED) & set(left):
+            # No seed tells sections apart that draw nothing.
+            plain = type(getattr(drive, name))()
+            if getattr(drive, name).replaced(seed=plain.seed) == plain:
+                drive = drive.replaced(**{name: plain})
         return drive
+
+    def _elsewhere(
+        self,
+        side: str,
+        drive: Scenario,
+        make: Callable[..., tuple[str, str]],
+        *arguments: Any,
+    ) -> Scenario:
+        """Returns a drive through a map that is made."""
+        try:
+            folder, stage = make(drive, *arguments)
+        except InputError as error:
+            raise InputError(f"{self.source}: {side}.{error}") from None
+        return drive.replaced(map=folder, stage=stage)
 
     def _place(self, side: str, viewpoint: Any) -> tuple[float, float]:
         """Returns offset to the left [m] and heading [deg] of a viewpoint."""
@@ -318,7 +364,7 @@ class PairOfDrives:
             f" {', '.join(VIEWPOINTS)} nor [metres to the left, heading in deg]"
         )
 
-    def _stage(self, drive: Scenario, wanted: Any) -> str:
+    def _stage(self, side: str, drive: Scenario, wanted: Any) -> str:
         """Returns the stage that a name or a place among stages means."""
         own, last = str(drive.stage), str(self.query.stage)
         stages = sorted(map_folder(drive).stages())
@@ -336,16 +382,16 @@ class PairOfDrives:
                     raise MissingError(f"no stage before {last}")
                 if back >= number:
                     raise MissingError(
-                        f"{len(before)} stages before {last}, so none for"
+                        f"stages before {last}: {len(before)}, so none for"
                         f" '{wanted}'"
                     )
                 return before[back * (len(before) - 1) // max(1, number - 1)]
         if wanted in stages:
             return str(wanted)
         raise InputError(
-            f"{self.source}: stage: {wanted!r}: {map_folder(drive).name} has"
-            f" {', '.join(stages)}; or give {OWN}, {LAST}, {FIRST} or"
-            f" '{EARLIER}1' to '{EARLIER}{_STEPS}'"
+            f"{self.source}: {side}.stage: {wanted!r}:"
+            f" {map_folder(drive).name} has {', '.join(stages)}; or give"
+            f" {OWN}, {LAST}, {FIRST} or '{EARLIER}1' to '{EARLIER}{_STEPS}'"
         )
 
     def _decayed(
@@ -362,22 +408,23 @@ class PairOfDrives:
 
     def _fit(self, drive: Scenario, fields: dict[str, Any]) -> None:
         """Limits traffic to the roads, and drivers to what a drive has."""
-        driver = fields.get("driver")
-        if driver and driver.get("lane_changes") and drive.waypoints:
-            self.on_note(f"{drive.name}: waypoints have no lanes to change")
+        driver, traffic = (
+            one if isinstance(one := fields.get(name), Mapping) else {}
+            for name in ("driver", "traffic")
+        )
+        if driver.get("lane_changes") and drive.waypoints:
+            self.on_note("waypoints have no lanes to change")
             fields["driver"] = {**driver, "lane_changes": 0.0}
-        traffic = fields.get("traffic")
         if not traffic:
             return
-        follows = driver and driver.get("follows")
+        follows = driver.get("follows")
         share = _FOLLOWED_ROOM if follows else _MOST_ROOM
         graph = load_ways(map_folder(self.query)).graph
         most = int(share * room_for_vehicles(graph))
         for name in ("vehicles", "walkers"):
             if isinstance(given := traffic.get(name), int) and given > most:
                 self.on_note(
-                    f"{map_folder(self.query).name}: {given} {name} do not fit"
-                    f" its roads; {most} move"
+                    f"{given} {name} do not fit the roads; {most} move"
                 )
                 traffic = fields["traffic"] = {**traffic, name: most}
 
@@ -394,6 +441,8 @@ class PairOfDrives:
             name = drive.name
             if drive != self._plain[side]:
                 name += f"_{_ending(side, condition, seed)}"
+            if name in {one.name for one in known.values()}:
+                name += f"_{content[:6]}"
             known[content] = drive.replaced(name=name)
         return known[content]
 

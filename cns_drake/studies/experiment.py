@@ -9,14 +9,22 @@ product of all factors.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+import contextlib
 from dataclasses import dataclass, field, replace
-import functools
 import itertools
 import json
+import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_type_hints
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    create_model,
+    model_validator,
+)
 
 from cns_drake.base.errors import InputError, validated
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
@@ -32,23 +40,34 @@ _FACTORED = (*SIDES, "protocol")
 _LISTS: Mapping[str, tuple[type, ...]] = {
     "viewpoint": (int, float),
     "without": (str,),
+    "route": (dict,),
     "xyz": (int, float),
     "rpy_deg": (int, float),
 }
 # A list of so many evenly spaced numbers.
 _SPREAD = {"from", "to", "count"}
+# The factor of the fresh versions of the shipped maps.
+FRESH = "both.fresh"
 # Factors of experiments with cases: the name of the case, and its level.
 CAUSE, LEVEL = "cause", "level"
 NO_CAUSE = "none"
 _MOST_CONDITIONS = 20_000
+_MOST_SPREAD = 1000
 
 Changes = Mapping[str, Any]
-Side = Literal["both", "database", "query"]
-Case = dict[Side, dict[str, Any]]
+Case = dict[str, dict[str, Any]]
 
 
 def _in_a_tuple(value: Any) -> Any:
-    return [value] if isinstance(value, str | int | dict) else value
+    value = [value] if isinstance(value, str | int | dict) else value
+    _check_once(value)
+    return value
+
+
+def _check_once(values: Any) -> None:
+    for one in values if isinstance(values, list) else ():
+        if values.count(one) > 1:
+            raise ValueError(f"{one!r} is there twice")
 
 
 def _by_name(value: Any) -> Any:
@@ -57,17 +76,34 @@ def _by_name(value: Any) -> Any:
         value = [value]
     if not isinstance(value, list):
         return value
+    _check_once(value)
     return {str(name): {} for name in value}
 
 
-def _with_base(value: Any) -> Any:
-    """Returns the name of a protocol as a mapping without other fields."""
+def _base(value: Any) -> Any:
     return {"base": value} if isinstance(value, str) else value
 
 
-# Fields with a short form -> what writes it out.
-_SHORT = {"tasks": _by_name, "methods": _by_name, "protocol": _with_base}
+def _case(value: Any) -> Case | tuple[str, ...]:
+    """Returns the fields of each side of a case, or names of cases."""
+    if isinstance(value, list | tuple):
+        if not value or not all(isinstance(one, str) for one in value):
+            raise ValueError("a list of a case holds names of other cases")
+        _check_once(list(value))
+        return tuple(value)
+    if not (isinstance(value, dict) and value):
+        raise ValueError("neither fields of a side nor names of other cases")
+    for side, fields in value.items():
+        if side not in SIDES:
+            raise ValueError(f"{side}: no side (there are: {', '.join(SIDES)})")
+        if not (isinstance(fields, dict) and fields):
+            raise ValueError(f"{side}: no fields")
+    return value
+
+
 _Settings = Annotated[dict[str, dict[str, Any]], BeforeValidator(_by_name)]
+# Fields of an experiment that may be written shorter -> their long form.
+_LONG_FORMS = {"tasks": _by_name, "methods": _by_name, "protocol": _base}
 
 
 class MadeMap(Section):
@@ -99,6 +135,16 @@ class MadeMap(Section):
         if (self.age is None) != (self.years is None):
             raise ValueError("years: they belong to age")
         return self
+
+
+def _map(value: Any) -> str | MadeMap:
+    """Returns the name of a map, or how to make one."""
+    if isinstance(value, str | MadeMap):
+        return value
+    try:
+        return validated(MadeMap, value, "to be made")
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
 class Experiment(Section):
@@ -140,39 +186,35 @@ class Experiment(Section):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]
     about: str = ""
     maps: Annotated[
-        tuple[str | MadeMap, ...] | None, BeforeValidator(_in_a_tuple)
-    ] = None
+        tuple[Annotated[Any, PlainValidator(_map)], ...] | None,
+        BeforeValidator(_in_a_tuple),
+    ] = Field(default=None, min_length=1)
     files: str | None = None
     drives: Literal["same-route", "stages", "first-and-last"] = "same-route"
     both: dict[str, Any] = Field(default_factory=dict)
     database: dict[str, Any] = Field(default_factory=dict)
     query: dict[str, Any] = Field(default_factory=dict)
-    cases: dict[Name, Case | tuple[Name, ...]] = Field(default_factory=dict)
-    levels: tuple[Annotated[int, Field(ge=1, le=100)], ...] | None = None
+    cases: dict[Name, Annotated[Any, PlainValidator(_case)]] = Field(
+        default_factory=dict
+    )
+    levels: Annotated[
+        tuple[Annotated[int, Field(ge=1, le=100)], ...] | None,
+        BeforeValidator(_in_a_tuple),
+    ] = Field(default=None, min_length=1)
     design: Literal["product", "one-at-a-time"] = "product"
     tasks: _Settings = Field(default={"place": {}}, min_length=1)
-    methods: _Settings | None = None
+    methods: _Settings | None = Field(default=None, min_length=1)
     seeds: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**31)], ...],
         BeforeValidator(_in_a_tuple),
     ] = Field(default=(1,), min_length=1)
-    protocol: Annotated[dict[str, Any], BeforeValidator(_with_base)] = Field(
+    protocol: Annotated[dict[str, Any], BeforeValidator(_base)] = Field(
         default_factory=dict
     )
     baseline: dict[str, Any] = Field(default_factory=dict)
     frozen: str | None = None
     charts: tuple[dict[str, Any], ...] = ()
     quick: dict[str, Any] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _check_cases(self) -> Experiment:
-        for name, case in self.cases.items():
-            for other in case if isinstance(case, tuple) else ():
-                if not isinstance(self.cases.get(other), dict):
-                    raise ValueError(
-                        f"cases.{name}: {other} is no case with fields"
-                    )
-        return self
 
     @property
     def fresh(self) -> list[int]:
@@ -228,12 +270,14 @@ def load_experiment(
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of an experiment's fields")
     values.setdefault("name", path.stem)
-    # A single field that replaces another one leaves the rest.
-    for name, written_out in _SHORT.items():
-        if name in values:
-            values[name] = written_out(values[name])
+    for name, long_form in _LONG_FORMS.items():
+        # Their validation names the field that cannot be used.
+        with contextlib.suppress(ValueError):
+            values |= {name: long_form(values[name])} if name in values else {}
     if quick:
-        values = _merged(values, values.get("quick") or {})
+        if not isinstance(values.get("quick"), dict):
+            raise InputError(f"{path}: quick: no fields of a smaller one")
+        values = _merged(values, values["quick"])
     for one in overrides:
         if isinstance(one, str):
             values = _merged(values, _override(one))
@@ -242,10 +286,15 @@ def load_experiment(
     experiment = validated(Experiment, values, path)
     try:
         conditions(experiment)
+        method_variants(experiment.methods or {})
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
     if not quick and experiment.quick:
-        load_experiment(name_or_file, overrides, quick=True)
+        try:
+            load_experiment(name_or_file, overrides, quick=True)
+        except InputError as error:
+            fault = str(error).removeprefix(f"{path}: ")
+            raise InputError(f"{path}: quick: {fault}") from None
     return experiment
 
 
@@ -306,12 +355,14 @@ def conditions(experiment: Experiment) -> list[Condition]:
         first[path] = asked
     if wanted:
         raise ValueError(f"baseline.{next(iter(wanted))}: this is no factor")
+    cases = list(_cases(experiment))
+    lengths = [len(values) for values in factors.values()]
+    number = 1 + sum(lengths) - len(lengths)
     if experiment.design == "product":
-        number = functools.reduce(
-            lambda n, some: n * len(some), factors.values(), 1
-        )
-        if number > _MOST_CONDITIONS:
-            raise ValueError(f"{number} conditions, more than 20000")
+        number = math.prod(lengths)
+    if (number := number * len(cases)) > _MOST_CONDITIONS:
+        raise ValueError(f"{number} conditions, more than {_MOST_CONDITIONS}")
+    if experiment.design == "product":
         cells = [
             dict(zip(factors, some, strict=True))
             for some in itertools.product(*factors.values())
@@ -323,7 +374,6 @@ def conditions(experiment: Experiment) -> list[Condition]:
             cells += [
                 {**first, path: one} for one in values if one != first[path]
             ]
-    cases = list(_cases(experiment))
     found = []
     for cell, (cause, level, members) in itertools.product(cells, cases):
         changes: dict[str, Any] = fixed
@@ -353,19 +403,32 @@ def _factors(
     fixed: dict[str, Any] = {}
     factors: dict[str, list[Any]] = {}
     for side in _FACTORED:
-        for path, value in _leaves(getattr(experiment, side), (side,)):
-            if path == "both.fresh":
-                continue
-            if not isinstance(value, _Values):
+        single, varied = _split(getattr(experiment, side), (side,))
+        for path, value in single.items():
+            if path != FRESH:
                 fixed = _merged(fixed, _nested(path, value))
-                continue
-            if not value:
-                raise ValueError(f"{path}: a factor without a value")
-            for one in value:
-                if value.count(one) > 1:
-                    raise ValueError(f"{path}: {one!r} is there twice")
-            factors[path] = list(value)
+        factors |= {n: some for n, some in varied.items() if n != FRESH}
     return fixed, factors
+
+
+def _split(
+    fields: Changes, above: tuple[str, ...]
+) -> tuple[dict[str, Any], dict[str, list[Any]]]:
+    """Returns path -> value of single fields, and path -> values of factors."""
+    single: dict[str, Any] = {}
+    varied: dict[str, list[Any]] = {}
+    for path, value in _leaves(fields, above):
+        if path in single or path in varied:
+            raise ValueError(f"{path}: it is there twice")
+        if isinstance(value, _Values):
+            try:
+                _check_once(list(value))
+            except ValueError as error:
+                raise ValueError(f"{path}: {error}") from None
+            varied[path] = list(value)
+        else:
+            single[path] = value
+    return single, varied
 
 
 class _Values(list):
@@ -381,9 +444,17 @@ def _leaves(
         path = ".".join(place)
         if isinstance(value, dict) and set(value) == _SPREAD:
             yield path, _Values(_spread(path, value))
-        elif isinstance(value, dict) and value:
+            continue
+        if isinstance(value, dict) and value:
             yield from _leaves(value, place)
-        elif isinstance(value, list) and not _is_single(name, value):
+            continue
+        try:
+            json.dumps(value, allow_nan=False, default=str)
+        except ValueError:
+            raise ValueError(f"{path}: {value} is not finite") from None
+        if isinstance(value, list) and not _is_single(name, value):
+            if not value:
+                raise ValueError(f"{path}: a list without a value")
             yield path, _Values(value)
         else:
             yield path, value
@@ -398,11 +469,15 @@ def _is_single(name: str, value: Sequence[Any]) -> bool:
 def _spread(path: str, value: Mapping[str, Any]) -> list[float]:
     first, last, count = (value[name] for name in ("from", "to", "count"))
     numbers = all(
-        isinstance(one, int | float) and not isinstance(one, bool)
+        isinstance(one, int | float)
+        and not isinstance(one, bool)
+        and math.isfinite(one)
         for one in (first, last)
     )
-    if not (numbers and type(count) is int and 2 <= count <= _MOST_CONDITIONS):
-        raise ValueError(f"{path}: from and to are numbers, count from 2 on")
+    if not (numbers and type(count) is int and 2 <= count <= _MOST_SPREAD):
+        raise ValueError(
+            f"{path}: from and to are numbers, count from 2 to {_MOST_SPREAD}"
+        )
     step = (last - first) / (count - 1)
     return [round(first + k * step, 4) for k in range(count)]
 
@@ -426,11 +501,18 @@ def _cases(
 ) -> Iterator[tuple[str, int, tuple[tuple[Case, ...], ...]]]:
     """Yields cause, level and the fields of its members, `none` first."""
     yield NO_CAUSE, 0, ()
+    if experiment.levels and not experiment.cases:
+        raise ValueError("levels: there are no cases")
     for name, case in experiment.cases.items():
-        members = [case] if isinstance(case, dict) else []
-        if isinstance(case, tuple):
-            members = [experiment.cases[one] for one in case]  # type: ignore[misc]
-        lengths = [_num_levels(one) for one in members]
+        if name == NO_CAUSE:
+            raise ValueError(f"cases.{name}: the name of what has no cause")
+        members = []
+        for one in case if isinstance(case, tuple) else [name]:
+            member = experiment.cases.get(one)
+            if not isinstance(member, dict):
+                raise ValueError(f"cases.{name}: {one} is no case with fields")
+            members.append(member)
+        lengths = [_num_levels(one, f"cases.{name}") for one in members]
         most = max(lengths)
         wanted = experiment.levels or range(1, most + 1)
         levels = sorted({min(level, most) for level in wanted})
@@ -450,11 +532,9 @@ def _cases(
             )
 
 
-def _num_levels(case: Case) -> int:
-    return max(
-        [len(v) for _, v in _leaves(case, ()) if isinstance(v, _Values)],
-        default=1,
-    )
+def _num_levels(case: Case, place: str) -> int:
+    fields = _leaves(case, (place,))
+    return max([len(v) for _, v in fields if isinstance(v, _Values)], default=1)
 
 
 def _at_level(case: Case, level: int) -> Case:
@@ -467,8 +547,30 @@ def _at_level(case: Case, level: int) -> Case:
     return fields
 
 
-def base_protocol(fields: Changes, source: object) -> RetrievalProtocol:
+# The fields of a protocol that a study can vary. Both gates are measured in any
+# case; matches are by distance, and drives differ.
+_ProtocolFields = create_model(
+    "_ProtocolFields",
+    __config__=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False),
+    **{
+        name: (kind, None)
+        for name, kind in get_type_hints(
+            RetrievalProtocol, localns={"PlaceScan": Literal["middle", "first"]}
+        ).items()
+        if name not in ("gate", "overlap", "exclude_recent")
+    },
+)
+
+
+def base_protocol(
+    fields: Changes, source: object, place: str = "protocol"
+) -> RetrievalProtocol:
     """Returns the protocol of a condition's fields.
+
+    Args:
+        fields: field -> value; `base` is the protocol that has all others.
+        source: file of the experiment, for errors.
+        place: where the fields are in it.
 
     Raises:
         InputError: a field is unknown or out of range.
@@ -478,19 +580,15 @@ def base_protocol(fields: Changes, source: object) -> RetrievalProtocol:
     known = {**PROTOCOLS, "recorded": RetrievalProtocol()}
     if base not in known:
         raise InputError(
-            f"{source}: protocol.base: {base!r} is none of {', '.join(known)}"
+            f"{source}: {place}.base: {base!r} is none of {', '.join(known)}"
         )
-    unknown = set(values) - set(RetrievalProtocol.__dataclass_fields__)
-    if unknown or "gate" in values:
-        name = min(unknown or {"gate"})
-        raise InputError(f"{source}: protocol.{name}: no such field")
+    validated(_ProtocolFields, values, f"{source}: {place}")
     try:
         return replace(known[base], **values)
     except InputError as error:
-        fault = str(error).removeprefix("--").replace("-", "_", 2)
-        raise InputError(f"{source}: protocol.{fault}") from None
-    except TypeError:
-        raise InputError(f"{source}: protocol: not a number") from None
+        option, _, fault = str(error).removeprefix("--").partition(":")
+        name = option.replace("-", "_")
+        raise InputError(f"{source}: {place}.{name}:{fault}") from None
 
 
 @dataclass(frozen=True)
@@ -498,29 +596,32 @@ class MethodVariant:
     """A method with settings; the varied ones are columns of a table."""
 
     name: str
-    settings: tuple[tuple[str, str], ...] = ()
+    settings: tuple[tuple[str, str | tuple[str, ...]], ...] = ()
     factors: Changes = field(default_factory=dict)
 
 
 def method_variants(
     methods: Mapping[str, Mapping[str, Any]],
 ) -> list[MethodVariant]:
-    """Returns each method with each combination of its varied settings."""
+    """Returns each method with each combination of its varied settings.
+
+    Raises:
+        ValueError: a setting has no value, or one twice.
+    """
     found = []
     for name, settings in methods.items():
-        leaves = dict(_leaves(settings, ()))
-        varied = {n: v for n, v in leaves.items() if isinstance(v, _Values)}
+        place = f"methods.{name}"
+        fixed, varied = _split(settings, (place,))
         for some in itertools.product(*varied.values()):
             chosen = dict(zip(varied, some, strict=True))
-            values = {**leaves, **chosen}
-            found.append(
-                MethodVariant(
-                    name,
-                    tuple((n, str(one)) for n, one in values.items()),
-                    {
-                        f"methods.{name}.{n}": _shown(one)
-                        for n, one in chosen.items()
-                    },
-                )
+            given = tuple(
+                (path.removeprefix(f"{place}."), _setting(one))
+                for path, one in {**fixed, **chosen}.items()
             )
+            columns = {path: _shown(one) for path, one in chosen.items()}
+            found.append(MethodVariant(name, given, columns))
     return found
+
+
+def _setting(value: Any) -> str | tuple[str, ...]:
+    return tuple(map(str, value)) if isinstance(value, list) else str(value)

@@ -132,7 +132,6 @@ class MadeMaps:
     """
 
     folder: Path
-    source: str
     # (Map, rates, seed) -> years.
     _ages: dict[tuple[Path, tuple[tuple[str, float], ...], int], set[int]] = (
         field(default_factory=dict)
@@ -141,18 +140,34 @@ class MadeMaps:
 
     def want_age(
         self, drive: Scenario, years: Any, rates: Any, seed: int
-    ) -> None:
+    ) -> tuple[str, str]:
         """Notes that a drive's city is needed after some years.
+
+        Returns:
+            The drive's own map and stage, as long as there is no other.
 
         Raises:
             InputError: years, or a rate, are out of range.
         """
         if type(years) is not int or not 1 <= years <= LAST_YEAR:
-            raise InputError(
-                f"{self.source}: years: {years!r} is not from 0 to {LAST_YEAR}"
-            )
+            raise InputError(f"years: {years!r} is not from 0 to {LAST_YEAR}")
         key = self._key(drive, rates, seed)
         self._ages.setdefault(key, set()).add(years)
+        return str(drive.map), str(drive.stage)
+
+    def want_redrawn(self, drive: Scenario, seed: Any) -> tuple[str, str]:
+        """Notes that a drive's city is needed drawn anew; see `want_age`.
+
+        Raises:
+            InputError: the seed is out of range.
+        """
+        if type(seed) is not int or not 0 <= seed < 2**31:
+            raise InputError(f"version: {seed!r} is no number from 0 on")
+        source = map_folder(drive).path.resolve()
+        folder, stage = self.redrawn(drive, seed)
+        path = Path(folder)
+        self._steps[path] = RedrawCity(source, stage, seed, path)
+        return str(drive.map), str(drive.stage)
 
     def aged(
         self, drive: Scenario, years: int, rates: Any, seed: int
@@ -164,14 +179,8 @@ class MadeMaps:
 
     def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
         """Returns the folder of a drive's city drawn anew, and its stage."""
-        if type(seed) is not int or not 0 <= seed < 2**31:
-            raise InputError(
-                f"{self.source}: version: {seed!r} is no number from 0 on"
-            )
         source = map_folder(drive).path.resolve()
-        folder = self.folder / f"{source.name}_c{seed}"
-        self._steps[folder] = RedrawCity(source, _STAGE, seed, folder)
-        return str(folder), _STAGE
+        return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 
     def make(self, cluster: Cluster) -> None:
         """Makes the maps that are not there.
@@ -211,14 +220,14 @@ class MadeMaps:
         if isinstance(rates, dict):
             found = dict(rates)
             factor = found.pop(_FACTOR, 1.0)
-            check_rates(found, f"{self.source}: rates")
+            check_rates(found, "rates")
         if isinstance(factor, bool) or not isinstance(factor, int | float):
-            raise InputError(f"{self.source}: rates: {factor!r} is no number")
+            raise InputError(f"rates: {factor!r} is no number")
         try:
             known = read_rates(None, factor)
         except InputError as error:
             fault = str(error).removeprefix("--rate: ")
-            raise InputError(f"{self.source}: rates: {fault}") from None
+            raise InputError(f"rates: {fault}") from None
         return {**known, **found}
 
     def _aged_folder(

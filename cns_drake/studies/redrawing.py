@@ -224,12 +224,12 @@ def draw_fresh_cities(
     """
     versions = fresh_versions()
     for what, given, known in (
-        ("map", maps, dict.fromkeys(one.map_name for one in versions)),
-        ("--number", numbers, dict.fromkeys(one.number for one in versions)),
+        ("map", maps, [one.map_name for one in versions]),
+        ("number", numbers, [one.number for one in versions]),
     ):
         for one in given:
             if one not in known:
-                there = ", ".join(map(str, known))
+                there = ", ".join(map(str, dict.fromkeys(known)))
                 raise InputError(
                     f"{what}: no fresh version {one!r} (there are: {there})"
                 )

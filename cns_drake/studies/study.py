@@ -12,6 +12,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import num_cores
@@ -32,6 +33,8 @@ from cns_drake.studies.comparisons import (
 )
 from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
+    CAUSE,
+    FRESH,
     LEVEL,
     Condition,
     Experiment,
@@ -51,6 +54,7 @@ from cns_drake.studies.tasks.localise import LocaliseTask
 from cns_drake.studies.tasks.place import PlaceTask, PoseTask
 from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
+from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.page import write_page
 from evaluation.results.table import (
@@ -77,8 +81,6 @@ TASKS: Mapping[str, type[Task]] = {
         *(MapTask, ChangeTask, CostTask),
     )
 }
-# The factor of the fresh versions of the shipped maps.
-FRESH = "both.fresh"
 _STAGE = "database.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
@@ -111,6 +113,17 @@ class _Drives:
     factors: Mapping[str, Any]
     pairs: Sequence[tuple[Scenario, Scenario]] = ()
     city: City | None = None
+
+    @property
+    def drive_names(self) -> set[str]:
+        """The names of all drives."""
+        recordings = (
+            (*self.city.stages.values(), *self.city.others)
+            if self.city is not None
+            else ()
+        )
+        names = {one.name for one in recordings}
+        return names | {one.name for pair in self.pairs for one in pair}
 
 
 def run_study(
@@ -176,10 +189,14 @@ class Study:
                     f" {', '.join(TASKS)})"
                 )
             self._tasks.append(TASKS[name](settings, self.source))
-        self._variants = self._choose_methods()
+        try:
+            self._variants = self._choose_methods()
+        except InputError as error:
+            fault = str(error).removeprefix("--method: ")
+            raise InputError(f"{self.source}: methods: {fault}") from None
         self._conditions = conditions(self.experiment)
         self._protocol = self._protocol_of(self._conditions[0])
-        self._made = MadeMaps(self.output / "cities", self.source)
+        self._made = MadeMaps(self.output / "cities")
 
     def run(self, maps: Sequence[str] = ()) -> Path:
         """Does the work; returns the path of the page."""
@@ -190,12 +207,17 @@ class Study:
                     " another folder"
                 )
         drives = list(self._drives(maps))
+        # Faults of the file come before all slow work.
         for some in drives:
-            if some.city is None:
-                self._note_ages(some)
+            for _ in self._simulated(some, made=False):
+                pass
         make_folder(self.output)
         self._made.make(self.cluster)
         jobs, measured = self._plan(drives)
+        if not measured:
+            raise InputError(
+                f"{self.source}: no condition that can be measured"
+            )
         self._announce(jobs)
         run_jobs(jobs.values(), self.cluster)
         results = Results.of(self._rows(measured))
@@ -218,7 +240,11 @@ class Study:
         wanted = self.experiment.methods
         files = [*self.own_methods]
         if wanted is not None:
-            files += [Path(one) for one in wanted if one.endswith(".py")]
+            files += [
+                Path(one)
+                for one in wanted
+                if one.endswith(".py") or one in optional_methods()
+            ]
         known = {one.name: one for one in choose_methods(files)}
         if wanted is None:
             wanted = {name: {} for name in known}
@@ -230,8 +256,7 @@ class Study:
                 name = next(n for n, one in known.items() if one.file == path)
             if name not in known:
                 raise InputError(
-                    f"{self.source}: methods: no method {name!r} (known:"
-                    f" {', '.join(known)})"
+                    f"no method {name!r} (known: {', '.join(known)})"
                 )
             choice = replace(known[name], settings=variant.settings)
             choice.make()  # A wrong setting is found before anything slow.
@@ -248,17 +273,18 @@ class Study:
         wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
         if not maps:
             wanted = self.experiment.maps or recordable_maps()
-        names: dict[str, str] = {}
+        known: set[str] = set()
         for one in wanted:
             for some in self._drives_of(one):
-                key = " ".join(
-                    (some.map_name, *map(str, some.factors.values()))
-                )
-                if key in names:
+                names = {some.map_name, *some.drive_names}
+                if some.factors:
+                    names.remove(some.map_name)
+                for name in sorted(names & known):
                     raise InputError(
-                        f"{one}: another map has the name {some.map_name}, too"
+                        f"{one}: another map, or a drive of one, has the name"
+                        f" {name}, too"
                     )
-                names[key] = key
+                known |= names
                 yield some
 
     def _drives_of(self, one: str | MadeMap) -> Iterator[_Drives]:
@@ -309,27 +335,12 @@ class Study:
         query = max(drives, key=lambda drive: drive.stage or "")
         return [(one, query) for one in drives if one is not query]
 
-    def _note_ages(self, drives: _Drives) -> None:
-        """Notes the years that the cities of drives must live."""
-        for condition in self._conditions:
-            groups = [condition.changes]
-            groups += [one for levels in condition.causes for one in levels]
-            for fields in groups:
-                for side in ("both", "database", "query"):
-                    changes = fields.get(side, {})
-                    if not (years := changes.get("years", 0)):
-                        continue
-                    for seed in self.experiment.seeds:
-                        for _, query in drives.pairs[:1]:
-                            self._made.want_age(
-                                query, years, changes.get("rates", 1.0), seed
-                            )
-
     def _plan(
         self, drives: Iterable[_Drives]
     ) -> tuple[dict[str, Job], list[_Measured]]:
         """Returns the jobs, and what they measure."""
         jobs: dict[str, Job] = {}
+        notes: dict[str, None] = {}
         measured: list[_Measured] = []
         for some in drives:
             found = list(
@@ -337,6 +348,8 @@ class Study:
                 if some.city is not None
                 else self._simulated(some)
             )
+            if not found:
+                self.on_note(f"{some.map_name}: no two drives to compare")
             planned = Jobs(
                 StudyFiles(self.output),
                 tuple(choice for choice, _ in self._variants.values()),
@@ -363,7 +376,10 @@ class Study:
                         part = task.measure(one.pair, planned)
                         one.parts[task.name] = part
             jobs |= planned.jobs
+            notes |= planned.notes
             measured += found
+        for text in notes:
+            self.on_note(text)
         if self.experiment.frozen is not None:
             prints: dict[tuple[str, int], list[str]] = {}
             for one in measured:
@@ -382,17 +398,25 @@ class Study:
             )
         return NamedDrive(drive.name, DriveSimulation(drive))
 
-    def _simulated(self, some: _Drives) -> Iterator[_Measured]:
-        """Yields the pairs of a map in all conditions that it allows."""
+    def _simulated(
+        self, some: _Drives, *, made: bool = True
+    ) -> Iterator[_Measured]:
+        """Yields the pairs of a map in all conditions that it allows.
+
+        As long as the maps of conditions are not made, these are noted.
+        """
         noted: dict[str, None] = {}
+        age, redraw = self._made.want_age, self._made.want_redrawn
+        if made:
+            age, redraw = self._made.aged, self._made.redrawn
         for database, query in some.pairs:
             pair = PairOfDrives(
                 database,
                 query,
                 self.experiment.drives == "same-route",
                 self.source,
-                self._made.aged,
-                self._made.redrawn,
+                age,
+                redraw,
                 noted.setdefault,
             )
             known: set[str] = set()
@@ -401,10 +425,8 @@ class Study:
                     try:
                         compared = pair.build(condition, seed)
                     except MissingError as error:
-                        label = "condition"
-                        if condition.causes:
-                            label = str(condition.factors["cause"])
-                        noted.setdefault(f"{error}: no {label}")
+                        label = condition.factors.get(CAUSE, "a condition")
+                        noted.setdefault(f"{label} left out: {error}")
                         break
                     # A condition without random draws is measured once.
                     key = f"{condition.factors} {compared.fingerprint()}"
@@ -419,7 +441,7 @@ class Study:
                             self._pair(compared, query),
                             compared.fingerprint(),
                         )
-        for text in noted:
+        for text in noted if made else ():
             self.on_note(f"{some.map_name}: {text}")
 
     def _pair(self, compared: Compared, query: Scenario) -> Pair:
@@ -430,11 +452,18 @@ class Study:
                 name: getattr(compared.database, name)
                 for name in ("map", "stage", "without", "transient")
             }
-            drive = query.replaced(**city)
-            if drive != query:
-                drive = drive.replaced(name=f"{compared.database.name}_way")
+            drive = compared.query.replaced(**city, name=query.name)
+            if drive.replaced(name=asked.name) == compared.query:
+                drive = compared.query
+            elif drive != query:
+                content = fingerprint(drive.model_dump(mode="json"))[:8]
+                drive = drive.replaced(name=f"{query.name}_way_{content}")
             way = self._named(drive)
-        name = f"{database.name} {asked.name} {compared.fingerprint()[:8]}"
+        asked_how = {
+            "compared": compared.fingerprint(),
+            **compared.protocol.to_json(),
+        }
+        name = f"{database.name} {asked.name} {fingerprint(asked_how)[:8]}"
         return Pair(
             name,
             database,
@@ -470,7 +499,8 @@ class Study:
                     condition.factors,
                     self.experiment.seeds[0],
                     Pair(
-                        f"{database.name} {query.name} {protocol.radius:g}",
+                        f"{database.name} {query.name}"
+                        f" {fingerprint(protocol.to_json())[:8]}",
                         *(database, query, database),
                         protocol,
                     ),

@@ -32,10 +32,23 @@ if TYPE_CHECKING:
     from evaluation.recognition.metrics import Interval
     from evaluation.recognition.place_recognition import PlaceRecognition
 
+# Command of an earlier version -> what takes its place.
+RENAMED = {
+    "ranking": "compare --rankings",
+    "trend": "cns-drake study FILE.yaml FOLDER",
+}
+
 app = terminal.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
+    groups={
+        "Measure change": ("tcr",),
+        "Recognise places": ("pr", "scores", "report", "compare"),
+        "Localise, and keep maps": ("localise", "map-update", "map-sessions"),
+        "Look at drives": ("drives", "trajectory"),
+    },
+    renamed=RENAMED,
 )
 
 
@@ -51,7 +64,7 @@ def tcr(
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
-    """Structural change of two drives or maps.
+    """Measure the structural change between two drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
@@ -126,7 +139,7 @@ def pr(
     *,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Place recognition between two drives.
+    """Recognise the places of one drive in another.
 
     Measures how well the scans of QUERY find their place in DATABASE. Both are
     recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in
@@ -223,7 +236,7 @@ def scores(
     gate: Annotated[bool, typer.Option("--gate")] = False,
     radius: float = DEFAULT_PROTOCOL.radius,
 ) -> None:
-    """Scores of all pairs of scans of folders.
+    """Score all pairs of scans of two folders.
 
     Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
     place; searches that only save time are left out. An empty score means that
@@ -306,41 +319,63 @@ def report(
     print(path)
 
 
-@app.command(epilog=example("cns-eval ranking simulated/report real/report"))
+@app.command(epilog=example("cns-eval compare mine/results.csv"))
 @explained
-def ranking(
-    first: Annotated[Path, typer.Argument(metavar="REPORT")],
-    second: Annotated[Path, typer.Argument(metavar="REPORT")],
+def compare(
+    tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
+    metric: str = "auc",
     protocol: Annotated[
-        str | None, typer.Option(metavar="fair|paper|recorded")
+        str | None, typer.Option(metavar="fair|paper|recorded|own")
     ] = None,
+    gate: Annotated[bool, typer.Option("--gate")] = False,
+    rankings: Annotated[bool, typer.Option("--rankings")] = False,
     json: options.Json = False,
 ) -> None:
-    """Whether two reports rank methods alike.
+    """Rank the methods of tables of results.
 
-    The reports may be of simulated and of real drives. Prints the mean AUC of
-    each method in both, and Kendall's tau, with their 95 % intervals. A report
-    is a folder with a queries.csv, or that file.
+    RESULTS are files like results.csv, or folders that hold one. Their methods
+    are ranked beside those that ship, by means over the conditions that all
+    tables have, with 95 % intervals. Where methods have a queries.csv beside
+    them, their differences have p-values. Kendall's tau says how far two tables
+    rank alike.
 
     Args:
-        protocol: Protocol of the queries that count; by default fair, or the
-            only one there is.
+        metric: Column metric of the rows to compare.
+        protocol: Compare only rows by this protocol.
+        gate: Compare rows with the gate, instead of those without.
+        rankings: Only compare the rankings, each of its own conditions, as
+            those of simulated and of real drives.
     """
-    from evaluation.recognition.rank_agreement import rank_agreement
+    from evaluation.results import comparing
 
-    found = rank_agreement(first, second, protocol=protocol)
+    found = comparing.compare(
+        tables, metric, protocol, gate=gate, rankings=rankings
+    )
+    for note in found.notes:
+        terminal.note(note)
     rows = [
-        (
-            method,
-            f"{found.first[k]:.4f} {_interval_text(found.first_intervals[k])}"
-            f"  {found.second[k]:.4f}"
-            f" {_interval_text(found.second_intervals[k])}",
-        )
-        for k, method in enumerate(found.methods)
+        (one.method, f"{number(one.value)}  {_interval_text(one.interval)}")
+        for one in found.ranked
     ]
-    low, high = map(number, (found.interval.low, found.interval.high))
-    tau = f"{number(found.tau)}  (95 %: {low} to {high})"
-    rows = [("method", "AUC in each"), *rows, ("Kendall's tau", tau)]
+    if rows:
+        where = f"mean of {found.conditions} conditions"
+        rows.insert(0, ("method", f"{metric}, {where}  [95 %]"))
+    for one in found.differences:
+        interval = _interval_text(one.difference.interval)
+        rows.append(
+            (
+                f"{one.first} - {one.second}",
+                f"{number(one.difference.value)}  {interval}"
+                f"  p {number(one.p_value)}",
+            )
+        )
+    for alike in found.agreements:
+        rows.append(
+            (
+                f"Kendall's tau, {alike.first} and {alike.second}",
+                f"{number(alike.tau)}  {_interval_text(alike.interval)}",
+            )
+        )
     options.show(found.to_json(), rows, json=json)
 
 

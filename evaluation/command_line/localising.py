@@ -34,7 +34,7 @@ def localise(
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     json: options.Json = False,
 ) -> None:
-    """Localisation of scans in a map.
+    """Localise scans in a map.
 
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS) or
     clouds (.pcd .ply .npy .bin). The map is made of a drive's scans at their

@@ -82,7 +82,7 @@ def map_sessions(
     spacing: SessionSpacing = 1.0,
     lidar: LidarName = None,
 ) -> None:
-    """Maps of two recorded drives.
+    """Make the maps of two recorded drives.
 
     Writes maps, scans and poses as cns-drake map-truth does, but no labels: for
     drives whose world is not known, such as real ones. Both are in one world.

@@ -23,7 +23,7 @@ def drives(
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
-    """How the ways of two drives differ.
+    """Compare the ways of two drives.
 
     Offsets, lanes, headings, heights and stops of B at a stop of A every 5 m,
     beside those of two pairs of real drives along one route (Boreas, 28 days
@@ -46,7 +46,7 @@ def trajectory(
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
-    """Errors of an estimated trajectory.
+    """Measure the errors of an estimated trajectory.
 
     They are those of evo and KITTI. The estimate is a TUM file: seconds, x y z,
     and a quaternion x y z w. Prints ATE, the root mean square of its distances

@@ -19,6 +19,7 @@ In both modes R@N is the part of the queries with a match that have a match
 among their N best places.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import Literal
@@ -293,31 +294,51 @@ class Difference:
 
 
 def auc_difference(first: QueryOutcomes, second: QueryOutcomes) -> Difference:
-    """Compares two methods on the same queries (mode all).
-
-    The bootstrap draws the same blocks for both. Its deviation, corrected for
-    the number n of blocks, gives a t test of n - 1 degrees of freedom, whose
-    small p-values do not end at the number of samples.
+    """Compares two methods on the same queries, see `mean_auc_difference`.
 
     Args:
         first: outcomes of Q queries.
         second: outcomes of the same queries, in the same blocks.
     """
-    value = pr_curve(first).auc - pr_curve(second).auc
-    blocks = first.blocks
-    number = len(first) if blocks is None else len(np.unique(blocks))
-    if number < 2:
+    return mean_auc_difference([(first, second)])
+
+
+def mean_auc_difference(
+    pairs: Sequence[tuple[QueryOutcomes, QueryOutcomes]],
+) -> Difference:
+    """Compares two methods on several sets of queries (mode all).
+
+    The bootstrap draws the same blocks for both. Its deviation, corrected for
+    the number n of blocks, gives a t test of n - 1 degrees of freedom, whose
+    small p-values do not end at the number of samples. Sets of queries are
+    independent: their variances and degrees of freedom add up.
+
+    Args:
+        pairs: outcomes of both methods on each set; there is one or more.
+    """
+    value, variance, freedom = 0.0, 0.0, 0
+    for first, second in pairs:
+        value += (pr_curve(first).auc - pr_curve(second).auc) / len(pairs)
+        blocks = first.blocks
+        number = len(first) if blocks is None else len(np.unique(blocks))
+        if number < 2:
+            variance = math.nan
+            continue
+        weights = resampled_weights(len(first), blocks=blocks)
+        samples = (
+            resampled_metrics(first, weights)[0]
+            - resampled_metrics(second, weights)[0]
+        )
+        spread = float(samples.std()) * math.sqrt(number / (number - 1))
+        variance += spread**2
+        freedom += number - 1
+    if math.isnan(variance):
         return Difference(value, UNKNOWN, math.nan)
-    weights = resampled_weights(len(first), blocks=blocks)
-    samples = (
-        resampled_metrics(first, weights)[0]
-        - resampled_metrics(second, weights)[0]
-    )
-    spread = float(samples.std()) * math.sqrt(number / (number - 1))
-    margin = float(stdtrit(number - 1, 0.975)) * spread
+    spread = math.sqrt(variance) / len(pairs)
+    margin = float(stdtrit(freedom, 0.975)) * spread
     p_value = 1.0
     if spread > 0.0:
-        p_value = 2.0 * float(stdtr(number - 1, -abs(value) / spread))
+        p_value = 2.0 * float(stdtr(freedom, -abs(value) / spread))
     return Difference(value, Interval(value - margin, value + margin), p_value)
 
 

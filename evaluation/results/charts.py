@@ -168,10 +168,11 @@ def draw(
         if alone:
             figure.suptitle(plain(textwrap.fill(message, width // 9)))
         if alone and legend:
-            handles = [
-                Line2D([], [], color=c, linestyle=s, marker=m, label=plain(one))
-                for one, (c, s, m) in legend.items()
-            ]
+            handles = []
+            for one, (colour, style, marker) in legend.items():
+                options: dict = {"linestyle": style, "marker": marker}
+                options["label"] = plain(one)
+                handles.append(Line2D([], [], color=colour, **options))
             figure.legend(handles=handles, loc="outside right center")
     return Drawn(message, figure, legend)
 
@@ -289,11 +290,13 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
         axes.grid(alpha=0.3)
     figure.supxlabel(plain(words(over)), fontsize=_FONT)
     figure.supylabel(plain(words(chart.metric)), fontsize=_FONT)
-    found = {n: (np.mean(v), f"{np.mean(v):.2f}") for n, v in last.items()}
+    found = {
+        n: (float(np.mean(v)), f"{np.mean(v):.2f}") for n, v in last.items()
+    }
     best, worst = _ends(found)
     return (
-        f"At {at[-1]:g} {words(over)}, the {words(chart.metric)} is greatest with"
-        f" {best[0]} ({best[1]}) and least with {worst[0]} ({worst[1]})",
+        f"At {at[-1]:g} {words(over)}, the {words(chart.metric)} is greatest"
+        f" with {best[0]} ({best[1]}) and least with {worst[0]} ({worst[1]})",
         figure,
     )
 

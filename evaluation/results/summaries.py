@@ -535,7 +535,9 @@ class Ranked(NamedTuple):
     interval: Interval
 
 
-def ranking(rows: Iterable[Row]) -> tuple[list[Ranked], np.ndarray]:
+def ranking(
+    rows: Iterable[Row], *, least_first: bool = False
+) -> tuple[list[Ranked], np.ndarray]:
     """Ranks methods by their means over the conditions that all have.
 
     The bootstrap draws maps, where there are several, else conditions; a
@@ -544,6 +546,7 @@ def ranking(rows: Iterable[Row]) -> tuple[list[Ranked], np.ndarray]:
 
     Args:
         rows: rows of one metric.
+        least_first: whether less is better.
 
     Returns:
         The methods, the best first, and their means (B, M) in samples. There
@@ -570,7 +573,10 @@ def ranking(rows: Iterable[Row]) -> tuple[list[Ranked], np.ndarray]:
         if len(common) == 1:
             interval = Interval(common[0][name].low, common[0][name].high)
         found.append(Ranked(name, float(values[:, k].mean()), interval))
-    order = sorted(range(len(names)), key=lambda k: (-found[k].value, names[k]))
+    sign = 1.0 if least_first else -1.0
+    order = sorted(
+        range(len(names)), key=lambda k: (sign * found[k].value, names[k])
+    )
     return [found[k] for k in order], samples[:, order]
 
 

@@ -316,8 +316,8 @@ class QueryRows:
     def read(cls, path: Path) -> QueryRows:
         """Reads `queries.csv`, or that of a folder.
 
-        Of the columns of a query, all but `query_frame`, `correct`,
-        `has_match` and `score` may be missing.
+        All columns of a query but `query_frame`, `correct`, `has_match` and
+        `score` may be missing.
 
         Raises:
             InputError: as `Results.read`.

@@ -327,11 +327,25 @@ RECIPES = {
         after=("exports",),
         prints=("report/report.",),
     ),
+    "table of an entrant": Recipe("experiment,map,database", file="mine.csv"),
+    "compare": Recipe(
+        ".venv/bin/cns-eval compare mine.csv",
+        after=("table of an entrant",),
+        prints=("mine ", "layered-overlap "),
+    ),
     "help: compare": Recipe(
         "cns-eval compare mine/results.csv",
-        changes=(("mine/results.csv", "decay trend --rankings"),),
-        after=("compare",),
-        prints=("Kendall's tau",),
+        changes=(("mine/results.csv", "mine.csv"),),
+        after=("table of an entrant",),
+        prints=("mine ", "layered-overlap "),
+    ),
+    "means of a table": Recipe(
+        "from pathlib import Path\n\nfrom evaluation.results",
+        changes=(('"results.csv"', '"mine.csv"'),),
+        after=("table of an entrant",),
+        file="means.py",
+        command=".venv/bin/python means.py",
+        prints=("('mine', False) 0.895",),
     ),
     "Python": Recipe(
         "from evaluation import open_drive",
@@ -548,13 +562,6 @@ RECIPES = {
     "crossed causes": Recipe(
         "about: Do snow and another lane",
         file="crossed.yaml",
-    ),
-    "compare": Recipe(
-        ".venv/bin/cns-eval compare mine/results.csv\n",
-        # Neither is of a condition that is shipped.
-        changes=(("mine/results.csv", "decay trend --rankings"),),
-        after=("first finding", "family trend"),
-        prints=("Kendall's tau",),
     ),
     "age": Recipe(
         ".venv/bin/cns-drake age suburbia",
@@ -854,6 +861,9 @@ NOT_RUN = {
     "cns-drake study levels": "takes hours",
     "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
     "script of another project; test_traffic_recording records traffic",
+    ".venv/bin/cns-drake study stages --method heights.py": "drives through "
+    "shipped cities, for an hour",
+    "method           auc, mean": "is what the recipe compare prints",
     "cns-eval pr --method map-closures": "needs an extra",
     "cns-drake train": "needs an extra, and minutes; test_training trains",
     ".venv/bin/cns-drake train": "needs that extra, too",

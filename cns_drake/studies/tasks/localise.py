@@ -52,7 +52,7 @@ class LocaliseTask(Task):
         if name == "spacing":
             positive(value, where)
         elif name == "methods":
-            for one in value if isinstance(value, list) else [value]:
+            for one in value:
                 known = str(one) in estimators.METHODS
                 if not known and not Path(str(one)).is_file():
                     raise InputError(
@@ -61,11 +61,18 @@ class LocaliseTask(Task):
                     )
         else:
             try:
-                self._starts(value)
+                radii = [one.radius for one in self._starts(value)]
             except (TypeError, ValueError):
+                radii = []
+            except InputError as error:
+                _, _, fault = str(error).partition(": ")
+                raise InputError(f"{where}: {fault}") from None
+            if not radii:
                 raise InputError(
                     f"{where}: {value!r} is no list of [metres, degrees]"
-                ) from None
+                )
+            if len(set(radii)) < len(radii):
+                raise InputError(f"{where}: two starts at one distance")
 
     @staticmethod
     def _starts(values: Any) -> tuple[Starts, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -97,12 +98,14 @@ class Jobs:
     Attributes:
         methods: the methods that are run.
         distractors: described drives elsewhere, the first to be added first.
+        notes: what is left out, in words.
     """
 
     files: StudyFiles
     methods: tuple[MethodChoice, ...]
     distractors: Sequence[NamedDrive] = ()
     jobs: dict[str, Job] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
     # Description -> names of the pairs that need it.
     _uses: dict[str, set[str]] = field(default_factory=dict)
 
@@ -219,6 +222,8 @@ class Task(abc.ABC):
                 raise InputError(
                     f"{where}: no such setting (there are: {known})"
                 )
+            if name == "methods":
+                value = self.settings[name] = _names(value, where)
             self.check(name, value, where)
 
     def check(self, name: str, value: Any, where: str) -> None:  # noqa: B027
@@ -244,6 +249,22 @@ class Task(abc.ABC):
     def answers(self, found: Any) -> Iterable[Answers]:
         """Yields the answers to the queries; none by default."""
         return ()
+
+
+def _names(value: Any, where: str) -> list[str]:
+    """Returns a list of names of methods, or one, as a list.
+
+    Raises:
+        InputError: it is none, or two results would have one name.
+    """
+    found = [value] if isinstance(value, str) else value
+    if not (found and isinstance(found, list)):
+        raise InputError(f"{where}: {value!r} is no list of names")
+    stems = [Path(str(one)).stem for one in found]
+    for one, stem in zip(found, stems, strict=True):
+        if stems.count(stem) > 1:
+            raise InputError(f"{where}: {one!r} is there twice")
+    return found
 
 
 def positive(value: Any, where: str) -> None:

@@ -48,7 +48,7 @@ class MapTask(Task):
             positive(value, where)
             return
         known = (TRUTH, *BASELINES)
-        for one in value if isinstance(value, list) else [value]:
+        for one in value:
             if one not in known:
                 raise InputError(
                     f"{where}: {one!r} is none of {', '.join(known)}"
@@ -58,10 +58,11 @@ class MapTask(Task):
         methods = self.settings["methods"]
         if methods is None:
             # M3C2 needs the extra map-update.
-            has_m3c2 = find_spec("py4dgeo") is not None
-            methods = [
-                one for one in (TRUTH, *BASELINES) if one != "m3c2" or has_m3c2
-            ]
+            methods = [TRUTH, *BASELINES]
+            if find_spec("py4dgeo") is None:
+                methods.remove("m3c2")
+                note = "m3c2 is left out: it needs the extra map-update"
+                jobs.notes[note] = None
         arguments = (
             *(pair.database.source, pair.query.source),
             *(tuple(methods), float(self.settings["spacing"])),

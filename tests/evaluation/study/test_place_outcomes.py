@@ -1,4 +1,4 @@
-"""A rung of a ladder has the numbers of the single commands."""
+"""A pair of drives has the numbers of the single commands."""
 
 from dataclasses import dataclass
 
@@ -9,17 +9,20 @@ import pytest
 from cns_drake.base.jobs.step import Reporter
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition.metrics import pr_curve
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study import rungs
+from evaluation.study import place_outcomes
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import MakePart, Part, SurveyFiles
-from evaluation.study.rungs import measure_rung, measure_size
+from evaluation.study.place_outcomes import measure_places
 from evaluation.study.surveys import RecordedDrive, Survey
 
-METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
+METHODS = (
+    MethodChoice("solid"),
+    MethodChoice("layered-overlap"),
+    MethodChoice("solid", settings=(("ranges", "20"),)),
+)
 PROTOCOL = RetrievalProtocol()
 
 
@@ -68,11 +71,11 @@ def described(folder, name, role):
     )
     if not step.is_done():
         step.run(Reporter())
-    return (files.scans, *(files.described(one.name) for one in METHODS))
+    return (files.scans, *(files.described(one.key) for one in METHODS))
 
 
-def rung(folder, part, **changes):
-    """A rung whose database is described beforehand."""
+def pair(folder, part, **changes):
+    """Two drives, of which the database is described beforehand."""
     values = {
         "database": described(folder, "metropolis_01", "places"),
         "query": Once(folder / "metropolis_04"),
@@ -82,25 +85,30 @@ def rung(folder, part, **changes):
         "protocol": PROTOCOL,
     }
     arguments = tuple((values | changes).values())
-    return MakePart(Part(part), measure_rung, arguments)
+    return MakePart(Part(part), measure_places, arguments)
+
+
+def _done(step):
+    step.run(Reporter())
+    return step.part.read()
 
 
 def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
-    step = rung(folder, tmp_path / "rung.data")
-    step.run(Reporter())
+    step = pair(folder, tmp_path / "pair.data")
+    found = _done(step)
     assert step.is_done()
-    found = step.part.read()
     assert [(one.method, one.is_gated) for one in found] == [
-        (choice.name, gated) for choice in METHODS for gated in (False, True)
+        (choice.key, gated) for choice in METHODS for gated in (False, True)
     ]
     database, query = (
         open_drive(folder / name) for name in ("metropolis_01", "metropolis_04")
     )
-    for one in found:
+    choices = [choice for choice in METHODS for _ in range(2)]
+    for one, choice in zip(found, choices, strict=True):
         alone = run(
             database,
             query,
-            make_method(one.method, {}),
+            make_method(choice.name, dict(choice.settings)),
             protocol=RetrievalProtocol(gate=one.is_gated),
         )
         for name in ("best_scores", "is_right", "first_right_ranks"):
@@ -129,15 +137,15 @@ def test_the_best_match_agrees_with_the_matrix_of_overlaps(folder, tmp_path):
     # Places and queries are all frames of both drives.
     assert matrix.shape == apart.shape
     expected = np.where(apart <= PROTOCOL.radius, matrix, 0.0).max(axis=1)
-    for one in _done(rung(folder, tmp_path / "rung.data")):
+    for one in _done(pair(folder, tmp_path / "pair.data")):
         np.testing.assert_allclose(one.overlaps, expected, atol=1e-4)
 
 
 def test_places_of_other_cities_are_never_right(folder, tmp_path):
     others = (described(folder, "suburbia_01", "places")[1:],)
-    plain = _done(rung(folder, tmp_path / "plain.data"))
+    plain = _done(pair(folder, tmp_path / "plain.data"))
     for number in (3, 100):
-        step = rung(
+        step = pair(
             folder,
             tmp_path / f"{number}.data",
             distractors=others,
@@ -157,15 +165,10 @@ def test_places_of_other_cities_are_never_right(folder, tmp_path):
     assert elsewhere.any()
 
 
-def _done(step):
+def test_another_database_is_another_pair(folder, tmp_path):
+    step = pair(folder, tmp_path / "pair.data")
     step.run(Reporter())
-    return step.part.read()
-
-
-def test_another_database_is_another_rung(folder, tmp_path):
-    step = rung(folder, tmp_path / "rung.data")
-    step.run(Reporter())
-    other = rung(
+    other = pair(
         folder,
         step.part.path,
         database=RecordedDrive(folder / "metropolis_04"),
@@ -174,36 +177,23 @@ def test_another_database_is_another_rung(folder, tmp_path):
     assert not other.is_done()
 
 
-def test_a_size_has_the_numbers_of_its_rung(folder, tmp_path, monkeypatch):
-    others = described(folder, "suburbia_01", "places")[1:]
-    expected = _done(
-        rung(
-            folder,
-            tmp_path / "rung.data",
-            distractors=(others,),
-            num_distractors=5,
-        )
+def test_methods_that_would_take_very_long_are_left_out(
+    folder, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(place_outcomes, "_LONGEST_MS", 0.0)
+    notes = []
+    reporter = Reporter(
+        lambda kind, *values: kind == "note" and notes.extend(values)
     )
-    database = described(folder, "metropolis_01", "places")[1:]
-    query = described(folder, "metropolis_04", "queries")[1:]
-    for k, choice in enumerate(METHODS):
-        arguments = (
-            Reporter(),
-            database[k],
-            query[k],
-            (others[k],),
-            5,
-            choice,
-            PROTOCOL,
-        )
-        point = measure_size(*arguments)
-        outcomes = expected[2 * k].outcomes
-        assert (point.method, point.others) == (choice.name, 5)
-        assert point.places == outcomes.num_places
-        assert point.queries == len(outcomes)
-        assert point.auc == pr_curve(outcomes).auc
-        assert point.r1 == outcomes.recall_at(1)
-        assert point.query_ms > 0.0
-        with monkeypatch.context() as patch:
-            patch.setattr(rungs, "_LONGEST_MS", 0.0)
-            assert np.isnan(measure_size(*arguments).auc)
+    # Only a large database is timed.
+    step = pair(folder, tmp_path / "few.data")
+    step.run(reporter)
+    assert len(step.part.read()) == 2 * len(METHODS)
+    assert not notes
+    monkeypatch.setattr(place_outcomes, "_MANY", 3)
+    step = pair(folder, tmp_path / "many.data")
+    step.run(reporter)
+    assert step.part.read() == []
+    assert notes == [
+        f"{choice.name}: it would take over an hour" for choice in METHODS
+    ]

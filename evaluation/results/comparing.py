@@ -1,0 +1,427 @@
+"""Anybody's tables of results beside the shipped ones, on what all have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+import itertools
+from pathlib import Path
+import re
+from typing import Any, NamedTuple
+import warnings
+
+import numpy as np
+from scipy.stats import kendalltau
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import json_number
+from evaluation.recognition.metrics import (
+    Difference,
+    Interval,
+    holm,
+    mean_auc_difference,
+    percentile_interval,
+    resampled_metrics,
+    resampled_weights,
+)
+from evaluation.recognition.protocol import PROTOCOL_NAMES
+from evaluation.results.summaries import (
+    Ranked,
+    check_same_queries,
+    ranking,
+)
+from evaluation.results.table import (
+    QUERIES,
+    RESULTS,
+    SETTINGS,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+)
+
+_BASELINES = Path(__file__).with_name("baselines")
+_SHIPPED = "shipped"
+# Metrics of which less is better.
+_LESS = re.compile(
+    r"translation_\w+|rotation_\w+|\w+_ms|no_\w+|other_city|too_far|elsewhere"
+    r"|lost"
+)
+# Metric -> its place among those of `resampled_metrics`.
+_RESAMPLED = {"auc": 0, "r1": 1}
+
+# A method, and what identifies a condition.
+_Place = tuple[str, tuple[object, ...]]
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The rows of one metric, and the answers that are there."""
+
+    name: str
+    rows: Mapping[_Place, Row]
+    answers: Mapping[_Place, Answers]
+
+    @property
+    def methods(self) -> list[str]:
+        return list(dict.fromkeys(method for method, _ in self.rows))
+
+    @property
+    def conditions(self) -> list[tuple[object, ...]]:
+        return list(dict.fromkeys(condition for _, condition in self.rows))
+
+
+class Compared(NamedTuple):
+    """Two methods by name, and the mean AUC of the first less the second.
+
+    The p-value is corrected, by Holm's method, for the number of differences.
+    """
+
+    first: str
+    second: str
+    difference: Difference
+    p_value: float
+
+
+class Agreement(NamedTuple):
+    """How far two tables rank the methods alike that both have by name.
+
+    `tau` is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
+    methods have the same order in both, -1 if the opposite one; NaN if all
+    values of a table are equal.
+    """
+
+    first: str
+    second: str
+    methods: tuple[str, ...]
+    tau: float
+    interval: Interval
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Tables beside each other.
+
+    Attributes:
+        metric: the number that is compared.
+        task: that has it.
+        conditions: number of the conditions that all tables have.
+        ranked: methods, the best first. One that also ships, or is in two
+            tables, has the name of its table behind its own.
+        differences: of each two methods whose answers are there.
+        agreements: of each two tables with two or more methods of one name.
+        notes: what was left out.
+    """
+
+    metric: str
+    task: str
+    conditions: int
+    ranked: Sequence[Ranked]
+    differences: Sequence[Compared]
+    agreements: Sequence[Agreement]
+    notes: Sequence[str]
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns all of it; NaN becomes None."""
+        return {
+            "metric": self.metric,
+            "task": self.task,
+            "conditions": self.conditions,
+            "methods": [
+                {
+                    "method": one.method,
+                    "value": one.value,
+                    "interval_95": one.interval.to_json(),
+                }
+                for one in self.ranked
+            ],
+            "differences": [
+                {
+                    "first": one.first,
+                    "second": one.second,
+                    "difference": one.difference.value,
+                    "interval_95": one.difference.interval.to_json(),
+                    "p": json_number(one.p_value),
+                }
+                for one in self.differences
+            ],
+            "agreements": [
+                {
+                    "first": one.first,
+                    "second": one.second,
+                    "methods": list(one.methods),
+                    "kendall_tau": json_number(one.tau),
+                    "interval_95": one.interval.to_json(),
+                }
+                for one in self.agreements
+            ],
+            "notes": list(self.notes),
+        }
+
+
+def compare(
+    paths: Sequence[Path],
+    metric: str = "auc",
+    protocol: str | None = None,
+    *,
+    gate: bool = False,
+    rankings: bool = False,
+) -> Comparison:
+    """Compares tables with each other and with those that ship.
+
+    Args:
+        paths: tables of results, or folders with a `results.csv`. A
+            `queries.csv` beside one gives its answers.
+        metric: the number to compare; of several tasks, `place` counts.
+        protocol: name of the protocol whose rows count; by default each with
+            its like, and for rankings `fair`, or else the only one.
+        gate: whether rows with the gate count, or those without.
+        rankings: whether to compare the rankings alone, each of its own
+            conditions, as those of simulated and of real drives.
+
+    Raises:
+        InputError: a table cannot be read, has no such row, or the tables have
+            no condition in common.
+    """
+    if protocol not in (None, *PROTOCOL_NAMES):
+        names = ", ".join(PROTOCOL_NAMES)
+        raise InputError(f"--protocol: {protocol!r} is none of {names}")
+    read = [Results.read(path) for path in paths]
+    tasks = {row.task for one in read for row in one.where(metric=metric).rows}
+    task = "place" if "place" in tasks else min(tasks, default="")
+    wanted: dict[str, object] = {"metric": metric, "task": task, "gate": gate}
+    if protocol is not None:
+        wanted["protocol"] = protocol
+    own = []
+    for path, results in zip(paths, read, strict=True):
+        chosen_rows = results.where(wanted).rows
+        if not chosen_rows:
+            chosen = f"{metric} {'with' if gate else 'without'} the gate"
+            by = f" by protocol {protocol}" if protocol else ""
+            known = ", ".join(sorted(results.distinct("metric")))
+            raise InputError(
+                f"{path}: no row of {chosen}{by} (metrics: {known})"
+            )
+        if rankings and protocol is None:
+            chosen_rows = _by_one_protocol(chosen_rows, path)
+        queries = (path if path.is_dir() else path.parent) / QUERIES
+        answers = QueryRows.read(queries).answers if queries.exists() else ()
+        asked = [a for a in answers if (a.task, a.gate) == (task, gate)]
+        own.append(
+            _Table(_name(path, paths), _by_place(chosen_rows), _by_place(asked))
+        )
+    pairs = itertools.combinations(own, 2)
+    if rankings:
+        if len(own) < 2:
+            raise InputError("--rankings: two tables are needed")
+        found = [_agreement(*pair, metric) for pair in pairs]
+        return Comparison(metric, task, 0, (), (), found, ())
+    shipped = _shipped(wanted)
+    common, notes = _common(own, shipped, paths)
+    tables = [_on(table, common) for table in (shipped, *own)]
+    entries: dict[str, tuple[_Table, str]] = {}
+    for table in tables:
+        for method in table.methods:
+            name = method
+            others = [one for one in tables if one is not table]
+            if table is not tables[0] and any(
+                method in one.methods for one in others
+            ):
+                name = f"{method} ({table.name})"
+            has = sum((method, one) in table.rows for one in common)
+            if has == len(common):
+                entries[name] = table, method
+            else:
+                notes.append(
+                    f"{name}: left out, with {has} of {len(common)} conditions"
+                )
+    rows = [
+        replace(table.rows[method, one], method=name)
+        for name, (table, method) in entries.items()
+        for one in common
+    ]
+    ranked, _ = ranking(rows, least_first=bool(_LESS.fullmatch(metric)))
+    alike = [
+        _agreement(*pair, metric)
+        for pair in itertools.combinations(tables, 2)
+        if len({*pair[0].methods} & {*pair[1].methods}) > 1
+    ]
+    differences = _differences(entries, common) if metric == "auc" else ()
+    return Comparison(
+        metric, task, len(common), ranked, differences, alike, notes
+    )
+
+
+def _name(path: Path, paths: Iterable[Path]) -> str:
+    """Returns the name of a table: that of its file, or else of its folder."""
+    names = [
+        one.stem
+        if one.is_file() and one.name != RESULTS
+        # A folder, or the file that it holds.
+        else (one if one.is_dir() else one.parent).absolute().name
+        for one in (path, *paths)
+    ]
+    name = names.pop(0)
+    return name if names.count(name) < 2 else str(path)
+
+
+def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
+    names = list(dict.fromkeys(row.protocol for row in rows))
+    if "fair" not in names and len(names) > 1:
+        raise InputError(
+            f"{path}: protocol: {' and '.join(names)} in one table; choose one"
+            " with --protocol"
+        )
+    chosen = "fair" if "fair" in names else names[0]
+    return tuple(row for row in rows if row.protocol == chosen)
+
+
+def _by_place(keys: Iterable[Any]) -> dict[_Place, Any]:
+    """Returns rows or answers by method, with its settings, and condition."""
+    found = {}
+    for key in keys:
+        factors = {
+            name: value
+            for name, value in key.factors.items()
+            if not name.startswith(SETTINGS)
+        }
+        plain = replace(key, method=key.label, factors=factors)
+        found[plain.method, plain.but("method")] = plain
+    return found
+
+
+def _shipped(wanted: Mapping[str, object]) -> _Table:
+    rows = [
+        row
+        for path in sorted(_BASELINES.glob("*.csv"))
+        for row in Results.read(path).where(wanted).rows
+    ]
+    return _Table(_SHIPPED, _by_place(rows), {})
+
+
+def _common(
+    own: Sequence[_Table], shipped: _Table, paths: Sequence[Path]
+) -> tuple[list[tuple[object, ...]], list[str]]:
+    """Returns the conditions that all tables have, and what to say of it."""
+    common = own[0].conditions
+    for table in own[1:]:
+        common = [one for one in common if one in set(table.conditions)]
+    with_shipped = [one for one in common if one in set(shipped.conditions)]
+    if with_shipped:
+        left = len(common) - len(with_shipped)
+        note = f"{left} conditions left out, which the shipped tables lack"
+        return with_shipped, [note] if left else []
+    if len(own) > 1 and common:
+        return common, ["the shipped tables have none of these conditions"]
+    names = ", ".join(map(str, paths))
+    beside = "" if len(own) > 1 else " with the shipped tables"
+    raise InputError(
+        f"{names}: no condition in common{beside} (of experiment, map,"
+        " drives, seed, factors and protocol)"
+    )
+
+
+def _on(table: _Table, common: Iterable[tuple[object, ...]]) -> _Table:
+    """Returns a table with some of its conditions."""
+    kept = set(common)
+    rows = {place: row for place, row in table.rows.items() if place[1] in kept}
+    return replace(table, rows=rows)
+
+
+def _differences(
+    entries: Mapping[str, tuple[_Table, str]],
+    common: Sequence[tuple[object, ...]],
+) -> list[Compared]:
+    """Compares each two methods whose answers in all conditions are there."""
+    asked: dict[str, list[Answers]] = {}
+    for name, (table, method) in entries.items():
+        places = [(method, one) for one in common]
+        if all(place in table.answers for place in places):
+            asked[name] = [table.answers[place] for place in places]
+    pairs = list(itertools.combinations(asked, 2))
+    found = []
+    for one, other in pairs:
+        both = list(zip(asked[one], asked[other], strict=True))
+        for first, second in both:
+            check_same_queries(first, second)
+        found.append(
+            mean_auc_difference([(a.outcomes, b.outcomes) for a, b in both])
+        )
+    corrected = holm(np.array([one.p_value for one in found])).tolist()
+    return [
+        Compared(*pair, difference, p)
+        for pair, difference, p in zip(pairs, found, corrected, strict=True)
+    ]
+
+
+def _agreement(first: _Table, second: _Table, metric: str) -> Agreement:
+    """Compares the rankings of two tables, each of its own conditions.
+
+    The interval is by bootstrap over blocks of the routes where all answers
+    are there, else over conditions.
+
+    Raises:
+        InputError: fewer than two methods have all conditions of both.
+    """
+    whole = [
+        {
+            method
+            for method in table.methods
+            if all((method, one) in table.rows for one in table.conditions)
+        }
+        for table in (first, second)
+    ]
+    methods = tuple(sorted(set.intersection(*whole)))
+    if len(methods) < 2:
+        raise InputError(
+            f"{first.name}, {second.name}: fewer than two methods are on all"
+            f" conditions of both ({', '.join(methods) or 'none'})"
+        )
+    one, one_samples = _values(first, methods, metric)
+    other, other_samples = _values(second, methods, metric)
+    samples = zip(one_samples, other_samples, strict=True)
+    taus = np.array([_tau(*pair) for pair in samples])
+    return Agreement(
+        first.name,
+        second.name,
+        methods,
+        _tau(one, other),
+        percentile_interval(taus),
+    )
+
+
+def _values(
+    table: _Table, methods: Sequence[str], metric: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the mean values (M,) of methods, and those of samples (B, M)."""
+    ranked, samples = ranking(
+        row for (method, _), row in table.rows.items() if method in methods
+    )
+    order = [[one.method for one in ranked].index(name) for name in methods]
+    means = np.array([one.value for one in ranked])[order]
+    places = list(itertools.product(table.conditions, methods))
+    if metric not in _RESAMPLED or any(
+        (method, one) not in table.answers for one, method in places
+    ):
+        return means, samples[:, order]
+    of_condition = []
+    for k, one in enumerate(table.conditions):
+        asked = [table.answers[method, one] for method in methods]
+        for answers in asked:
+            check_same_queries(asked[0], answers)
+        outcomes = asked[0].outcomes
+        weights = resampled_weights(len(outcomes), k, outcomes.blocks)
+        of_condition.append(
+            [
+                resampled_metrics(answers.outcomes, weights)[_RESAMPLED[metric]]
+                for answers in asked
+            ]
+        )
+    return means, np.mean(of_condition, axis=0).T
+
+
+def _tau(first: np.ndarray, second: np.ndarray) -> float:
+    with warnings.catch_warnings():
+        # SciPy warns if all values are equal; the result is then NaN.
+        warnings.simplefilter("ignore")
+        return float(kendalltau(first, second).statistic)

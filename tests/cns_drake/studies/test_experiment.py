@@ -1,0 +1,443 @@
+"""Files of experiments: their grids, and their faults."""
+
+import itertools
+
+import pytest
+import yaml
+
+from cns_drake.base.errors import InputError
+from cns_drake.studies.experiment import (
+    Experiment,
+    base_protocol,
+    conditions,
+    load_experiment,
+    method_variants,
+    shipped_experiments,
+)
+from evaluation.recognition.protocol import (
+    FAIR_PROTOCOL,
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Reads an experiment from text."""
+
+    def load(text, *overrides, **options):
+        path = tmp_path / "mine.yaml"
+        path.write_text(text)
+        return load_experiment(path, overrides, **options)
+
+    return load
+
+
+def factors(experiment):
+    """The values of all factors, condition by condition."""
+    return [dict(one.factors) for one in conditions(experiment)]
+
+
+def test_a_file_of_few_words_is_enough(read):
+    experiment = read("about: nothing changes\n")
+    assert experiment.name == "mine"
+    assert experiment.seeds == (1,)
+    assert list(experiment.tasks) == ["place"]
+    (only,) = conditions(experiment)
+    assert (only.factors, only.changes, only.causes) == ({}, {}, ())
+    assert only.is_baseline
+
+
+def test_the_grid_is_the_product_of_all_factors(read):
+    experiment = read(
+        """
+        database: {years: [0, 10, 20]}
+        query: {transient: {snow: [0, 0.2], leaves: 0.5}}
+        protocol: {radius: [5, 7.5]}
+        """
+    )
+    found = conditions(experiment)
+    columns = ["database.years", "query.transient.snow", "protocol.radius"]
+    assert all(list(one.factors) == columns for one in found)
+    # The last factor varies fastest.
+    assert [tuple(one.factors.values()) for one in found] == list(
+        itertools.product((0, 10, 20), (0, 0.2), (5, 7.5))
+    )
+    for one in found:
+        years, snow, radius = one.factors.values()
+        assert one.changes == {
+            "database": {"years": years},
+            "query": {"transient": {"snow": snow, "leaves": 0.5}},
+            "protocol": {"radius": radius},
+        }
+        # Each protocol has a baseline of its own.
+        assert one.is_baseline == (years == snow == 0)
+
+
+def test_the_baseline_comes_first(read):
+    experiment = read(
+        """
+        database: {years: [0, 10]}
+        query: {lidar: [vlp-16, os1-64]}
+        baseline: {query: {lidar: os1-64}}
+        """
+    )
+    found = conditions(experiment)
+    assert [tuple(one.factors.values()) for one in found] == [
+        (0, "os1-64"),
+        (0, "vlp-16"),
+        (10, "vlp-16"),
+        (10, "os1-64"),
+    ]
+    assert [one.is_baseline for one in found] == [True, False, False, False]
+
+
+def test_one_at_a_time(read):
+    experiment = read(
+        """
+        design: one-at-a-time
+        database: {years: [0, 5, 10]}
+        query: {years: [0, 5], transient: {snow: [0.1, 0]}}
+        baseline: {query: {transient: {snow: 0}}}
+        """
+    )
+    assert [tuple(one.values()) for one in factors(experiment)] == [
+        (0, 0, 0),
+        (5, 0, 0),
+        (10, 0, 0),
+        (0, 5, 0),
+        (0, 0, 0.1),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [
+        ("{from: 0, to: 0.6, count: 4}", [0, 0.2, 0.4, 0.6]),
+        ("{from: 1, to: -1, count: 3}", [1, 0, -1]),
+        ("[[1, 0], [2.5, 180]]", ["[1,0]", "[2.5,180]"]),
+        ("[near, [2, 0]]", ["near", "[2,0]"]),
+        ("[near]", ["near"]),
+        ("[{snow: 0.1, leaves: 0}, {}]", ["snow: 0.1,leaves: 0", "none"]),
+        ("[true, false]", [True, False]),
+        ('["01", "04"]', ["01", "04"]),
+    ],
+)
+def test_values_of_factors(read, value, found):
+    name = "viewpoint" if "near" in value or "[[" in value else "field"
+    experiment = read(f"database: {{{name}: {value}}}\n")
+    assert [next(iter(one.values())) for one in factors(experiment)] == found
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        "viewpoint: [2.0, 0]",
+        "without: [house_1, house_2]",
+        "without: []",
+        "route: [{road: a, direction: forward, lane: 1}]",
+        "lidars: {lidar: {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}",
+        "field: {from: 1, to: 2}",
+    ],
+)
+def test_lists_that_are_one_value(read, field):
+    experiment = read(f"both: {{{field}}}\n")
+    (only,) = conditions(experiment)
+    assert only.factors == {}
+    assert only.changes == {"both": yaml.safe_load(f"{{{field}}}")}
+
+
+CASES = """
+cases:
+  snow: {query: {transient: {snow: [0.1, 0.2, 0.4]}}}
+  returns: {query: {returns: calibrated}}
+  driver:
+    database: {driver: {lane_changes: [0, 9], wander: 0.3}, traffic: {vehicles:
+      [0, 0, 24]}}
+  all: [snow, returns]
+"""
+
+
+def test_cases_have_levels(read):
+    found = conditions(read(CASES))
+    assert [tuple(one.factors.values()) for one in found] == [
+        ("none", 0),
+        *(("snow", 1), ("snow", 2), ("snow", 3)),
+        ("returns", 1),
+        *(("driver", 1), ("driver", 2), ("driver", 3)),
+        *(("all", 1), ("all", 2), ("all", 3)),
+    ]
+    assert [one.is_baseline for one in found] == [True] + [False] * 10
+    fields = {tuple(one.factors.values()): one.causes for one in found}
+    assert fields["none", 0] == ()
+    assert fields["snow", 2] == (({"query": {"transient": {"snow": 0.2}}},),)
+    # A shorter list stays at its last value.
+    assert fields["driver", 3] == (
+        (
+            {
+                "database": {
+                    "driver": {"lane_changes": 9, "wander": 0.3},
+                    "traffic": {"vehicles": 24},
+                }
+            },
+        ),
+    )
+    # What a map lacks gives way to a lower level of the same cause.
+    snow, returns = fields["all", 2]
+    assert [one["query"]["transient"]["snow"] for one in snow] == [0.2, 0.1]
+    assert returns == ({"query": {"returns": "calibrated"}},)
+
+
+@pytest.mark.parametrize(
+    ("levels", "found"),
+    [
+        ("[4]", {"snow": [3], "returns": [1], "driver": [3], "all": [3]}),
+        ("[1, 3]", {"snow": [1, 3], "returns": [1], "all": [1, 3]}),
+        ("2", {"snow": [2], "returns": [1], "all": [2]}),
+    ],
+)
+def test_some_levels(read, levels, found):
+    experiment = read(f"{CASES}\nlevels: {levels}\n")
+    climbed = {}
+    for one in factors(experiment):
+        climbed.setdefault(one["cause"], []).append(one["level"])
+    assert climbed.pop("none") == [0]
+    assert climbed | found == climbed
+
+
+def test_cases_beside_factors(read):
+    experiment = read(f"{CASES}\nboth: {{seed: [3, 4]}}\nlevels: [1]\n")
+    found = conditions(experiment)
+    assert len(found) == 2 * 5
+    assert list(found[0].factors) == ["cause", "level", "both.seed"]
+    assert [one.is_baseline for one in found] == [True] + [False] * 9
+
+
+def test_settings_of_methods_are_factors():
+    plain, *varied = method_variants(
+        {
+            "btc": {},
+            "solid": {"ranges": [20, 40], "place": "first"},
+            "ring++": {"crop": 3.5},
+        }
+    )
+    assert (plain.name, plain.settings, plain.factors) == ("btc", (), {})
+    *solid, ring = varied
+    assert [one.settings for one in solid] == [
+        (("place", "first"), ("ranges", "20")),
+        (("place", "first"), ("ranges", "40")),
+    ]
+    assert [one.factors for one in solid] == [
+        {"methods.solid.ranges": 20},
+        {"methods.solid.ranges": 40},
+    ]
+    assert (ring.settings, ring.factors) == ((("crop", "3.5"),), {})
+
+
+def test_overrides_replace_single_fields(read):
+    text = """
+    database: {years: [0, 5], rates: 2}
+    protocol: recorded
+    tasks: [place, change]
+    """
+    found = read(
+        text,
+        "database.years=[0, 1, 2]",
+        "protocol.query_spacing=20",
+        "tasks.change.spacing=5",
+    )
+    assert found.database == {"years": [0, 1, 2], "rates": 2}
+    assert found.tasks == {"place": {}, "change": {"spacing": 5}}
+    # The other fields of the protocol stay as they were.
+    protocol = base_protocol(found.protocol, "here")
+    assert protocol == RetrievalProtocol(query_spacing=20)
+    found = read(text, "tasks=[cost]", ("methods", ["solid"]))
+    assert (found.tasks, found.methods) == ({"cost": {}}, {"solid": {}})
+
+
+def test_a_smaller_experiment(read):
+    text = """
+    database: {years: [0, 5, 20], rates: 2}
+    protocol: fair
+    quick:
+      database: {years: [0, 20]}
+      protocol: {query_spacing: 30.0}
+    """
+    assert read(text).database["years"] == [0, 5, 20]
+    found = read(text, quick=True)
+    assert found.database == {"years": [0, 20], "rates": 2}
+    assert found.protocol == {"base": "fair", "query_spacing": 30.0}
+    with pytest.raises(InputError, match=r"mine\.yaml: quick: no fields"):
+        read("about: all of it\n", quick=True)
+
+
+def test_protocols():
+    assert base_protocol({}, "") == FAIR_PROTOCOL
+    assert base_protocol({"base": "paper"}, "") == PAPER_PROTOCOL
+    found = base_protocol({"base": "recorded", "radius": 5}, "")
+    assert found == RetrievalProtocol(radius=5)
+
+
+@pytest.mark.parametrize("name", shipped_experiments())
+def test_shipped_experiments_are_read_and_written(name):
+    for quick in (False, True):
+        if quick and not load_experiment(name).quick:
+            continue
+        experiment = load_experiment(name, quick=quick)
+        again = Experiment.model_validate(yaml.safe_load(experiment.text))
+        assert again == experiment
+        assert sum(one.is_baseline for one in conditions(experiment)) == 1
+        assert experiment.about.endswith("?")
+
+
+FAULTS = [
+    ("- 1", "not a mapping of an experiment's fields"),
+    ("", "not a mapping"),
+    ("a: b: c", "not readable as YAML"),
+    ("seeds: [1]\nseeds: [2]", "not readable.* line 2: 'seeds' is .*twice"),
+    ("metods: [solid]", "metods: Extra inputs .* mean methods"),
+    ("name: ../x", "name: "),
+    ("maps: []", "maps: "),
+    ("maps: [7]", "maps.0: "),
+    ("maps: [suburbia, suburbia]", "maps: 'suburbia' is there twice"),
+    ("maps: [{name: a, seed: 1}]", "maps.0: .*either age .* or import"),
+    ("maps: [{name: a, seed: 1, age: town}]", "maps.0: .*years"),
+    ("maps: [{name: a, seed: 1, import: b, years: 2}]", "maps.0: .*years"),
+    ("maps: [{name: a, seed: 1, age: b, year: 2}]", "maps.0: .*year: Extra"),
+    ("maps: [{name: ../a, seed: 1, import: b}]", "maps.0: .*name: "),
+    ("drives: all", "drives: "),
+    ("design: half", "design: "),
+    ("database: [years]", "database: "),
+    ("database:", "database: "),
+    ("database: {years: []}", "database.years: a list without a value"),
+    ("database: {a: {b: []}}", "database.a.b: a list without a value"),
+    ("both: {fresh: []}", "both.fresh: a list without a value"),
+    ("database: {years: [0, 5, 0]}", "database.years: 0 is there twice"),
+    ("database: {years: [1, 1.0]}", "database.years: 1 is there twice"),
+    ("both: {fresh: [2, 2]}", "both.fresh: 2 is there twice"),
+    ("protocol: {radius: [5, 5]}", "protocol.radius: 5 is there twice"),
+    ("database: {a.b: 1, a: {b: [2, 3]}}", "database.a.b: it is there twice"),
+    ("database: {missing: .nan}", "database.missing: nan is not finite"),
+    ("query: {a: {b: [0, .inf]}}", "query.a.b: .*inf.* is not finite"),
+    ("query: {viewpoint: [[.nan, 0]]}", "query.viewpoint: .* not finite"),
+    ("database: {a: {from: 0, to: .inf, count: 3}}", "database.a: from and"),
+    ("database: {a: {from: x, to: 1, count: 3}}", "database.a: from and"),
+    ("database: {a: {from: 0, to: true, count: 3}}", "database.a: from and"),
+    ("database: {a: {from: 0, to: 1, count: 1}}", "database.a: .*count"),
+    ("database: {a: {from: 0, to: 1, count: 2.0}}", "database.a: .*count"),
+    ("database: {a: {from: 0, to: 1, count: 9999}}", "database.a: .*count"),
+    ("database: {a: {from: 1, to: 1, count: 2}}", "database.a: 1.0 is .*twice"),
+    ("seeds: []", "seeds: "),
+    ("seeds: [1, 1]", "seeds: 1 is there twice"),
+    ("seeds: -1", "seeds.0: "),
+    ("seeds: [1.5]", "seeds.0: "),
+    ("seeds: [.nan]", "seeds.0: "),
+    ("seeds: one", "seeds.0: "),
+    ("tasks: []", "tasks: "),
+    ("tasks: [place, place]", "tasks: 'place' is there twice"),
+    ("tasks: {place: 3}", "tasks.place: "),
+    ("methods: []", "methods: "),
+    ("methods: [solid, solid]", "methods: 'solid' is there twice"),
+    ("methods: {solid: {ranges: []}}", "methods.solid.ranges: a list without"),
+    (
+        "methods: {solid: {ranges: [9, 9]}}",
+        "methods.solid.ranges: 9 is",
+    ),
+    ("methods: {solid: {x: .inf}}", "methods.solid.x: inf is not finite"),
+    ("protocol: 3", "protocol: "),
+    ("protocol: [fair, paper]", "protocol: "),
+    (
+        "baseline: {database: {years: 0}}",
+        "baseline.database.years: this",
+    ),
+    (
+        "database: {years: [0, 1]}\nbaseline: {database: {years: 2}}",
+        "baseline.database.years: 2 is no value of it",
+    ),
+    (
+        "database: {years: [0, 1]}\nbaseline: {database: {years: [0]}}",
+        r"baseline.database.years: \[0\] is no value of it",
+    ),
+    ("baseline: {query: 3}", "baseline.query: this is no factor"),
+    ("cases: {snow: {}}", "cases.snow: "),
+    ("cases: {snow: 3}", "cases.snow: "),
+    ("cases: {snow: {query: {}}}", "cases.snow: query: no fields"),
+    ("cases: {snow: {query: [1]}}", "cases.snow: query: no fields"),
+    ("cases: {snow: {protocol: {radius: 3}}}", "cases.snow: protocol: no side"),
+    ("cases: {snow: {query: {x: []}}}", "cases.snow.query.x: a list without"),
+    ("cases: {all: []}", "cases.all: "),
+    ("cases: {all: [snow]}", "cases.all: snow is no case with fields"),
+    ("cases: {all: [all]}", "cases.all: all is no case with fields"),
+    (
+        "cases: {a: {query: {x: 1}}, b: [a], c: [a, b]}",
+        "cases.c: b is no case with fields",
+    ),
+    ("cases: {a: {query: {x: 1}}, b: [a, a]}", "cases.b: 'a' is there twice"),
+    ("cases: {none: {query: {x: 1}}}", "cases.none: "),
+    ("cases: {../x: {query: {x: 1}}}", "cases.../x"),
+    ("levels: [1]", "levels: there are no cases"),
+    ("levels: []\ncases: {a: {query: {x: 1}}}", "levels: "),
+    ("levels: [0]\ncases: {a: {query: {x: 1}}}", "levels.0: "),
+    ("levels: [2, 2]\ncases: {a: {query: {x: 1}}}", "levels: 2 is there twice"),
+    ("charts: [3]", "charts.0: "),
+    ("quick: 3", "quick: "),
+    ("quick: {metods: [solid]}", "quick: metods: Extra"),
+    ("quick: {database: {years: []}}", "quick: database.years: a list without"),
+    (
+        "quick: {baseline: {database: {years: 0}}}",
+        "quick: baseline.database.years: this is no factor",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "fault"), FAULTS)
+def test_faults_are_one_line_with_file_and_field(read, text, fault):
+    with pytest.raises(InputError, match=rf"mine\.yaml: {fault}") as error:
+        read(text)
+    assert "\n" not in str(error.value)
+
+
+def test_grids_have_an_end(read):
+    """20,000 conditions can be measured, one more cannot."""
+    spread = "{{from: 0, to: 1, count: {}}}".format
+
+    def grid(*counts, more=""):
+        fields = (f"f{k}: {spread(n)}" for k, n in enumerate(counts))
+        return f"database: {{{', '.join(fields)}}}\n{more}"
+
+    cases = "cases: {c: {query: {x: [1, 2, 3]}}}"
+    read(grid(50, 100, more=cases))
+    for text, number in (
+        (grid(59, 339), 20_001),
+        (grid(2, 2501, more=cases), None),
+        (grid(50, 101, more=cases), 20_200),
+        (grid(1000, 1000, 1000, 1000), 10**12),
+    ):
+        fault = f"{number} conditions, more than 20000" if number else "count"
+        with pytest.raises(InputError, match=fault):
+            read(text)
+    # One at a time they are few.
+    few = read(grid(1000, 1000, 1000, more="design: one-at-a-time"))
+    assert len(conditions(few)) == 1 + 3 * 999
+
+
+@pytest.mark.parametrize(
+    ("override", "fault"),
+    [
+        ("years", "--set: 'years' is not FIELD=VALUE"),
+        ("=3", "--set: '=3' is not FIELD=VALUE"),
+        ("database.years=[", "--set: database.years: not readable"),
+        ("database.years=[]", "database.years: a list without a value"),
+        ("metods=[solid]", "metods: Extra inputs"),
+    ],
+)
+def test_overrides_that_cannot_be(read, override, fault):
+    with pytest.raises(InputError, match=fault):
+        read("about: some\n", override)
+
+
+def test_no_such_experiment(tmp_path):
+    with pytest.raises(InputError, match=r"nothing: neither an .*ladder.* nor"):
+        load_experiment("nothing")
+    with pytest.raises(InputError, match="neither"):
+        load_experiment(tmp_path)

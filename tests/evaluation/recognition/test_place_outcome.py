@@ -1,0 +1,181 @@
+"""What a method makes of two drives, in numbers."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from evaluation.recognition.metrics import UNKNOWN
+from evaluation.recognition.place_outcome import (
+    FAULTS,
+    PlaceOutcome,
+    place_numbers,
+)
+from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.query_outcomes import QueryOutcomes
+
+
+def answered(is_right, scores=None, radius=7.5, blocks=None):
+    """An outcome; all queries have a match."""
+    right = np.array(is_right, dtype=bool)
+    number = len(right)
+    return PlaceOutcome(
+        "solid",
+        False,
+        QueryOutcomes(
+            np.ones(number) if scores is None else scores,
+            right,
+            np.ones(number, bool),
+            np.where(right, 1.0, np.inf),
+            9,
+            blocks,
+        ),
+        query_frames=np.arange(number),
+        stamps_ns=np.arange(number) * 50,
+        p_WQs=np.zeros((number, 3)),
+        match_drives=["town_01"] * number,
+        match_frames=np.arange(number),
+        distances=np.ones(number),
+        pose_errors=PoseErrors.unknown(number),
+        overlaps=np.linspace(0.2, 0.8, number),
+        radius=radius,
+    )
+
+
+def part(number, kept):
+    """Returns which queries are right: the first ones."""
+    return np.arange(number) < kept
+
+
+def numbers(now, before=None):
+    """Metric -> value, and metric -> interval."""
+    found = list(place_numbers(now, before))
+    names = [name for name, _, _ in found]
+    assert len(set(names)) == len(names)
+    return (
+        {name: value for name, value, _ in found},
+        {name: interval for name, _, interval in found},
+    )
+
+
+def test_the_share_of_auc_that_is_kept():
+    # All scores are equal: the only threshold rejects nothing, and AUC is its
+    # precision.
+    before, now = (answered(part(60, kept)) for kept in (54, 45))
+    values, intervals = numbers(before, before)
+    assert values["kept"] == values["kept_strict"] == 1.0
+    assert intervals["kept"].low == intervals["kept"].high == 1.0
+    assert (values["lost"], values["found"]) == (0.0, 0.0)
+    values, intervals = numbers(now, before)
+    assert values["r1"] == values["auc"] == 0.75
+    assert values["kept"] == pytest.approx(45 / 54)
+    assert (values["lost"], values["found"]) == (9.0, 0.0)
+    low, high = binom.ppf([0.025, 0.975], 54, 45 / 54) / 54
+    assert intervals["kept"].low == pytest.approx(low, abs=0.05)
+    assert intervals["kept"].high == pytest.approx(high, abs=0.05)
+    low, high = binom.ppf([0.025, 0.975], 60, 0.75) / 60
+    assert intervals["r1"].low == pytest.approx(low, abs=0.02)
+    assert intervals["r1"].high == pytest.approx(high, abs=0.02)
+
+
+def test_right_answers_with_the_best_scores():
+    """AUC is the share that is right."""
+    scores = np.linspace(1.0, 0.5, 10)
+    values, intervals = numbers(
+        answered(part(10, 6), scores), answered(part(10, 10), scores)
+    )
+    assert values["auc_strict"] == pytest.approx(0.6)
+    assert values["kept_strict"] == pytest.approx(0.6)
+    assert intervals["kept"].low <= values["kept"] <= intervals["kept"].high
+
+
+def test_without_a_baseline_nothing_is_kept():
+    values, _ = numbers(answered(part(10, 6)))
+    assert not {"kept", "kept_strict", "lost", "found"} & values.keys()
+    assert values["with_match"] == 10.0
+    assert values["places"] == 9.0
+
+
+def test_without_anything_to_keep():
+    nothing = answered(part(9, 0))
+    values, intervals = numbers(nothing, nothing)
+    assert np.isnan(values["kept"])
+    assert np.isnan(intervals["kept"].low)
+
+
+def test_other_queries_have_no_pairs():
+    """The baseline asks as many queries, or no query has a partner."""
+    values, intervals = numbers(answered(part(10, 6)), answered(part(9, 9)))
+    assert values["kept"] == pytest.approx(0.6)
+    assert intervals["kept"] is UNKNOWN
+    assert not {"lost", "found"} & values.keys()
+
+
+def test_intervals_are_by_blocks():
+    """All queries of a block are right or wrong: their number is that of
+    blocks."""
+    right = np.repeat(part(12, 9), 5)
+    blocks = np.repeat(np.arange(12), 5)
+    _, single = numbers(answered(right))
+    _, joint = numbers(answered(right, blocks=blocks))
+    wide, narrow = (one["r1"].high - one["r1"].low for one in (joint, single))
+    assert wide > 1.6 * narrow
+    low, high = binom.ppf([0.025, 0.975], 12, 0.75) / 12
+    assert joint["r1"].low == pytest.approx(low, abs=0.05)
+    assert joint["r1"].high == pytest.approx(high, abs=0.05)
+
+
+def test_what_is_wrong_with_each_answer():
+    """Each kind of fault occurs once, and two best places are right."""
+    one = answered([1, 1, 0, 0, 0, 0, 0])
+    one.outcomes.has_match[2] = False
+    one.match_frames[3] = -1
+    one.distances[3:] = np.nan, np.nan, 15.0, 15.1
+    assert one.faults() == [
+        "",
+        "",
+        "no_place",
+        "no_candidate",
+        "other_city",
+        "too_far",
+        "elsewhere",
+    ]
+    values, _ = numbers(one, answered([1, 0, 1, 1, 0, 0, 0]))
+    assert (values["lost"], values["found"]) == (2.0, 1.0)
+    assert {values[name] for name in FAULTS} == {1.0}
+    assert values["with_match"] == 6.0
+    # Three of the seven shares of 0.2 to 0.8 are below a half; the third has a
+    # wrong best place.
+    assert values["hidden"] == 1.0
+    assert values["visible_change"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("radius", [5.0, 7.5])
+def test_places_within_two_radii_are_too_far(radius):
+    one = answered([0, 0], radius=radius)
+    one.distances[:] = 2 * radius - 1e-9, 2 * radius + 1e-9
+    assert one.faults() == ["too_far", "elsewhere"]
+
+
+def test_overlaps_that_are_not_known():
+    one = answered([1, 1, 0])
+    one.overlaps[:] = np.nan, 0.6, 0.8
+    assert numbers(one)[0]["visible_change"] == pytest.approx(0.3)
+    one.overlaps[:] = np.nan
+    assert "visible_change" not in numbers(one)[0]
+
+
+def test_columns_hold_all_that_numbers_follow_from():
+    right = part(8, 5)
+    one = answered(right, np.linspace(1, 0, 8), blocks=np.arange(8) // 2)
+    found = one.columns()
+    assert {len(column) for column in found.values()} == {8}
+    assert np.mean(found["correct"]) == numbers(one)[0]["r1"]
+    np.testing.assert_array_equal(found["block"], np.arange(8) // 2)
+    np.testing.assert_allclose(
+        np.add(found["overlap"], found["visible_change"]), 1.0
+    )
+    assert [bool(why) for why in found["why"]] == [*~right]
+    # Without blocks each query is one.
+    np.testing.assert_array_equal(
+        answered(right).columns()["block"], np.arange(8)
+    )

@@ -1,0 +1,311 @@
+"""Charts of tables, and the page that shows them."""
+
+from html.parser import HTMLParser
+import math
+import re
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from evaluation.results import charts
+from evaluation.results.page import write_page
+from evaluation.results.table import Results, Row
+
+YEARS = "database.years"
+PARTS = {"ring++": 0.9, "solid": 0.5, "mine": 0.7}
+
+
+def row(value, factors, method="mine", metric="auc", town="town", **changes):
+    values = {
+        "experiment": "e",
+        "map": town,
+        "database": f"{town}_01",
+        "query": f"{town}_02",
+        "seed": 1,
+        "factors": factors,
+        "task": "place",
+        "method": method,
+        "gate": False,
+        "protocol": "fair",
+    }
+    return Row(**{**values, **changes}, metric=metric, value=value)
+
+
+def aged():
+    """The parts fall by a hundredth a year, and differ by 0.02 of seeds."""
+    return Results.of(
+        row(part - 0.01 * year + 0.01 * seed, {YEARS: year}, name, seed=seed)
+        for name, part in PARTS.items()
+        for year in (0, 10, 30)
+        for seed in (0, 2)
+    )
+
+
+def caused():
+    return Results.of(
+        row(
+            1.0 - 0.1 * level * (name == "solid") * (cause == "parked_cars"),
+            {"cause": cause, "level": level},
+            name,
+            "kept",
+        )
+        for name in PARTS
+        for cause, levels in (("none", (0,)), ("parked_cars", (1, 2, 4)))
+        for level in levels
+    )
+
+
+def scattered(number=8):
+    rows = []
+    for k in range(number):
+        version = {"database.version": k}
+        rows.append(
+            row(0.1 * k, version, "", "tcr_sym", task="change", protocol="")
+        )
+        rows += [row(0.9 - 0.1 * k, version, name) for name in ("a", "b")]
+    return Results.of(rows)
+
+
+def test_lines_have_means_and_bands():
+    drawn = charts.draw(
+        {"kind": "lines", "over": YEARS, "metric": "auc"}, aged()
+    )
+    (axes,) = drawn.figure.axes
+    lines = [line.get_xydata() for line in axes.get_lines()]
+    # RING++ and SOLiD, in the order of tables, then the others.
+    expected = [PARTS[name] + 0.01 for name in ("solid", "ring++", "mine")]
+    for line, part in zip(lines, expected, strict=True):
+        assert line[:, 0].tolist() == [0, 10, 30]
+        np.testing.assert_allclose(line[:, 1], part - np.array([0.0, 0.1, 0.3]))
+    edges = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert edges.max() == pytest.approx(0.5 + 0.02)
+    assert drawn.message == (
+        "At 30 years, the AUC is greatest with RING++ (0.61) and least with"
+        " SOLiD (0.21)"
+    )
+    assert list(drawn.legend) == ["SOLiD", "RING++", "mine"]
+    assert len({colour for colour, _, _ in drawn.legend.values()}) == 3
+
+
+def test_a_wide_range_is_logarithmic():
+    rows = [
+        row(0.9, {"database.distractors": number})
+        for number in (0, 100, 10_000)
+    ]
+    chart = {"kind": "lines", "over": "database.distractors", "metric": "auc"}
+    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    assert axes.get_xscale() == "symlog"
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == [
+        "0",
+        "100",
+        "10000",
+    ]
+    (axes,) = charts.draw(
+        {"kind": "lines", "over": YEARS, "metric": "auc"}, aged()
+    ).figure.axes
+    assert axes.get_xscale() == "linear"
+
+
+def test_a_matrix_has_strips_and_the_last_number():
+    chart = {
+        "kind": "matrix",
+        "over": "cause",
+        "strips": "level",
+        "metric": "kept",
+    }
+    drawn = charts.draw(chart, caused())
+    (axes,) = drawn.figure.axes
+    # Three methods, one strip without a cause and three with one.
+    assert len(axes.patches) == 3 * (1 + 3)
+    numbers = [text.get_text() for text in axes.texts]
+    assert sorted(numbers) == ["100"] * 5 + ["60"]
+    assert [t.get_text() for t in axes.get_yticklabels()] == [
+        "none",
+        "parked cars",
+    ]
+    assert drawn.message == (
+        "The worst case is SOLiD under parked cars: kept share 0.60"
+    )
+    assert not drawn.legend
+
+
+def test_a_dumbbell_joins_both_ends():
+    rows = [
+        row(value, {"database.stage": stage}, name, town=town)
+        for name, before, after in (("ring++", 0.8, 0.6), ("solid", 0.5, 0.1))
+        for town in ("x", "y")
+        for stage, value in (("last", before), ("own", after))
+    ]
+    chart = {"kind": "dumbbell", "over": "database.stage", "metric": "auc"}
+    drawn = charts.draw(chart, Results.of(rows))
+    (axes,) = drawn.figure.axes
+    bars = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]
+    found = [list(bar.get_xdata()) for bar in bars]
+    assert found == [[0.5, 0.1]] * 2 + [[0.8, 0.6]] * 2
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert labels == ["SOLiD", "x", "y", "RING++", "x", "y"]
+    assert drawn.message == (
+        "RING++ keeps most of its AUC (0.60 of 0.80), SOLiD least (0.10 of"
+        " 0.50)"
+    )
+
+
+@pytest.mark.parametrize("number", [3, 8])
+def test_a_scatter_of_points_on_a_line(number):
+    drawn = charts.draw(
+        {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(number)
+    )
+    (axes,) = drawn.figure.axes
+    points, line, *_ = axes.get_lines()
+    np.testing.assert_allclose(
+        points.get_ydata(), 0.9 - np.asarray(points.get_xdata())
+    )
+    # A local linear regression of a line is that line.
+    np.testing.assert_allclose(
+        line.get_ydata(), 0.9 - np.asarray(line.get_xdata())
+    )
+    assert bool(axes.collections) == (number == 8)
+    assert drawn.message == (
+        "Rank correlation of AUC with TCR_sym: from -1.00 (b) to -1.00 (a)"
+    )
+
+
+def test_other_keys_select_rows():
+    rows = [*aged().rows, row(0.01, {YEARS: 0}, "mine", gate=True)]
+    chart = {"kind": "lines", "over": YEARS, "metric": "auc", "seed": 2}
+    drawn = charts.draw({**chart, "method": ["mine"]}, Results.of(rows))
+    (axes,) = drawn.figure.axes
+    (line,) = axes.get_lines()
+    np.testing.assert_allclose(line.get_ydata(), [0.72, 0.62, 0.42])
+
+
+@pytest.mark.parametrize(
+    ("chart", "words"),
+    [
+        ({"kind": "pie"}, "kind: 'pie' is none of dumbbell, lines"),
+        ({"metric": "auc"}, "kind: None"),
+        ({"kind": "lines", "metric": "auc"}, "lines: over: a name"),
+        ({"kind": "lines", "over": 3, "metric": "auc"}, "lines: over"),
+        (
+            {"kind": "lines", "over": "query.snow", "metric": "auc"},
+            "query.snow: the table has none",
+        ),
+        ({"kind": "lines", "over": YEARS, "metric": "miou"}, "no miou"),
+        (
+            {"kind": "lines", "over": YEARS, "metric": "auc", "colour": 1},
+            "colour: the table has none",
+        ),
+        (
+            {"kind": "lines", "over": "method", "metric": "auc"},
+            "method: 'ring",
+        ),
+        ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, "no auc has a tcr"),
+    ],
+)
+def test_faults_of_a_chart_are_named(chart, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        charts.draw(chart, aged())
+
+
+@pytest.mark.parametrize("width", [charts.WIDE, charts.NARROW])
+@pytest.mark.parametrize(
+    ("chart", "results"),
+    [
+        ({"kind": "lines", "over": YEARS, "metric": "auc"}, aged()),
+        ({"kind": "matrix", "over": "cause", "metric": "kept"}, caused()),
+        ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered()),
+        ({"kind": "dumbbell", "over": YEARS, "metric": "auc"}, aged()),
+    ],
+)
+def test_all_letters_can_be_read(chart, results, width):
+    figure = charts.draw(chart, results, width).figure
+    FigureCanvasAgg(figure).draw()
+    assert figure.get_figwidth() * 96 == pytest.approx(width)
+    # Nothing that is drawn is cut off. Letters have 12 px, also on a phone of
+    # 360 px with margins of 16 px.
+    box = figure.get_tightbbox()
+    assert box.x0 >= -0.01
+    assert box.x1 <= figure.get_figwidth() + 0.01
+    shown = 1.0 if width == charts.WIDE else 328.0 / width
+    sizes = [
+        text.get_fontsize() * 96.0 / 72.0 * shown
+        for text in figure.findobj(Text)
+        if text.get_text()
+    ]
+    assert len(sizes) > 4
+    assert min(sizes) >= 12.0
+
+
+class _Page(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.ids, self.links, self.tables, self.open = [], [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if "id" in values:
+            self.ids.append(values["id"])
+        for name in ("href", "xlink:href", "src"):
+            if name in values:
+                self.links.append(values[name])
+        if tag == "table":
+            self.tables.append([])
+        if tag == "tr" and self.tables:
+            self.tables[-1].append([])
+        if tag in ("td", "th"):
+            self.tables[-1][-1].append("")
+        self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        while self.open and self.open.pop() != tag:
+            pass
+
+    def handle_data(self, data):
+        if {"td", "th"} & {*self.open} and self.tables:
+            self.tables[-1][-1][-1] += data.strip()
+
+
+def test_a_page_stands_alone(tmp_path):
+    chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    path = write_page(
+        aged(),
+        None,
+        tmp_path / "page",
+        title="Age & <years>",
+        about="How old?",
+        charts=[chart],
+        experiment_text="name: <age>\n",
+        notes=["seeds 0 & 2"],
+    )
+    text = path.read_text()
+    page = _Page()
+    page.feed(text)
+    assert len(page.ids) == len(set(page.ids))
+    wanted = {link[1:] for link in page.links if link.startswith("#")}
+    assert wanted <= set(page.ids)
+    outside = {link for link in page.links if not link.startswith("#")}
+    assert outside == {"results.csv"}
+    assert "name: &lt;age&gt;" in text
+    assert "Age &amp; &lt;years&gt;" in text
+    assert "At 30 years, the AUC" in text[text.index("<h1>") :][:100]
+    summary, whole = page.tables
+    header, *lines = summary
+    assert header == ["method", "AUC"]
+    # The mean over years of 0, 10 and 30 less 0.01 a year, and of both seeds.
+    mean = 0.9 - 0.4 / 3.0 + 0.01
+    assert lines[1] == ["RING++", f"{mean:.3f}0.600 to 0.920"]
+    header, *lines = whole
+    assert header == ["seed", "method", YEARS, "auc"]
+    assert len(lines) == 3 * 3 * 2
+    assert ["2", "solid", "30", "0.220"] in lines
+    names = sorted(one.name for one in path.parent.iterdir())
+    assert names == ["chart_1.pdf", "chart_1.png", "index.html"]
+
+
+def test_a_page_without_a_chart_or_a_value(tmp_path):
+    results = Results.of([row(math.nan, {YEARS: 0}, metric="kept")])
+    path = write_page(results, None, tmp_path, title="nothing")
+    assert "<h1>nothing</h1>" in path.read_text()

@@ -1,0 +1,315 @@
+"""Tables beside each other, and beside those that ship."""
+
+import csv
+import itertools
+import json
+
+from helpers.eval_program import assert_refused, run
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from evaluation.results.comparing import _BASELINES, compare
+from evaluation.results.table import Answers, QueryRows, Results, Row
+
+
+def key(method, town="town", **changes):
+    values = {
+        "experiment": "e",
+        "map": town,
+        "database": f"{town}_01",
+        "query": f"{town}_02",
+        "seed": 1,
+        "factors": {},
+        "task": "place",
+        "method": method,
+        "gate": False,
+        "protocol": "fair",
+    }
+    return {**values, **changes}
+
+
+def write_table(folder, towns, number=40, *, queries=False, **changes):
+    """Writes a table in which all scores of a method are equal.
+
+    AUC is then the part of its answers that are right.
+
+    Args:
+        folder: to write.
+        towns: town -> (method -> the part that is right).
+        number: of queries of each town.
+        queries: whether there are answers.
+        changes: of all keys.
+    """
+    folder.mkdir()
+    rows, answers = [], []
+    for town, parts in towns.items():
+        for method, part in parts.items():
+            keys = key(method, town, **changes)
+            rows.append(Row(**keys, metric="auc", value=part))
+            right = np.arange(number) < part * number
+            columns = {
+                "query_frame": np.arange(number),
+                "block": np.arange(number) % 10,
+                "correct": right,
+                "has_match": np.ones(number, dtype=bool),
+                "score": np.full(number, 0.5),
+            }
+            answers.append(Answers(**keys, columns=columns))
+    Results.of(rows).write_csv(folder / "results.csv")
+    if queries:
+        QueryRows.of(answers).write_csv(folder / "queries.csv")
+    return folder
+
+
+def shipped(**columns):
+    stages = Results.read(_BASELINES / "stages.csv")
+    return stages.where(columns).rows
+
+
+def test_the_shipped_tables_hold_the_published_numbers():
+    """Both files of the documents, read by another reader."""
+    for name, source, version in (
+        ("stages.csv", "docs/notes/results_fair.csv", None),
+        ("fresh.csv", "docs/notes/fresh.csv", "version"),
+    ):
+        found = {
+            (
+                row.map,
+                row.database,
+                row.query,
+                row.method,
+                row["both.fresh"],
+                row["database.stage"],
+                row.gate,
+                row.metric,
+            ): row
+            for row in Results.read(_BASELINES / name).rows
+        }
+        with open(source, newline="") as file:
+            lines = list(csv.DictReader(file))
+        assert lines
+        for line in lines:
+            drives = (
+                line["map"],
+                *(f"{line['map']}_{line[one]}" for one in ("db", "query")),
+                line["method"],
+                int(line[version]) if version else None,
+            )
+            for column, place in (
+                ("auc_unchanged", ("last", False, "auc")),
+                ("auc", ("own", False, "auc")),
+                ("auc_strict", ("own", False, "auc_strict")),
+                ("r1", ("own", False, "r1")),
+                ("kept", ("own", False, "kept")),
+                ("gate_auc", ("own", True, "auc")),
+                ("gate_unchanged_auc", ("last", True, "auc")),
+            ):
+                if column in line:
+                    row = found.pop((*drives, *place))
+                    assert row.value == float(line[column])
+            # The interval of the share that is kept.
+            if row := found.get((*drives, "own", False, "kept")):
+                ends = float(line["kept_low"]), float(line["kept_high"])
+                assert (row.low, row.high) == ends
+        rest = {place[-1] for place in found}
+        assert rest <= {"visible_change", "recall_at_full_precision"}
+
+
+def test_an_entrant_stands_among_the_shipped(tmp_path):
+    """Each value is just above the best shipped method's, or below it."""
+    best = {}
+    for row in shipped(map="suburbia", metric="auc", gate=False):
+        condition = row.but("method")
+        if condition not in best or best[condition].value < row.value:
+            best[condition] = row
+    rows = [
+        Row(**{**vars(row), "method": name, "value": row.value - less})
+        for row in best.values()
+        for name, less in (("mine", -0.001), ("solid", 0.01))
+    ]
+    path = tmp_path / "entrant.csv"
+    Results.of(rows).write_csv(path)
+    found = compare([path])
+    assert found.conditions == 4
+    names = [one.method for one in found.ranked]
+    assert names[0] == "mine"
+    assert {"solid", "solid (entrant)"} < set(names)
+    value = {one.method: one.value for one in found.ranked}
+    expected = np.mean([row.value for row in best.values()])
+    assert value["mine"] == pytest.approx(expected + 0.001)
+    assert value["solid (entrant)"] == pytest.approx(expected - 0.01)
+    mean = np.mean(
+        [
+            row.value
+            for row in shipped(
+                map="suburbia", metric="auc", gate=False, method="ring++"
+            )
+        ]
+    )
+    assert value["ring++"] == pytest.approx(mean)
+    assert found.notes == []
+    assert found.agreements == []
+
+
+def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
+    one = write_table(
+        tmp_path / "one",
+        {"a": {"x": 0.5, "y": 0.4}, "b": {"x": 0.6}, "c": {"x": 0.1}},
+    )
+    two = write_table(tmp_path / "two", {"a": {"z": 0.2}, "b": {"z": 0.3}})
+    found = compare([one, two])
+    assert found.conditions == 2
+    assert [(r.method, r.value) for r in found.ranked] == [
+        ("x", pytest.approx(0.55)),
+        ("z", pytest.approx(0.25)),
+    ]
+    assert found.notes == [
+        "the shipped tables have none of these conditions",
+        "y: left out, with 1 of 2 conditions",
+    ]
+
+
+def test_differences_of_answers(tmp_path):
+    parts = {"a": {"x": 0.9}, "b": {"x": 0.7}}
+    one = write_table(tmp_path / "one", parts, queries=True)
+    two = write_table(
+        tmp_path / "two", {"a": {"x": 0.5}, "b": {"x": 0.7}}, queries=True
+    )
+    found = compare([one, two])
+    assert [r.method for r in found.ranked] == ["x (one)", "x (two)"]
+    (difference,) = found.differences
+    assert (difference.first, difference.second) == ("x (one)", "x (two)")
+    assert difference.difference.value == pytest.approx(0.2)
+    # It is 0.4 in a, with some deviation, and 0 in b, without any: the mean
+    # has half of that deviation.
+    (alone,) = compare(
+        [
+            write_table(tmp_path / "three", {"a": {"x": 0.9}}, queries=True),
+            write_table(tmp_path / "four", {"a": {"x": 0.5}}, queries=True),
+        ]
+    ).differences
+    assert alone.difference.value == pytest.approx(0.4)
+    widths = [
+        one.difference.interval.high - one.difference.value
+        for one in (difference, alone)
+    ]
+    # More degrees of freedom make it a little less than half.
+    assert 0.9 < widths[0] / (0.5 * widths[1]) < 1.0
+    fewer = write_table(
+        tmp_path / "fewer", {"a": {"x": 0.5}, "b": {"x": 0.5}}, 8, queries=True
+    )
+    with pytest.raises(InputError, match="different queries"):
+        compare([one, fewer])
+
+
+def counted_tau(first, second):
+    """Pairs in the same order less those in the opposite, over all pairs."""
+    signs = [
+        np.sign((one - other) * (second[i] - second[k]))
+        for (i, one), (k, other) in itertools.combinations(enumerate(first), 2)
+    ]
+    return np.mean(signs)
+
+
+@pytest.mark.parametrize("queries", [False, True])
+def test_tau_of_mean_areas(tmp_path, queries):
+    names = "wxyz"
+    simulated = write_table(
+        tmp_path / "simulated",
+        {
+            "a": dict(zip(names, (0.9, 0.7, 0.5, 0.1), strict=True)),
+            "b": dict(zip(names, (0.7, 0.9, 0.2, 0.3), strict=True)),
+        },
+        queries=queries,
+    )
+    real = write_table(
+        tmp_path / "real",
+        {"c": dict(zip(names, (0.6, 0.2, 0.4, 0.1), strict=True))},
+        queries=queries,
+    )
+    (one,) = compare([simulated, real], rankings=True).agreements
+    assert one.methods == tuple(names)
+    # The first two are equal on one side: tau-b divides by the root of the
+    # 5 of 6 pairs that are not.
+    expected = counted_tau((0.8, 0.8, 0.35, 0.2), (0.6, 0.2, 0.4, 0.1))
+    assert one.tau == pytest.approx(expected / np.sqrt(5 / 6))
+
+
+def test_opposite_rankings(tmp_path):
+    up = {"a": {"x": 0.1, "y": 0.4, "z": 0.9}}
+    down = {"a": {"x": 0.9, "y": 0.6, "z": 0.1}}
+    found = compare(
+        [
+            write_table(tmp_path / "up", up, queries=True),
+            write_table(tmp_path / "down", down, queries=True),
+        ]
+    )
+    (one,) = found.agreements
+    assert one.tau == pytest.approx(-1.0)
+    # The values are far apart, so no sample swaps two of them.
+    assert one.interval.low == one.interval.high == pytest.approx(-1.0)
+
+
+def test_rankings_are_of_one_protocol(tmp_path):
+    parts = {"a": {"x": 0.1, "y": 0.4}}
+    fair = write_table(tmp_path / "fair", parts)
+    rows = [
+        Row(**key(method, protocol=name), metric="auc", value=value)
+        for name in ("paper", "own")
+        for method, value in (("x", 0.9), ("y", 0.1))
+    ]
+    both = tmp_path / "both.csv"
+    Results.of(rows).write_csv(both)
+    with pytest.raises(InputError, match="paper and own in one table"):
+        compare([fair, both], rankings=True)
+    also_fair = tmp_path / "also.csv"
+    Results.of([*rows, *Results.read(fair).rows]).write_csv(also_fair)
+    (one,) = compare([fair, also_fair], rankings=True).agreements
+    assert one.tau == pytest.approx(1.0)
+    with pytest.raises(InputError, match=r"no row of auc .* protocol paper"):
+        compare([fair, both], protocol="paper", rankings=True)
+
+
+def test_less_may_be_better(tmp_path):
+    rows = [
+        Row(**key(name, task="localise"), metric="translation_median", value=v)
+        for name, v in (("gicp", 0.1), ("icp", 0.4))
+    ]
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for path in paths:
+        Results.of(rows).write_csv(path)
+    found = compare(paths, "translation_median")
+    assert found.task == "localise"
+    assert [r.method for r in found.ranked[::2]] == ["gicp (a)", "icp (a)"]
+
+
+def test_the_command(tmp_path, capsys):
+    one = write_table(tmp_path / "one", {"a": {"x": 0.5, "y": 0.25}})
+    two = write_table(tmp_path / "two", {"a": {"x": 0.75, "y": 0.5}})
+    status, out, err = run(capsys, "compare", one, two)
+    assert (status, err.count("\n")) == (0, 1)
+    assert out.splitlines()[1].split() == ["x", "(two)", "0.7500", *UNKNOWN]
+    status, out, _ = run(capsys, "compare", one, two, "--json")
+    found = json.loads(out)
+    assert found["conditions"] == 1
+    assert [m["value"] for m in found["methods"]] == [0.75, 0.5, 0.5, 0.25]
+    assert found["agreements"][0]["kendall_tau"] == pytest.approx(1.0)
+
+
+UNKNOWN = ["[undefined,", "undefined]"]
+
+
+def test_faults_are_one_line(tmp_path, capsys):
+    one = write_table(tmp_path / "one", {"a": {"x": 0.5}})
+    other = write_table(tmp_path / "other", {"b": {"x": 0.5}})
+    assert_refused(capsys, ["compare", one, other], one, "in common")
+    assert_refused(capsys, ["compare", one], "shipped tables")
+    assert_refused(capsys, ["compare", one, "--metric", "r1"], "r1", "auc")
+    assert_refused(capsys, ["compare", one, "--gate"], "with the gate")
+    assert_refused(capsys, ["compare", one, "--protocol", "x"], "--protocol")
+    assert_refused(capsys, ["compare", one, "--rankings"], "two tables")
+    pair = ["compare", one, other, "--rankings"]
+    assert_refused(capsys, pair, "fewer than two methods")
+    assert_refused(capsys, ["compare", tmp_path / "none.csv"], "none.csv")
+    assert_refused(capsys, ["ranking", one, other], "cns-eval compare")
