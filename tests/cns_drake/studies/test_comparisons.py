@@ -554,8 +554,12 @@ def test_maps_that_are_made(query_drive):
     ]
     rungs = found.by_cause()
     aged = rungs["old", 2]
-    assert (aged.database.map, aged.database.stage) == ("/aged/20_2_2", "07")
-    assert aged.query == query_drive
+    # The database is 20 years old: the query's city has lived on.
+    assert (aged.query.map, aged.query.stage) == ("/aged/20_2_2", "07")
+    assert aged.database.map == query_drive.map
+    young = rungs["young", 1]
+    assert young.database.map.startswith("/aged/5_1_")
+    assert young.query == query_drive
     other = rungs["other", 1]
     assert other.database.map == other.query.map == "/redrawn/7"
 
@@ -586,7 +590,7 @@ FAULTS = [
     ("database: {stage: 1}", "database.stage: 1: town has"),
     ("database: {stage: earlier 5}", "database.stage: 'earlier 5'"),
     ("cases: {a: {query: {stage: next}}}", "query.stage: 'next'"),
-    ("database: {years: 5, stage: '01'}", "database.years: stage last ages"),
+    ("{database: {stage: '01'}, query: {years: 5}}", "years: stage last ages"),
     ("database: {rates: 2}", "database.rates: those of no years"),
     ("query: {distractors: 3}", "query.distractors: it is a field of database"),
     ("both: {lateral: 3}", "query.lateral: it is a field of database"),
