@@ -9,8 +9,9 @@
   smooth line and its 95 % band.
 
 All other keys are columns of the table with the values that are shown. By
-default the task is `place`, the gate 0. Methods keep their colours, and the
-title is what the chart shows, in words.
+default the gate is 0, and the task `place`, or else the first one with the
+metric. Methods keep their colours, and the title is what the chart shows, in
+words.
 """
 
 from __future__ import annotations
@@ -155,7 +156,9 @@ def draw(
     for name in (*chosen, *(keys[n] for n in keys if n in ("over", "strips"))):
         if not any(row[name] is not None for row in results.rows):
             raise InputError(f"charts: {kind}: {name}: the table has none")
-    chosen = {"task": "place", "gate": 0, **chosen}
+    tasks = results.where(metric=metric).distinct("task")
+    task = "place" if "place" in tasks else next(iter(tasks), "place")
+    chosen = {"task": task, "gate": 0, **chosen}
     rows = results.where(chosen, metric=metric).rows
     rows = tuple(row for row in rows if not math.isnan(row.value))
     if not rows:

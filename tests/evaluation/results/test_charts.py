@@ -183,6 +183,23 @@ def test_other_keys_select_rows():
 
 
 @pytest.mark.parametrize(
+    ("tasks", "share"),
+    [(("pose", "place"), 0.9), (("localise", "pose"), 0.8)],
+)
+def test_the_task_is_place_or_the_first_with_the_metric(tasks, share):
+    shares = {"place": 0.9, "localise": 0.8, "pose": 0.7}
+    rows = [
+        row(shares[task], {YEARS: year}, metric="kept", task=task)
+        for task in tasks
+        for year in (0, 5)
+    ]
+    chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
+    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    (line,) = axes.get_lines()
+    np.testing.assert_allclose(line.get_ydata(), share)
+
+
+@pytest.mark.parametrize(
     ("chart", "words"),
     [
         ({"kind": "pie"}, "kind: 'pie' is none of dumbbell, lines"),
