@@ -122,6 +122,9 @@ class PairOfDrives:
             if drive.driver.departs and drive.driver.seed is None:
                 driver = drive.driver.replaced(seed=drive.name)
                 self._unchanged[side] = drive.replaced(driver=driver)
+        self._last_stage = max(
+            str(one.stage) for one in (self.database, self.query)
+        )
         self._plain = dict(self._unchanged)
         if self.same_route:
             self._plain["database"] = moved(
@@ -310,7 +313,7 @@ class PairOfDrives:
         if stage != drive.stage:
             drive = drive.replaced(stage=stage)
         if age[0]:
-            if drive.stage != self.query.stage:
+            if drive.stage != self._last_stage:
                 raise InputError(
                     f"{self.source}: years: stage {LAST} ages, not the stage"
                     f" {drive.stage} of the {side}"
@@ -366,7 +369,7 @@ class PairOfDrives:
 
     def _stage(self, side: str, drive: Scenario, wanted: Any) -> str:
         """Returns the stage that a name or a place among stages means."""
-        own, last = str(drive.stage), str(self.query.stage)
+        own, last = str(drive.stage), self._last_stage
         stages = sorted(map_folder(drive).stages())
         if wanted in (OWN, LAST, FIRST):
             return {OWN: own, LAST: last, FIRST: min(stages, default=own)}[
@@ -438,13 +441,36 @@ class PairOfDrives:
         content = fingerprint(drive.replaced(name="").model_dump(mode="json"))
         known = self._known[side]
         if content not in known:
-            name = drive.name
-            if drive != self._plain[side]:
+            name, plain = drive.name, self._plain[side]
+            if not self.same_route and drive == plain.replaced(
+                stage=drive.stage
+            ):
+                if drive != plain:
+                    drive = control_drive(plain, str(drive.stage))
+                    name = drive.name
+            elif drive != plain:
                 name += f"_{_ending(side, condition, seed)}"
             if name in {one.name for one in known.values()}:
                 name += f"_{content[:6]}"
             known[content] = drive.replaced(name=name)
         return known[content]
+
+
+def control_drive(drive: Scenario, stage: str) -> Scenario:
+    """Returns the control of a drive: its route, through another stage.
+
+    The driver is the same. All change between the control and that stage's own
+    drive is due to the routes, and not to the city.
+    """
+    driver = drive.driver
+    if driver.departs and driver.seed is None:
+        driver = driver.replaced(seed=drive.name)
+    return drive.replaced(
+        name=f"{drive.name}_stage_{stage}",
+        stage=stage,
+        title=f"Control: the route of {drive.name} in stage {stage}",
+        driver=driver,
+    )
 
 
 def _joined(fields: Any, changes: Any) -> Any:

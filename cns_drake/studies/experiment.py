@@ -157,7 +157,8 @@ class Experiment(Section):
             made; by default the shipped maps.
         files: folder of the files that `maps` import.
         drives: `same-route`: the last drive of a map queries a database of its
-            own route; `stages`: it queries each earlier drive;
+            own route; `stages`: it queries each earlier drive; `both-ways`:
+            likewise, and two drives of a map query each other;
             `first-and-last`: the last drive, through the last stage, queries
             the first one.
         both: fields of both drives; lists are factors.
@@ -190,7 +191,9 @@ class Experiment(Section):
         BeforeValidator(_in_a_tuple),
     ] = Field(default=None, min_length=1)
     files: str | None = None
-    drives: Literal["same-route", "stages", "first-and-last"] = "same-route"
+    drives: Literal["same-route", "stages", "both-ways", "first-and-last"] = (
+        "same-route"
+    )
     both: dict[str, Any] = Field(default_factory=dict)
     database: dict[str, Any] = Field(default_factory=dict)
     query: dict[str, Any] = Field(default_factory=dict)

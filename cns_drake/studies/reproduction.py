@@ -14,6 +14,7 @@ from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import recordable_map, recordable_maps
 from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies.comparisons import control_drive
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import Record, is_recorded, plan_recordings
 from evaluation.paper import reference_for
@@ -121,28 +122,13 @@ def _drives(folder: Path) -> list[Scenario]:
 
 
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
-    """Returns the control drives of a map's drives.
-
-    A control drive follows the route of an earlier stage in the last one, with
-    the same driver. All change between it and the last stage's own drive is due
-    to the routes, and not to the city.
-    """
+    """Returns the control drives of a map's drives, see `control_drive`."""
     last = max(drives, key=lambda drive: drive.stage or "")
-    controls = []
-    for drive in drives:
-        if drive is last:
-            continue
-        driver = drive.driver
-        if driver.departs and driver.seed is None:
-            driver = driver.replaced(seed=drive.name)
-        control = drive.replaced(
-            name=f"{drive.name}_stage_{last.stage}",
-            stage=last.stage,
-            title=f"Control: the route of {drive.name} in stage {last.stage}",
-            driver=driver,
-        )
-        controls.append(control)
-    return controls
+    return [
+        control_drive(drive, str(last.stage))
+        for drive in drives
+        if drive is not last
+    ]
 
 
 def recording_info(

@@ -82,7 +82,7 @@ TASKS: Mapping[str, type[Task]] = {
         *(MapTask, ChangeTask, CostTask),
     )
 }
-_STAGE = "database.stage"
+_STAGE = "both.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
 # Tables that earlier versions wrote.
@@ -347,7 +347,10 @@ class Study:
             query = drives[-1]
             return [(query.replaced(name=f"{query.name}_database"), query)]
         query = max(drives, key=lambda drive: drive.stage or "")
-        return [(one, query) for one in drives if one is not query]
+        pairs = [(one, query) for one in drives if one is not query]
+        if kind == "both-ways" and len(drives) == 2:
+            pairs += [(query, one) for one, _ in pairs]
+        return pairs
 
     def _plan(
         self, drives: Iterable[_Drives]
@@ -497,7 +500,10 @@ class Study:
                     f"{self.source}: {name}: the recordings of {city.name} are"
                     " as they are; simulated drives alone can vary it"
                 )
-        for pair in city.change_pairs():
+        pairs = city.change_pairs()
+        if self.experiment.drives == "both-ways" and len(pairs) == 1:
+            pairs += [(later, earlier) for earlier, later in pairs]
+        for pair in pairs:
             control = city.unchanged_pair(*pair)
             for condition in self._conditions:
                 stage = condition.factors.get(_STAGE, OWN)

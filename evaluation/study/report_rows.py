@@ -12,7 +12,7 @@ from evaluation.report.page import Report
 from evaluation.results.table import Results, Row
 
 EXPERIMENT = "stages"
-_STAGE = "database.stage"
+_STAGE = "both.stage"
 # The stage of the database: its own, or that of the query on the same routes.
 _OWN, _LAST = "own", "last"
 _SEED = 1

@@ -134,12 +134,12 @@ def test_a_matrix_has_strips_and_the_last_number():
 
 def test_a_dumbbell_joins_both_ends():
     rows = [
-        row(value, {"database.stage": stage}, name, town=town)
+        row(value, {"both.stage": stage}, name, town=town)
         for name, before, after in (("ring++", 0.8, 0.6), ("solid", 0.5, 0.1))
         for town in ("x", "y")
         for stage, value in (("last", before), ("own", after))
     ]
-    chart = {"kind": "dumbbell", "over": "database.stage", "metric": "auc"}
+    chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
     drawn = charts.draw(chart, Results.of(rows))
     (axes,) = drawn.figure.axes
     bars = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]

@@ -80,7 +80,7 @@ def test_the_shipped_tables_hold_the_published_numbers():
                 row.query,
                 row.method,
                 row["both.fresh"],
-                row["database.stage"],
+                row["both.stage"],
                 row.gate,
                 row.metric,
             ): row

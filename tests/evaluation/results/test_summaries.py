@@ -212,7 +212,7 @@ def test_rank_correlations_are_those_of_scipy():
     rng = np.random.default_rng(3)
     rows, drawn = [], []
     for k in range(25):
-        stage, tcr = {"database.stage": f"s{k}"}, rng.random()
+        stage, tcr = {"both.stage": f"s{k}"}, rng.random()
         seen, auc = rng.random(), np.round(rng.random(), 1)
         drawn.append((tcr, seen, 1.0 - auc))
         rows += [
@@ -221,7 +221,7 @@ def test_rank_correlations_are_those_of_scipy():
             row(auc, stage),
         ]
     # A condition without one of them does not count.
-    rows.append(row(0.5, {"database.stage": "alone"}))
+    rows.append(row(0.5, {"both.stage": "alone"}))
     results = Results.of(rows)
     (one,) = summaries.correlations(results, ("tcr_sym", "visible_change"))
     tcr, seen, failure = np.transpose(drawn)
