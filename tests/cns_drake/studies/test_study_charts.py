@@ -11,7 +11,7 @@ def test_charts_that_the_results_lack_are_left_out_with_a_note():
     results = Results.of(
         Row(
             *("stages", "town", "town_01", "town_02", 1),
-            *({"database.stage": stage}, "place", "solid", False, "fair"),
+            *({"both.stage": stage}, "place", "solid", False, "fair"),
             *("auc", 0.5),
         )
         for stage in ("last", "own")
