@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import csv
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache, cached_property
 import io
 import math
@@ -35,6 +35,8 @@ _BEFORE = ("experiment", "map", "database", "query", "seed")
 _BEHIND = ("task", "method", "gate", "protocol")
 KEYS = (*_BEFORE, *_BEHIND)
 _MEASURED = ("metric", "value", "low", "high", "n")
+# What `Key` gives by name beside factors, which cannot have such a name.
+_NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.
 _ANSWERS = {
     "query_frame": int,
@@ -126,8 +128,8 @@ class Key:
 
     def __getitem__(self, column: str) -> object:
         """Returns the value of a column, or `label`; None without one."""
-        if column in _COLUMNS:
-            return getattr(self, column)
+        if column in _NAMED:
+            return getattr(self, column, None)
         return self.factors.get(column)
 
     @property
@@ -212,11 +214,6 @@ class Answers(Key):
             0,
             None if blocks is None or (blocks < 0).all() else blocks,
         )
-
-
-_COLUMNS = frozenset(
-    ("label", *(one.name for one in (*fields(Row), *fields(Answers))))
-)
 
 
 @dataclass(frozen=True)
@@ -584,6 +581,9 @@ class _Cells:
                 fault = "is there twice" if name else "has no name"
                 raise InputError(f"{file}: line 1: column '{name}' {fault}")
         factors = [n for n in names if n not in {*needed, *known}]
+        for name in factors:
+            if name in _NAMED:
+                raise InputError(f"{file}: line 1: '{name}' names no factor")
         columns = {name: k for k, name in enumerate(names)}
         rows = [one for one in rows if any(one[1])]
         if not rows:
