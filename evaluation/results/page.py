@@ -12,6 +12,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
 from evaluation.report.drawing import save
@@ -50,7 +51,8 @@ def write_page(
         folder: to write into.
         title: of the page.
         about: the question, in words.
-        charts: see `charts`; the headline is what the first one shows.
+        charts: see `charts`; the headline is what the first one shows. One
+            whose rows the table lacks is left out, and a note says so.
         experiment_text: the experiment as YAML.
         notes: what else a reader has to know, such as settings.
 
@@ -58,17 +60,20 @@ def write_page(
         The path of the page.
 
     Raises:
-        InputError: a chart cannot be drawn, or a file cannot be written.
+        InputError: a file cannot be written.
     """
     make_folder(folder)
-    shown = []
+    shown, notes = [], list(notes)
     for number, chart in enumerate(charts, start=1):
-        alone = drawing.draw(chart, results, alone=True)
+        try:
+            alone = drawing.draw(chart, results, alone=True)
+        except InputError as error:
+            # What was measured does not depend on it.
+            notes.append(f"Chart {number} is left out: {error}.")
+            continue
         save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
         svgs = {
-            name: _svg(
-                drawing.draw(chart, results, width).figure, f"{name}{number}"
-            )
+            name: _svg(drawing.draw(chart, results, width), f"{name}{number}")
             for name, width in (
                 ("wide", drawing.WIDE),
                 ("narrow", drawing.NARROW),
@@ -92,7 +97,7 @@ def write_page(
         summary=[_summary(results, task) for task in results.distinct("task")],
         table=_wide_table(results),
         experiment_text=experiment_text,
-        notes=list(notes),
+        notes=notes,
         protocols=list(filter(None, results.distinct("protocol"))),
         queries=sum(len(one.columns["correct"]) for one in answers),
         version=__version__,
@@ -104,11 +109,11 @@ def write_page(
     return path
 
 
-def _svg(figure: Any, prefix: str) -> Markup:
+def _svg(drawn: drawing.Drawn, prefix: str) -> Markup:
     """Returns a drawing as an element whose ids no other drawing has."""
     with tempfile.TemporaryDirectory() as folder:
         stem = Path(folder) / "chart"
-        save(figure, stem, ("svg",))
+        save(drawn.figure, stem, ("svg",))
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
