@@ -447,9 +447,8 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         for one in correlations(selected, [x_name], y_name)
     }
     message = f"{words(y_name)} over {words(x_name)}"
-    known = {n: one for n, one in found.items() if not math.isnan(one[0])}
-    if known:
-        best, worst = _ends(known)
+    if not all(math.isnan(rho) for rho, _ in found.values()):
+        best, worst = _ends(found)
         message = (
             f"Rank correlation of {words(y_name)} with {words(x_name)}: from"
             f" {worst[1]} ({worst[0]}) to {best[1]} ({best[0]})"
