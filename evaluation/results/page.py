@@ -12,13 +12,14 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
 from evaluation.report.drawing import save
 from evaluation.report.tables import in_table_order
 from evaluation.results import charts as drawing
-from evaluation.results.summaries import means
+from evaluation.results.summaries import Summary, means, summarised
 from evaluation.results.table import KEYS, QueryRows, Results
 
 _TASKS = {
@@ -29,6 +30,7 @@ _TASKS = {
     "change": "Structural change",
     "cost": "Costs",
 }
+_SUMMARIES = "summaries.csv"
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3"}
 
 
@@ -43,7 +45,10 @@ def write_page(
     experiment_text: str = "",
     notes: Iterable[str] = (),
 ) -> Path:
-    """Writes `index.html`, which needs no other file, and the charts for print.
+    """Writes `index.html`, which needs no other file.
+
+    Beside it stand the charts for print, and `summaries.csv` where there are
+    summaries of them, see `summarised`.
 
     Args:
         results: the table, beside the page as `results.csv`.
@@ -80,6 +85,9 @@ def write_page(
             )
         }
         shown.append({"message": alone.message, "legend": alone.legend, **svgs})
+    numbers = summarised(results, queries, charts)
+    if numbers:
+        write_csv(folder / _SUMMARIES, Summary._fields, map(_cells, numbers))
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -96,6 +104,7 @@ def write_page(
         charts=shown,
         summary=[_summary(results, task) for task in results.distinct("task")],
         table=_wide_table(results),
+        numbers=numbers,
         experiment_text=experiment_text,
         notes=notes,
         protocols=list(filter(None, results.distinct("protocol"))),
@@ -175,10 +184,20 @@ def _wide_table(results: Results) -> dict[str, Any]:
     }
 
 
+def _cells(numbers: Summary) -> list[object]:
+    """Returns the cells of a summary, with all digits."""
+    return [
+        "" if isinstance(v, float) and math.isnan(v) else v
+        for v in (*numbers[:4], int(numbers.gate), *numbers[5:])
+    ]
+
+
 def _shown(value: object) -> str:
     """Returns a value for a reader."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
+    if value == math.inf:
+        return "more"
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float):

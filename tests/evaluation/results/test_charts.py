@@ -348,5 +348,11 @@ def test_a_page_stands_alone(tmp_path):
 
 def test_a_page_without_a_chart_or_a_value(tmp_path):
     results = Results.of([row(math.nan, {YEARS: 0}, metric="kept")])
-    path = write_page(results, None, tmp_path, title="nothing")
-    assert "<h1>nothing</h1>" in path.read_text()
+    chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
+    path = write_page(results, None, tmp_path, title="none", charts=[chart])
+    assert "<h1>none</h1>" in path.read_text()
+    assert "Chart 1 is left out" in path.read_text()
+    header, first, _ = (tmp_path / "summaries.csv").read_text().splitlines()
+    assert header == "what,map,task,method,gate,value,low,high,n"
+    # A single year without a share has no lifetime.
+    assert first.endswith("left (of 0),town,place,mine,0,,,,")
