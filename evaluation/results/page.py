@@ -12,12 +12,14 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from cns_drake.base.csv_files import write_csv
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
 from evaluation.report.drawing import save
 from evaluation.report.tables import in_table_order
 from evaluation.results import charts as drawing
-from evaluation.results.summaries import means
+from evaluation.results.summaries import Summary, means, summarised
 from evaluation.results.table import KEYS, QueryRows, Results
 
 _TASKS = {
@@ -28,6 +30,7 @@ _TASKS = {
     "change": "Structural change",
     "cost": "Costs",
 }
+_SUMMARIES = "summaries.csv"
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3"}
 
 
@@ -42,7 +45,10 @@ def write_page(
     experiment_text: str = "",
     notes: Iterable[str] = (),
 ) -> Path:
-    """Writes `index.html`, which needs no other file, and the charts for print.
+    """Writes `index.html`, which needs no other file.
+
+    Beside it stand the charts for print, and `summaries.csv` where there are
+    summaries of them, see `summarised`.
 
     Args:
         results: the table, beside the page as `results.csv`.
@@ -50,7 +56,8 @@ def write_page(
         folder: to write into.
         title: of the page.
         about: the question, in words.
-        charts: see `charts`; the headline is what the first one shows.
+        charts: see `charts`; the headline is what the first one shows. One
+            whose rows the table lacks is left out, and a note says so.
         experiment_text: the experiment as YAML.
         notes: what else a reader has to know, such as settings.
 
@@ -58,23 +65,29 @@ def write_page(
         The path of the page.
 
     Raises:
-        InputError: a chart cannot be drawn, or a file cannot be written.
+        InputError: a file cannot be written.
     """
     make_folder(folder)
-    shown = []
+    shown, notes = [], list(notes)
     for number, chart in enumerate(charts, start=1):
-        alone = drawing.draw(chart, results, alone=True)
+        try:
+            alone = drawing.draw(chart, results, alone=True)
+        except InputError as error:
+            # What was measured does not depend on it.
+            notes.append(f"Chart {number} is left out: {error}.")
+            continue
         save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
         svgs = {
-            name: _svg(
-                drawing.draw(chart, results, width).figure, f"{name}{number}"
-            )
+            name: _svg(drawing.draw(chart, results, width), f"{name}{number}")
             for name, width in (
                 ("wide", drawing.WIDE),
                 ("narrow", drawing.NARROW),
             )
         }
         shown.append({"message": alone.message, "legend": alone.legend, **svgs})
+    numbers = summarised(results, queries, charts)
+    if numbers:
+        write_csv(folder / _SUMMARIES, Summary._fields, map(_cells, numbers))
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -91,8 +104,9 @@ def write_page(
         charts=shown,
         summary=[_summary(results, task) for task in results.distinct("task")],
         table=_wide_table(results),
+        numbers=numbers,
         experiment_text=experiment_text,
-        notes=list(notes),
+        notes=notes,
         protocols=list(filter(None, results.distinct("protocol"))),
         queries=sum(len(one.columns["correct"]) for one in answers),
         version=__version__,
@@ -104,11 +118,11 @@ def write_page(
     return path
 
 
-def _svg(figure: Any, prefix: str) -> Markup:
+def _svg(drawn: drawing.Drawn, prefix: str) -> Markup:
     """Returns a drawing as an element whose ids no other drawing has."""
     with tempfile.TemporaryDirectory() as folder:
         stem = Path(folder) / "chart"
-        save(figure, stem, ("svg",))
+        save(drawn.figure, stem, ("svg",))
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
@@ -170,10 +184,20 @@ def _wide_table(results: Results) -> dict[str, Any]:
     }
 
 
+def _cells(numbers: Summary) -> list[object]:
+    """Returns the cells of a summary, with all digits."""
+    return [
+        "" if isinstance(v, float) and math.isnan(v) else v
+        for v in (*numbers[:4], int(numbers.gate), *numbers[5:])
+    ]
+
+
 def _shown(value: object) -> str:
     """Returns a value for a reader."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
+    if value == math.inf:
+        return "more"
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float):
