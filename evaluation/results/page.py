@@ -20,7 +20,7 @@ from evaluation.report.drawing import save
 from evaluation.report.tables import in_table_order
 from evaluation.results import charts as drawing
 from evaluation.results.summaries import Summary, means, summarised
-from evaluation.results.table import KEYS, QueryRows, Results
+from evaluation.results.table import KEYS, SETTINGS, QueryRows, Results
 
 _TASKS = {
     "place": "Place recognition",
@@ -31,6 +31,16 @@ _TASKS = {
     "cost": "Costs",
 }
 _SUMMARIES = "summaries.csv"
+# Task -> the metrics of its summary, the headline first.
+_HEADLINES = {
+    "place": ("auc", "auc_strict", "r1", "kept", "kept_strict"),
+    "pose": ("pose_success", "kept", "translation_median"),
+    "localise": ("success_03m_1deg", "success_2m_5deg", "kept"),
+    "map": ("miou", "right_structures", "called_structures"),
+    "change": ("tcr_sym", "tcr_sym_masked"),
+    "cost": ("query_ms", "build_ms"),
+}
+_MOST_COLUMNS = 12
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3"}
 
 
@@ -129,30 +139,49 @@ def _svg(drawn: drawing.Drawn, prefix: str) -> Markup:
 
 
 def _summary(results: Results, task: str) -> dict[str, Any]:
-    """Returns the means of a task's metrics, without and with the gate."""
+    """Returns a task's numbers by method, without and with the gate.
+
+    The columns are the conditions with their headline, or, where these are
+    many, the metrics with their means over all conditions.
+    """
     rows = results.where(task=task).rows
-    metrics = list(dict.fromkeys(row.metric for row in rows))
+    known = dict.fromkeys(row.metric for row in rows)
+    metrics = [m for m in _HEADLINES.get(task, known) if m in known] or [*known]
+    factors = [f for f in results.factors if not f.startswith(SETTINGS)]
+    cells = dict.fromkeys(tuple(row[f] for f in factors) for row in rows)
+    by_condition = 1 < len(cells) <= _MOST_COLUMNS
+    if by_condition:
+        metrics = metrics[:1]
     found = {
         one.key: one
-        for one in means(rows, "label", "gate", "metric")
+        for one in means(
+            rows, "label", "gate", "metric", *(factors if by_condition else ())
+        )
         if one.number
     }
-    names = in_table_order(row.label for row in rows)
+    columns = [
+        (metric, *(cell if by_condition else ()))
+        for metric in metrics
+        for cell in (cells if by_condition else [()])
+    ]
     lines = [
         {
             "name": (drawing.titled(name) or "–")
             + (", with the gate" if gate else ""),
-            "cells": [found.get((name, gate, metric)) for metric in metrics],
+            "cells": [found.get((name, gate, *one)) for one in columns],
         }
         for gate in sorted({row.gate for row in rows})
-        for name in names
-        if any((name, gate, metric) in found for metric in metrics)
+        for name in in_table_order(row.label for row in rows)
+        if any((name, gate, *one) in found for one in columns)
     ]
-    return {
-        "name": _TASKS.get(task, task),
-        "metrics": list(map(drawing.words, metrics)),
-        "rows": lines,
-    }
+    heads = [drawing.words(metric) for metric, *_ in columns]
+    title = _TASKS.get(task, task)
+    if by_condition:
+        title += f": {heads[0]}"
+        if factors:
+            title += f" by {', '.join(map(drawing.words, factors))}"
+        heads = [", ".join(map(_shown, cell)) for _, *cell in columns]
+    return {"name": title, "metrics": heads, "rows": lines}
 
 
 def _wide_table(results: Results) -> dict[str, Any]:
