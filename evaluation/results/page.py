@@ -174,7 +174,7 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         for name in in_table_order(row.label for row in rows)
         if any((name, gate, *one) in found for one in columns)
     ]
-    heads = [drawing.words(metric) for metric, *_ in columns]
+    heads = [drawing.words(str(metric)) for metric, *_ in columns]
     title = _TASKS.get(task, task)
     if by_condition:
         title += f": {heads[0]}"
