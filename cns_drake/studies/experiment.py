@@ -187,7 +187,13 @@ class Experiment(Section):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]
     about: str = ""
     maps: Annotated[
-        tuple[Annotated[Any, PlainValidator(_map)], ...] | None,
+        tuple[
+            Annotated[
+                Any, PlainValidator(_map, json_schema_input_type=str | MadeMap)
+            ],
+            ...,
+        ]
+        | None,
         BeforeValidator(_in_a_tuple),
     ] = Field(default=None, min_length=1)
     files: str | None = None
@@ -197,9 +203,9 @@ class Experiment(Section):
     both: dict[str, Any] = Field(default_factory=dict)
     database: dict[str, Any] = Field(default_factory=dict)
     query: dict[str, Any] = Field(default_factory=dict)
-    cases: dict[Name, Annotated[Any, PlainValidator(_case)]] = Field(
-        default_factory=dict
-    )
+    cases: dict[
+        Name, Annotated[Any, PlainValidator(_case, json_schema_input_type=dict)]
+    ] = Field(default_factory=dict)
     levels: Annotated[
         tuple[Annotated[int, Field(ge=1, le=100)], ...] | None,
         BeforeValidator(_in_a_tuple),

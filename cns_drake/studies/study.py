@@ -36,6 +36,7 @@ from cns_drake.studies.experiment import (
     CAUSE,
     FRESH,
     LEVEL,
+    SIDES,
     Condition,
     Experiment,
     MadeMap,
@@ -265,6 +266,7 @@ class Study:
         found = {}
         for variant in method_variants(wanted):
             name = variant.name
+            place = f"methods.{name}."
             if name.endswith(".py"):
                 path = Path(name).absolute()
                 name = next(n for n, one in known.items() if one.file == path)
@@ -274,7 +276,12 @@ class Study:
                 )
             choice = replace(known[name], settings=variant.settings)
             choice.make()  # A wrong setting is found before anything slow.
-            found[choice.key] = choice, replace(variant, name=name)
+            columns = {
+                f"methods.{name}.{column.removeprefix(place)}": one
+                for column, one in variant.factors.items()
+            }
+            variant = replace(variant, name=name, factors=columns)
+            found[choice.key] = choice, variant
         return found
 
     def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
@@ -493,22 +500,20 @@ class Study:
 
     def _recorded(self, city: City) -> Iterator[_Measured]:
         """Yields the pairs of recordings; nothing but their stage varies."""
-        allowed = {_STAGE, *_protocol_factors(self._conditions)}
-        for name in self._conditions[0].factors:
-            if name not in allowed:
-                raise InputError(
-                    f"{self.source}: {name}: the recordings of {city.name} are"
-                    " as they are; simulated drives alone can vary it"
-                )
+        self._check_recordable(city)
         pairs = city.change_pairs()
         if self.experiment.drives == "both-ways" and len(pairs) == 1:
             pairs += [(later, earlier) for earlier, later in pairs]
         for pair in pairs:
             control = city.unchanged_pair(*pair)
             for condition in self._conditions:
-                stage = condition.factors.get(_STAGE, OWN)
+                stage = condition.changes.get("both", {}).get("stage", OWN)
                 sources = pair if stage == OWN else control
-                if stage not in (OWN, LAST) or sources is None:
+                if sources is None:
+                    self.on_note(
+                        f"{city.name}: no drive on the route of {pair[0].name}"
+                        f" in the stage of {pair[1].name}"
+                    )
                     continue
                 database, query = map(_recording, sources)
                 protocol = self._protocol_of(condition)
@@ -524,6 +529,29 @@ class Study:
                         *(database, query, database),
                         protocol,
                     ),
+                )
+
+    def _check_recordable(self, city: City) -> None:
+        """Checks that no condition changes more than recordings can have."""
+        for condition in self._conditions:
+            sides = {n: condition.changes.get(n, {}) for n in SIDES}
+            given = [f"{side}.{name}" for side in sides for name in sides[side]]
+            given += [CAUSE] if condition.causes else []
+            for name in given:
+                if name != _STAGE:
+                    name = next(
+                        (n for n in condition.factors if n.startswith(name)),
+                        name,
+                    )
+                    raise InputError(
+                        f"{self.source}: {name}: the recordings of {city.name}"
+                        " are as they are; simulated drives alone can vary it"
+                    )
+            stage = sides["both"].get("stage", OWN)
+            if stage not in (OWN, LAST):
+                raise InputError(
+                    f"{self.source}: {_STAGE}: {stage!r}: recordings have"
+                    f" {OWN} and {LAST}"
                 )
 
     def _announce(self, jobs: Mapping[str, Job]) -> None:
@@ -617,10 +645,6 @@ class Study:
 
 def _recording(info: RecordingInfo) -> NamedDrive:
     return NamedDrive(info.name, info.source)
-
-
-def _protocol_factors(cells: Sequence[Condition]) -> list[str]:
-    return [name for name in cells[0].factors if name.startswith("protocol.")]
 
 
 def _base_name(database: Scenario) -> str:

@@ -132,6 +132,8 @@ class LocaliseTask(Task):
                     "query_frame": rows["frame"],
                     "query_stamp_ns": rows["stamp_ns"],
                     "correct": localise.is_right(rows),
+                    # Queries are where the map is.
+                    "has_match": np.ones(len(rows), bool),
                     "score": np.where(
                         np.isfinite(rows["own_score"]),
                         rows["own_score"],

@@ -1,6 +1,4 @@
-"""A family without recordings gives the results of its recordings."""
-
-import csv
+"""A study without recordings gives the results of recordings."""
 
 from helpers import studies
 from helpers.small_city import write_small_city
@@ -11,32 +9,31 @@ import yaml
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
 from cns_drake.studies import recording
-from evaluation.command_line.cli import app as evaluation_app
-from evaluation.study import trend_databases
+from cns_drake.studies import study as study_module
+from evaluation.change.drive_change import compare, survey
+from evaluation.drives import open_drive
+from evaluation.methods import make_method
+from evaluation.recognition.place_recognition import run as recognise
+from evaluation.recognition.protocol import FAIR_PROTOCOL
+from evaluation.results.table import Results
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.usefixtures("unrendered_figures", "few_methods"),
-]
-
-# Members and their control have scenario files; the query drive has none.
-RIDE, IMU = {"roughness": "C"}, {"rate": 100}
+pytestmark = pytest.mark.slow
 
 
-def run(program, *arguments):
-    result = CliRunner().invoke(program, [str(a) for a in arguments])
+def run(*arguments):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
     assert result.exit_code == 0, (result.output, result.exception)
 
 
 def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
-    studies.run_here(monkeypatch, recording, trend_databases)
+    studies.run_here(monkeypatch, recording, study_module)
     town = write_small_city(tmp_path / "town")
     generate_city(town)
-    for stage, heading in (("01", 0.4), ("02", 0.0)):
+    for stage, aside in (("01", 0.4), ("02", 0.0)):
         drive = {
             "map": ".",
             "stage": stage,
-            "aside": heading,
+            "aside": aside,
             "route": [
                 {"road": "south", "direction": "backward", "lane": 1},
                 {"road": "north", "direction": "backward", "lane": 1},
@@ -50,34 +47,48 @@ def test_simulated_and_recorded_families_agree(tmp_path, monkeypatch):
             "frames": 40,
         }
         (town / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
-        if stage == "01":
-            drive |= {"stage": "02", "ride": RIDE, "imu": IMU}
-            (town / "unchanged.yaml").write_text(yaml.safe_dump(drive))
+    ride = {"roughness": "C", "seed": 4}
+    base = {"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]}
     family = tmp_path / "family.yaml"
-    values = {"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]}
-    family.write_text(yaml.safe_dump(values | {"ride": RIDE, "imu": IMU}))
+    family.write_text(yaml.safe_dump(base | {"seeds": [4], "ride": ride}))
+    experiment = tmp_path / "mine.yaml"
+    fields = {
+        "drives": "stages",
+        "database": {
+            "stage": "last",
+            "missing": [0.0, 0.5],
+            "ride": {"roughness": "C"},
+        },
+        "seeds": [4],
+        "tasks": ["place", "change"],
+        "methods": ["solid", "btc"],
+    }
+    experiment.write_text(yaml.safe_dump(fields))
     recorded, simulated = tmp_path / "recorded", tmp_path / "simulated"
-    query_drive = town / "sequence_02.yaml"
-    varied = "--vary", family
-    run(app, "trend", *varied, "--query", query_drive, "--output", simulated)
-    run(app, "generate", query_drive, *varied, "--output", recorded)
-    run(app, "simulate", town / "unchanged.yaml", "--output", recorded)
-    members = sorted(recorded.glob("town_01_m*"))
-    run(
-        evaluation_app,
-        *("trend", *members, "--query", recorded / "town_02"),
-        *("--control", recorded / "unchanged"),
-        *("--output", tmp_path / "trend"),
-    )
-    tables = [
-        (folder / "trend.csv").read_text()
-        for folder in (simulated, tmp_path / "trend")
-    ]
-    assert tables[0] == tables[1]
-    rows = list(csv.DictReader(tables[0].splitlines()))
-    assert {row["database"] for row in rows} == {m.name for m in members}
-    # One control serves both, because they share a route.
-    unchanged = {(row["method"], row["auc_unchanged"]) for row in rows}
-    assert len(unchanged) == len(rows) / 2
-    assert any(row["kept"] for row in rows)
+    run("study", experiment, town, "--output", simulated)
+    query = town / "sequence_02.yaml"
+    run("generate", query, "--vary", family, "--output", recorded)
+    results = Results.read(simulated / "results.csv")
+    for part, member in ((0.0, "town_01_m000_s4"), (0.5, "town_01_m500_s4")):
+        here = results.where(**{"database.missing": part, "gate": False})
+        change = compare(
+            survey(recorded / member), survey(recorded / "town_02")
+        )
+        (found,) = here.where(metric="tcr_sym").rows
+        assert found.value == pytest.approx(change.change.symmetric, abs=1e-9)
+        for method in ("solid", "btc"):
+            alone = recognise(
+                open_drive(recorded / member),
+                open_drive(recorded / "town_02"),
+                make_method(method, {}),
+                protocol=FAIR_PROTOCOL,
+            )
+            for metric, value in (
+                ("auc", alone.metrics.auc),
+                ("r1", alone.metrics.recall_at_1),
+                ("places", alone.outcomes.num_places),
+            ):
+                (found,) = here.where(method=method, metric=metric).rows
+                assert found.value == pytest.approx(value, abs=1e-9)
+    assert found.n == alone.metrics.num_queries
     assert not list(simulated.glob("**/*.mcap"))

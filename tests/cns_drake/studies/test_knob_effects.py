@@ -8,8 +8,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.studies import knob_effects as knob_effects_module
 from cns_drake.studies.knob_effects import effect_lines, knob_effects
-from evaluation.study import trend_databases
 
 pytestmark = pytest.mark.slow
 
@@ -55,9 +55,7 @@ def town(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch):
-    monkeypatch.setattr(
-        trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
-    )
+    studies.run_here(monkeypatch, knob_effects_module)
 
 
 def test_each_knob_is_taken_back(town):
@@ -66,7 +64,7 @@ def test_each_knob_is_taken_back(town):
         drive(town, "02", frames=40),
         Cluster(),
     )
-    change = {title: points[0].tcr_sym for title, points in effects.items()}
+    change = {title: found[""]["tcr_sym"] for title, found in effects.items()}
     as_it_is, centred, present, high, unchanged = change.values()
     assert list(change) == [
         "as it is",
@@ -79,8 +77,9 @@ def test_each_knob_is_taken_back(town):
     assert unchanged < present < as_it_is
     assert unchanged < high < as_it_is
     assert centred == pytest.approx(as_it_is, abs=0.02)
-    for points in effects.values():
-        assert {p.method for p in points} >= {"ring++", "btc"}
+    for found in effects.values():
+        assert found.keys() >= {"ring++", "btc"}
+        assert all(0 <= found[m]["auc"] <= 1 for m in found if m)
     head, *rows = effect_lines(effects)
     assert "TCR_sym" in head
     assert len({len(line) for line in (head, *rows)}) == 1

@@ -2,14 +2,13 @@
 
 import csv
 import json
-import shutil
 
 from helpers import studies
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import assert_refused, make_block_scene, run
 import pytest
 
-from evaluation.study import plan, trend_databases
+from evaluation.study import plan
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +41,7 @@ def test_pairs(capsys, roofs, command):
 @pytest.mark.slow
 @pytest.mark.usefixtures("unrendered_figures")
 def test_folders(capsys, roofs, tmp_path, few_methods, monkeypatch):
-    studies.run_here(monkeypatch, plan, trend_databases)
+    studies.run_here(monkeypatch, plan)
     output = tmp_path / "out"
     report = ["report", roofs, "--output", output, "--no-costs", "--jobs", "1"]
     assert_refused(
@@ -52,8 +51,3 @@ def test_folders(capsys, roofs, tmp_path, few_methods, monkeypatch):
     assert status == 0
     with (output / "survival.csv").open(newline="") as stream:
         assert len(list(csv.DictReader(stream))) == len(few_methods)
-    shutil.rmtree(output)
-    trend = ["trend", roofs / "town_01", "--query", roofs / "town_02"]
-    trend += ["--output", output, "--jobs", "1"]
-    assert_refused(capsys, [*trend, "--lidar", "rear"], "/rear/points")
-    assert run(capsys, *trend, "--lidar", "roof")[0] == 0

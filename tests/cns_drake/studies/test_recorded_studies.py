@@ -1,0 +1,175 @@
+"""Experiments on folders of recordings, whose stage alone can vary."""
+
+from helpers import studies
+from helpers.eval_program import write_towns
+from helpers.small_towns import drive
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.studies import study as study_module
+from cns_drake.studies.experiment import Experiment
+from cns_drake.studies.study import run_study
+from evaluation.change.drive_change import compare, survey
+from evaluation.drives import open_drive
+from evaluation.methods import make_method
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.results.table import Results
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives")
+    drive(folder / "metropolis_01", "01", "a")
+    drive(folder / "metropolis_04_control", "04", "a")
+    drive(folder / "metropolis_04", "04", "b")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch):
+    studies.run_here(monkeypatch, study_module)
+    monkeypatch.setattr(study_module, "write_page", lambda *_, **options: None)
+
+
+def measure(output, *maps, on_note=lambda text: None, **fields):
+    experiment = Experiment.model_validate(
+        {
+            "name": "mine",
+            "maps": [str(path) for path in maps],
+            "methods": ["solid"],
+            **fields,
+        }
+    )
+    run_study(experiment, output, Cluster(), on_note=on_note)
+    return Results.read(output / "results.csv")
+
+
+def values(results, **columns):
+    """Metric -> value of the rows with these values of columns."""
+    found = results.where(**columns).rows
+    assert len({row.metric for row in found}) == len(found)
+    return {row.metric: row.value for row in found}
+
+
+def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
+    results = measure(
+        tmp_path,
+        folder,
+        tasks=["place", "change"],
+        both={"stage": ["last", "own"]},
+    )
+    databases = {"own": "metropolis_01", "last": "metropolis_04_control"}
+    query = folder / "metropolis_04"
+    found = {}
+    for stage, name in databases.items():
+        here = {"both.stage": stage}
+        found[stage] = values(results, **here, task="place", gate=False)
+        alone = run(
+            open_drive(folder / name),
+            open_drive(query),
+            make_method("solid", {}),
+            protocol=FAIR_PROTOCOL,
+        )
+        assert found[stage]["auc"] == pytest.approx(alone.metrics.auc, abs=1e-9)
+        change = compare(survey(folder / name), survey(query)).change
+        assert values(results, **here, task="change")["tcr_sym"] == (
+            pytest.approx(change.symmetric, abs=1e-9)
+        )
+    kept = found["own"]["auc"] / found["last"]["auc"]
+    assert found["own"]["kept"] == pytest.approx(kept, abs=1e-6)
+    assert {(row.map, row.database, row.query) for row in results.rows} == {
+        ("metropolis", "metropolis_01", "metropolis_04")
+    }
+
+
+def test_protocols_may_vary(folder, tmp_path):
+    results = measure(
+        tmp_path,
+        folder,
+        protocol={"base": "recorded", "radius": [5.0, 15.0]},
+    )
+    for radius in (5.0, 15.0):
+        alone = run(
+            open_drive(folder / "metropolis_01"),
+            open_drive(folder / "metropolis_04"),
+            make_method("solid", {}),
+            protocol=RetrievalProtocol(radius=radius),
+        )
+        found = values(results, **{"protocol.radius": radius}, gate=False)
+        assert found["auc"] == pytest.approx(alone.metrics.auc, abs=1e-9)
+        assert found["with_match"] == alone.outcomes.has_match.sum()
+
+
+def test_the_last_stage_alone(folder, tmp_path):
+    """A fixed stage counts, too."""
+    fields = {"protocol": "recorded"}
+    one = measure(tmp_path / "one", folder, both={"stage": "last"}, **fields)
+    both = measure(
+        tmp_path / "both", folder, both={"stage": ["last", "own"]}, **fields
+    )
+    assert values(one, gate=False) == values(
+        both, **{"both.stage": "last"}, gate=False
+    )
+
+
+def test_drives_without_a_control(tmp_path):
+    write_towns(tmp_path / "drives")
+    notes = []
+    results = measure(
+        tmp_path / "out",
+        tmp_path / "drives",
+        both={"stage": ["last", "own"]},
+        on_note=notes.append,
+    )
+    assert notes == [
+        "town: no drive on the route of town_01 in the stage of town_02"
+    ]
+    assert {row.factors["both.stage"] for row in results.rows} == {"own"}
+    assert "kept" not in {row.metric for row in results.rows}
+
+
+@pytest.mark.parametrize(
+    ("fields", "fault"),
+    [
+        (
+            {"query": {"transient": {"snow": [0, 0.2]}}},
+            "query.transient.snow: the recordings of metropolis are as",
+        ),
+        ({"query": {"transient": {"snow": 0.2}}}, "query.transient: the rec"),
+        ({"database": {"years": [0, 5]}}, "database.years: the recordings"),
+        ({"database": {"distractors": 9}}, "database.distractors: the rec"),
+        ({"query": {"hide_sector": 90}}, "query.hide_sector: the recordings"),
+        ({"query": {"stage": "last"}}, "query.stage: the recordings"),
+        ({"database": {"stage": "last"}}, "database.stage: the recordings"),
+        ({"both": {"lidar": "vlp-16"}}, "both.lidar: the recordings"),
+        ({"cases": {"a": {"database": {"stage": "last"}}}}, "cause: the rec"),
+        (
+            {"both": {"stage": "01"}},
+            "both.stage: .01.: recordings have",
+        ),
+        ({"both": {"stage": ["own", "first"]}}, "both.stage: 'first'"),
+        ({"both": {"fresh": [1]}}, "both.fresh: .*: no shipped map"),
+    ],
+)
+def test_recordings_are_as_they_are(folder, tmp_path, fields, fault):
+    with pytest.raises(InputError, match=f"^mine: {fault}") as error:
+        measure(tmp_path / "out", folder, **fields)
+    assert "\n" not in str(error.value)
+
+
+def test_folders_without_two_stages(folder, tmp_path):
+    drive(tmp_path / "drives" / "metropolis_04_b", "04", "b")
+    notes = []
+    with pytest.raises(InputError, match="mine: no condition that can be meas"):
+        measure(tmp_path / "out", tmp_path / "drives", on_note=notes.append)
+    assert notes == ["metropolis: no two drives to compare"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="empty: no recorded drive in it"):
+        measure(tmp_path / "out", tmp_path / "empty")
+
+
+def test_a_folder_given_twice(folder, tmp_path):
+    with pytest.raises(InputError, match=r"another map, .* metropolis, too"):
+        measure(tmp_path / "out", folder, f"{folder}/.")
