@@ -30,6 +30,7 @@ from cns_drake.studies.comparisons import (
     Compared,
     MissingError,
     PairOfDrives,
+    beside,
 )
 from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
@@ -380,10 +381,14 @@ class Study:
             )
             most = max((one.pair.distractors for one in found), default=0)
             if most:
+                # The same LiDARs see all places.
+                database, _ = some.pairs[0]
+                if self.experiment.drives == "same-route":
+                    database = beside(database)
                 planned.distractors = [
                     self._named(one)
                     for one in distracting_drives(
-                        some.pairs[0][0],
+                        database,
                         most,
                         self._protocol.place_spacing,
                         self.output / "cities",
