@@ -232,6 +232,8 @@ def _kind(schema: dict[str, Any], models: dict[str, Any]) -> str:
         return " or ".join(kind for kind in kinds if kind)
     if "enum" in schema:
         return ", ".join(f"`{value}`" for value in schema["enum"])
+    if "type" not in schema:
+        return ""
     if schema["type"] == "array":
         return _list_kind(schema, models)
     if schema["type"] == "object":

@@ -127,9 +127,7 @@ class PairOfDrives:
         )
         self._plain = dict(self._unchanged)
         if self.same_route:
-            self._plain["database"] = moved(
-                self._unchanged["database"], _AHEAD, *VIEWPOINTS["near"]
-            )
+            self._plain["database"] = beside(self._unchanged["database"])
         # Side -> content of a drive -> the drive; equal drives share a name.
         self._known: dict[str, dict[str, Scenario]] = {
             "database": {},
@@ -497,6 +495,11 @@ def _ending(side: str, condition: Condition, seed: int) -> str:
     if cause != NO_CAUSE:
         labels.append(f"{cause}_{level}")
     return "_".join([*labels, str(seed)])
+
+
+def beside(drive: Scenario) -> Scenario:
+    """Returns a drive whose LiDARs are where a database has them by default."""
+    return moved(drive, _AHEAD, *VIEWPOINTS["near"])
 
 
 def moved(

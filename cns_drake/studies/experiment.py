@@ -558,7 +558,7 @@ def _at_level(case: Case, level: int) -> Case:
 
 # The fields of a protocol that a study can vary. Both gates are measured in any
 # case; matches are by distance, and drives differ.
-_ProtocolFields = create_model(
+_ProtocolFields = create_model(  # type: ignore[call-overload]  # Fields are computed.
     "_ProtocolFields",
     __config__=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False),
     **{

@@ -30,6 +30,7 @@ from cns_drake.studies.comparisons import (
     Compared,
     MissingError,
     PairOfDrives,
+    beside,
 )
 from cns_drake.studies.elsewhere import distracting_drives
 from cns_drake.studies.experiment import (
@@ -57,6 +58,7 @@ from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.charts import draw
 from evaluation.results.page import write_page
 from evaluation.results.table import (
     QUERIES,
@@ -231,10 +233,23 @@ class Study:
             self.output,
             title=self.experiment.name,
             about=self.experiment.about,
-            charts=self.experiment.charts,
+            charts=self._charts(results),
             experiment_text=self.experiment.text,
             notes=[self._protocol.to_text()],
         )
+
+    def _charts(self, results: Results) -> list[Mapping[str, Any]]:
+        """Returns the charts that the table allows, and notes others."""
+        found: list[Mapping[str, Any]] = []
+        for chart in self.experiment.charts:
+            try:
+                draw(chart, results)
+            except InputError as error:
+                # Other tasks or maps may be measured than those of the file.
+                self.on_note(f"{self.source}: {error}: left out")
+            else:
+                found.append(chart)
+        return found
 
     def _choose_methods(self) -> dict[str, tuple[MethodChoice, MethodVariant]]:
         """Returns key -> method of the experiment, with its variant."""
@@ -366,10 +381,14 @@ class Study:
             )
             most = max((one.pair.distractors for one in found), default=0)
             if most:
+                # The same LiDARs see all places.
+                database, _ = some.pairs[0]
+                if self.experiment.drives == "same-route":
+                    database = beside(database)
                 planned.distractors = [
                     self._named(one)
                     for one in distracting_drives(
-                        some.pairs[0][0],
+                        database,
                         most,
                         self._protocol.place_spacing,
                         self.output / "cities",

@@ -9,7 +9,8 @@
   smooth line and its 95 % band.
 
 All other keys are columns of the table with the values that are shown. By
-default the task is `place`, the gate 0. Methods keep their colours, and the
+default the task is `place`, or else the only one with the metric, and the gate
+is 0. Methods keep their colours, and the
 title is what the chart shows, in words.
 """
 
@@ -105,17 +106,27 @@ class _Chart:
     def maps(self) -> list[str]:
         return list(dict.fromkeys(row.map for row in self.rows))
 
+    @property
+    def panes(self) -> dict[str, list[Row]]:
+        """Title of a panel -> its rows: a map's, unless maps are the lines."""
+        found: dict[str, list[Row]] = {}
+        for row in self.rows:
+            name = "" if self.keys.get("over") == "map" else row.map
+            found.setdefault(name, []).append(row)
+        return found
+
     def panels(self, height: float) -> tuple[Figure, list[Axes]]:
-        """Returns a figure with a panel for each map, of a height [px]."""
-        columns = 1 if self.width < WIDE else min(2, len(self.maps))
-        lines = math.ceil(len(self.maps) / columns)
+        """Returns a figure, and its panels of a height [px]."""
+        panes = self.panes
+        columns = 1 if self.width < WIDE else min(2, len(panes))
+        lines = math.ceil(len(panes) / columns)
         figure = self.figure(lines * height)
         grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
-        for axes in grid.flat[len(self.maps) :]:
+        for axes in grid.flat[len(panes) :]:
             axes.axis("off")
-        for axes, name in zip(grid.flat, self.maps, strict=False):
+        for axes, name in zip(grid.flat, panes, strict=False):
             axes.set_title(plain(name), loc="left")
-        return figure, list(grid.flat[: len(self.maps)])
+        return figure, list(grid.flat[: len(panes)])
 
     def figure(self, height: float) -> Figure:
         size = self.width * _PX, height * _PX
@@ -140,22 +151,16 @@ def draw(
     Raises:
         InputError: there is no such kind or column, or no such row.
     """
-    kind = chart.get("kind")
-    if kind not in _KINDS:
-        raise InputError(
-            f"charts: kind: {kind!r} is none of {', '.join(_KINDS)}"
-        )
-    draw_kind, needed, optional = _KINDS[kind]
-    for name in needed:
-        if not isinstance(chart.get(name), str):
-            raise InputError(f"charts: {kind}: {name}: a name is needed")
-    keys = {n: chart[n] for n in (*needed, *optional) if n in chart}
+    keys = check(chart)
+    kind = chart["kind"]
     metric = keys.get("metric", keys.get("y"))
     chosen = {n: v for n, v in chart.items() if n != "kind" and n not in keys}
     for name in (*chosen, *(keys[n] for n in keys if n in ("over", "strips"))):
         if not any(row[name] is not None for row in results.rows):
             raise InputError(f"charts: {kind}: {name}: the table has none")
-    chosen = {"task": "place", "gate": 0, **chosen}
+    tasks = results.where(metric=metric).distinct("task")
+    task = "place" if "place" in tasks else tasks[:1]
+    chosen = {"task": task, "gate": 0, **chosen}
     rows = results.where(chosen, metric=metric).rows
     rows = tuple(row for row in rows if not math.isnan(row.value))
     if not rows:
@@ -164,7 +169,7 @@ def draw(
     drawn = _Chart(keys, results, rows, styles(names), width)
     legend = drawn.styles if kind in ("lines", "scatter") else {}
     with rc_context({"font.size": _FONT, "axes.titlesize": "medium"}):
-        message, figure = draw_kind(drawn)
+        message, figure = _KINDS[kind][0](drawn)
         if alone:
             figure.suptitle(plain(textwrap.fill(message, width // 9)))
         if alone and legend:
@@ -175,6 +180,28 @@ def draw(
                 handles.append(Line2D([], [], color=colour, **options))
             figure.legend(handles=handles, loc="outside right center")
     return Drawn(message, figure, legend)
+
+
+def check(chart: Mapping[str, Any]) -> dict[str, str]:
+    """Checks the description of a chart, apart from any table.
+
+    Returns:
+        The keys of its kind.
+
+    Raises:
+        InputError: there is no such kind, or it lacks a key.
+    """
+    kind = chart.get("kind")
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise InputError(
+            f"charts: kind: {kind!r} is none of {', '.join(_KINDS)}"
+        )
+    _, needed, optional = _KINDS[kind]
+    keys = {n: chart[n] for n in (*needed, *optional) if n in chart}
+    for name in (*needed, *keys):
+        if not isinstance(keys.get(name), str):
+            raise InputError(f"charts: {kind}: {name}: a name is needed")
+    return keys
 
 
 def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
@@ -201,6 +228,8 @@ def words(name: str) -> str:
 def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
     over = chart.keys["over"]
     values = chart.results.distinct(over)
+    if len(values) < 2:
+        raise InputError(f"charts: dumbbell: {over}: the table has one value")
     before, after = values[0], values[-1]
     found = {
         (titled(one.key[0]), *one.key[1:]): one.value
@@ -271,8 +300,7 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
     figure, panels = chart.panels(280.0)
     last: dict[str, list[float]] = {}
     at = sorted({_number(row, over) for row in chart.rows})
-    for axes, name in zip(panels, chart.maps, strict=True):
-        rows = [row for row in chart.rows if row.map == name]
+    for axes, rows in zip(panels, chart.panes.values(), strict=True):
         for label, (colour, style, marker) in chart.styles.items():
             some = [row for row in rows if titled(row.label) == label]
             points = sorted(means(some, over), key=lambda one: one.key)
@@ -286,7 +314,10 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
             if x[-1:] == at[-1:]:
                 last.setdefault(label, []).append(y[-1])
         _spread(axes, at)
-        axes.set_ylim(bottom=0.0)
+        if chart.metric.endswith("_ms"):
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
     figure.supxlabel(plain(words(over)), fontsize=_FONT)
     figure.supylabel(plain(words(chart.metric)), fontsize=_FONT)
@@ -323,10 +354,9 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     figure, panels = chart.panels((len(values) + 4) * _ROW)
     names = list(chart.styles)
     weakest: list[tuple[float, str, str]] = []
-    for axes, one in zip(panels, chart.maps, strict=True):
+    for axes, rows in zip(panels, chart.panes.values(), strict=True):
         cells: dict[tuple[int, int], list[tuple[Any, float]]] = {}
-        of_map = [row for row in chart.rows if row.map == one]
-        for mean in means(of_map, "label", over, strips or over):
+        for mean in means(rows, "label", over, strips or over):
             x = names.index(titled(mean.key[0]))
             cell = cells.setdefault((x, values.index(mean.key[1])), [])
             cell.append((mean.key[2], mean.value))
@@ -416,12 +446,14 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         titled(one.method): (-one.rho[0][0], f"{-one.rho[0][0]:+.2f}")
         for one in correlations(selected, [x_name], y_name)
     }
-    best, worst = _ends(found)
-    return (
-        f"Rank correlation of {words(y_name)} with {words(x_name)}: from"
-        f" {worst[1]} ({worst[0]}) to {best[1]} ({best[0]})",
-        figure,
-    )
+    message = f"{words(y_name)} over {words(x_name)}"
+    if not all(math.isnan(rho) for rho, _ in found.values()):
+        best, worst = _ends(found)
+        message = (
+            f"Rank correlation of {words(y_name)} with {words(x_name)}: from"
+            f" {worst[1]} ({worst[0]}) to {best[1]} ({best[0]})"
+        )
+    return message, figure
 
 
 def smooth(x: np.ndarray, y: np.ndarray, grid: np.ndarray) -> np.ndarray:

@@ -31,6 +31,7 @@ from evaluation.results.summaries import (
     ranking,
 )
 from evaluation.results.table import (
+    KEYS,
     QUERIES,
     RESULTS,
     SETTINGS,
@@ -309,16 +310,34 @@ def _common(
     with_shipped = [one for one in common if one in set(shipped.conditions)]
     if with_shipped:
         left = len(common) - len(with_shipped)
-        note = f"{left} conditions left out, which the shipped tables lack"
+        note = f"left out, as the shipped tables lack them: {left} conditions"
         return with_shipped, [note] if left else []
     if len(own) > 1 and common:
         return common, ["the shipped tables have none of these conditions"]
     names = ", ".join(map(str, paths))
+    others = own[1:] or [shipped]
     beside = "" if len(own) > 1 else " with the shipped tables"
     raise InputError(
-        f"{names}: no condition in common{beside} (of experiment, map,"
-        " drives, seed, factors and protocol)"
+        f"{names}: no condition in common{beside} ({_apart(own[0], others[0])})"
     )
+
+
+def _apart(one: _Table, other: _Table) -> str:
+    """Returns why two tables have no condition in common."""
+    rows = [list(table.rows.values()) for table in (one, other)]
+    factors = {
+        name: None for some in rows for row in some for name in row.factors
+    }
+    for column in (*KEYS, *factors):
+        first, second = (
+            sorted({str(row[column]) for row in some}) for some in rows
+        )
+        if column != "method" and not {*first} & {*second}:
+            return (
+                f"{column}: {', '.join(first[:3])} in {one.name}, but"
+                f" {', '.join(second[:3])} in {other.name}"
+            )
+    return "each value is in both, but no row has the same ones in all columns"
 
 
 def _on(table: _Table, common: Iterable[tuple[object, ...]]) -> _Table:

@@ -12,13 +12,15 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from cns_drake.base.csv_files import write_csv
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
 from evaluation.report.drawing import save
 from evaluation.report.tables import in_table_order
 from evaluation.results import charts as drawing
-from evaluation.results.summaries import means
-from evaluation.results.table import KEYS, QueryRows, Results
+from evaluation.results.summaries import Summary, means, summarised
+from evaluation.results.table import KEYS, SETTINGS, QueryRows, Results
 
 _TASKS = {
     "place": "Place recognition",
@@ -28,6 +30,17 @@ _TASKS = {
     "change": "Structural change",
     "cost": "Costs",
 }
+_SUMMARIES = "summaries.csv"
+# Task -> the metrics of its summary, the headline first.
+_HEADLINES = {
+    "place": ("auc", "auc_strict", "r1", "kept", "kept_strict"),
+    "pose": ("pose_success", "kept", "translation_median"),
+    "localise": ("success_03m_1deg", "success_2m_5deg", "kept"),
+    "map": ("miou", "right_structures", "called_structures"),
+    "change": ("tcr_sym", "tcr_sym_masked"),
+    "cost": ("query_ms", "build_ms"),
+}
+_MOST_COLUMNS = 12
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3"}
 
 
@@ -42,7 +55,10 @@ def write_page(
     experiment_text: str = "",
     notes: Iterable[str] = (),
 ) -> Path:
-    """Writes `index.html`, which needs no other file, and the charts for print.
+    """Writes `index.html`, which needs no other file.
+
+    Beside it stand the charts for print, and `summaries.csv` where there are
+    summaries of them, see `summarised`.
 
     Args:
         results: the table, beside the page as `results.csv`.
@@ -50,7 +66,8 @@ def write_page(
         folder: to write into.
         title: of the page.
         about: the question, in words.
-        charts: see `charts`; the headline is what the first one shows.
+        charts: see `charts`; the headline is what the first one shows. One
+            whose rows the table lacks is left out, and a note says so.
         experiment_text: the experiment as YAML.
         notes: what else a reader has to know, such as settings.
 
@@ -58,23 +75,29 @@ def write_page(
         The path of the page.
 
     Raises:
-        InputError: a chart cannot be drawn, or a file cannot be written.
+        InputError: a file cannot be written.
     """
     make_folder(folder)
-    shown = []
+    shown, notes = [], list(notes)
     for number, chart in enumerate(charts, start=1):
-        alone = drawing.draw(chart, results, alone=True)
+        try:
+            alone = drawing.draw(chart, results, alone=True)
+        except InputError as error:
+            # What was measured does not depend on it.
+            notes.append(f"Chart {number} is left out: {error}.")
+            continue
         save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
         svgs = {
-            name: _svg(
-                drawing.draw(chart, results, width).figure, f"{name}{number}"
-            )
+            name: _svg(drawing.draw(chart, results, width), f"{name}{number}")
             for name, width in (
                 ("wide", drawing.WIDE),
                 ("narrow", drawing.NARROW),
             )
         }
         shown.append({"message": alone.message, "legend": alone.legend, **svgs})
+    numbers = summarised(results, queries, charts)
+    if numbers:
+        write_csv(folder / _SUMMARIES, Summary._fields, map(_cells, numbers))
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -91,8 +114,9 @@ def write_page(
         charts=shown,
         summary=[_summary(results, task) for task in results.distinct("task")],
         table=_wide_table(results),
+        numbers=numbers,
         experiment_text=experiment_text,
-        notes=list(notes),
+        notes=notes,
         protocols=list(filter(None, results.distinct("protocol"))),
         queries=sum(len(one.columns["correct"]) for one in answers),
         version=__version__,
@@ -104,41 +128,60 @@ def write_page(
     return path
 
 
-def _svg(figure: Any, prefix: str) -> Markup:
+def _svg(drawn: drawing.Drawn, prefix: str) -> Markup:
     """Returns a drawing as an element whose ids no other drawing has."""
     with tempfile.TemporaryDirectory() as folder:
         stem = Path(folder) / "chart"
-        save(figure, stem, ("svg",))
+        save(drawn.figure, stem, ("svg",))
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
 
 
 def _summary(results: Results, task: str) -> dict[str, Any]:
-    """Returns the means of a task's metrics, without and with the gate."""
+    """Returns a task's numbers by method, without and with the gate.
+
+    The columns are the conditions with their headline, or, where these are
+    many, the metrics with their means over all conditions.
+    """
     rows = results.where(task=task).rows
-    metrics = list(dict.fromkeys(row.metric for row in rows))
+    known = dict.fromkeys(row.metric for row in rows)
+    metrics = [m for m in _HEADLINES.get(task, known) if m in known] or [*known]
+    factors = [f for f in results.factors if not f.startswith(SETTINGS)]
+    cells = dict.fromkeys(tuple(row[f] for f in factors) for row in rows)
+    by_condition = 1 < len(cells) <= _MOST_COLUMNS
+    if by_condition:
+        metrics = metrics[:1]
     found = {
         one.key: one
-        for one in means(rows, "label", "gate", "metric")
+        for one in means(
+            rows, "label", "gate", "metric", *(factors if by_condition else ())
+        )
         if one.number
     }
-    names = in_table_order(row.label for row in rows)
+    columns = [
+        (metric, *(cell if by_condition else ()))
+        for metric in metrics
+        for cell in (cells if by_condition else [()])
+    ]
     lines = [
         {
             "name": (drawing.titled(name) or "–")
             + (", with the gate" if gate else ""),
-            "cells": [found.get((name, gate, metric)) for metric in metrics],
+            "cells": [found.get((name, gate, *one)) for one in columns],
         }
         for gate in sorted({row.gate for row in rows})
-        for name in names
-        if any((name, gate, metric) in found for metric in metrics)
+        for name in in_table_order(row.label for row in rows)
+        if any((name, gate, *one) in found for one in columns)
     ]
-    return {
-        "name": _TASKS.get(task, task),
-        "metrics": list(map(drawing.words, metrics)),
-        "rows": lines,
-    }
+    heads = [drawing.words(str(metric)) for metric, *_ in columns]
+    title = _TASKS.get(task, task)
+    if by_condition:
+        title += f": {heads[0]}"
+        if factors:
+            title += f" by {', '.join(map(drawing.words, factors))}"
+        heads = [", ".join(map(_shown, cell)) for _, *cell in columns]
+    return {"name": title, "metrics": heads, "rows": lines}
 
 
 def _wide_table(results: Results) -> dict[str, Any]:
@@ -170,10 +213,20 @@ def _wide_table(results: Results) -> dict[str, Any]:
     }
 
 
+def _cells(numbers: Summary) -> list[object]:
+    """Returns the cells of a summary, with all digits."""
+    return [
+        "" if isinstance(v, float) and math.isnan(v) else v
+        for v in (*numbers[:4], int(numbers.gate), *numbers[5:])
+    ]
+
+
 def _shown(value: object) -> str:
     """Returns a value for a reader."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
+    if value == math.inf:
+        return "more"
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-import itertools
 import math
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -19,10 +18,7 @@ from scipy.stats import rankdata
 from cns_drake.base.errors import InputError
 from evaluation.recognition.metrics import (
     UNKNOWN,
-    Difference,
     Interval,
-    auc_difference,
-    holm,
     percentile_interval,
     pr_curve,
     resampled_metrics,
@@ -322,7 +318,7 @@ def lifetimes(
             mean = [float(np.mean(list(curves[at].values()))) for at in times]
             single = [
                 lifetime(*_curve_of(curves, seed), share) for seed in seeds
-            ] or [math.inf]
+            ] or [lifetime(times, mean, share)]
             found.append(
                 Lifetime(
                     some[0],
@@ -475,44 +471,6 @@ def _spearman(values: np.ndarray) -> np.ndarray:
     return (ranks[..., :1] * ranks[..., 1:]).sum(axis=-2)
 
 
-class MethodDifference(NamedTuple):
-    """Two methods in a condition, and the AUC of the first less the second.
-
-    The p-value is corrected, by Holm's method, for the number of all
-    differences; NaN if unknown.
-    """
-
-    first: Answers
-    second: Answers
-    difference: Difference
-    p_value: float
-
-
-def method_differences(queries: QueryRows) -> list[MethodDifference]:
-    """Compares each two methods in each condition of the task `place`.
-
-    Raises:
-        InputError: two methods answered different queries.
-    """
-    groups: dict[tuple, list[Answers]] = {}
-    for one in queries.answers:
-        if one.task == "place":
-            groups.setdefault(one.but("method"), []).append(one)
-    pairs = [
-        pair
-        for group in groups.values()
-        for pair in itertools.combinations(group, 2)
-    ]
-    for one, other in pairs:
-        check_same_queries(one, other)
-    found = [auc_difference(a.outcomes, b.outcomes) for a, b in pairs]
-    corrected = holm(np.array([one.p_value for one in found])).tolist()
-    return [
-        MethodDifference(*pair, one, p)
-        for pair, one, p in zip(pairs, found, corrected, strict=True)
-    ]
-
-
 def check_same_queries(one: Answers, other: Answers) -> None:
     """Checks that two methods answered the same queries.
 
@@ -583,3 +541,83 @@ def ranking(
 def _numbered(units: Sequence[object]) -> np.ndarray:
     known = list(dict.fromkeys(units))
     return np.array([known.index(one) for one in units])
+
+
+class Summary(NamedTuple):
+    """A number that is made of a table, with its 95 % interval or range.
+
+    `n` is the number of conditions that it is made of, or None.
+    """
+
+    what: str
+    map: str
+    task: str
+    method: str
+    gate: bool
+    value: float
+    low: float
+    high: float
+    n: int | None = None
+
+
+def summarised(
+    results: Results,
+    queries: QueryRows | None,
+    charts: Iterable[Mapping[str, Any]],
+) -> list[Summary]:
+    """Returns what stands behind an experiment's charts.
+
+    They are the lifetimes of lines of `kept`, of which the range is that of
+    seeds, the growth of lines of times, the correlations of scatters, and what
+    two causes cost together.
+    """
+    found = []
+    for chart in charts:
+        over, metric = str(chart.get("over")), str(chart.get("metric"))
+        if chart.get("kind") == "scatter":
+            x, y = str(chart.get("x")), str(chart.get("y"))
+            for one in correlations(results.where(gate=False), [x], y):
+                value, interval = one.rho[0]
+                found.append(
+                    Summary(
+                        f"rank correlation of 1 - {y} with {x}",
+                        *("", "place", one.method, False, value),
+                        *(interval.low, interval.high, one.number),
+                    )
+                )
+        elif chart.get("kind") == "lines" and metric == "kept":
+            for life in lifetimes(results, over):
+                found.append(
+                    Summary(
+                        f"{over} until {100.0 * life.share:g} % is left (of"
+                        f" {life.last:g})",
+                        *_named(life.row),
+                        *(life.value, life.low, life.high),
+                    )
+                )
+        elif chart.get("kind") == "lines" and metric.endswith("_ms"):
+            x = "places" if "places" in results.distinct("metric") else over
+            found += [
+                Summary(
+                    f"exponent of {metric} over {x}, at {one.at:g}",
+                    *_named(one.row),
+                    *(one.exponent, math.nan, math.nan),
+                )
+                for one in growths(results, x, metric)
+                if not math.isnan(one.exponent)
+            ]
+    none = {CAUSE: "none", LEVEL: 0}
+    if queries is not None and CAUSE in queries.factors:
+        found += [
+            Summary(
+                f"excess of {' and '.join(one.names)}",
+                *_named(one.answers),
+                *(one.value, one.interval.low, one.interval.high),
+            )
+            for one in excesses(queries, none)
+        ]
+    return found
+
+
+def _named(key: Key) -> tuple[str, str, str, bool]:
+    return key.map, key.task, key.label, key.gate

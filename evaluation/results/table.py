@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import csv
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cache, cached_property
 import io
 import math
 from operator import itemgetter
@@ -35,6 +35,8 @@ _BEFORE = ("experiment", "map", "database", "query", "seed")
 _BEHIND = ("task", "method", "gate", "protocol")
 KEYS = (*_BEFORE, *_BEHIND)
 _MEASURED = ("metric", "value", "low", "high", "n")
+# What `Key` gives by name beside factors, which cannot have such a name.
+_NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.
 _ANSWERS = {
     "query_frame": int,
@@ -126,8 +128,8 @@ class Key:
 
     def __getitem__(self, column: str) -> object:
         """Returns the value of a column, or `label`; None without one."""
-        if column in _COLUMNS:
-            return getattr(self, column)
+        if column in _NAMED:
+            return getattr(self, column, None)
         return self.factors.get(column)
 
     @property
@@ -214,11 +216,6 @@ class Answers(Key):
         )
 
 
-_COLUMNS = frozenset(
-    ("label", *(one.name for one in (*fields(Row), *fields(Answers))))
-)
-
-
 @dataclass(frozen=True)
 class Results:
     """A table of results: the names of its factors, in order, and its rows."""
@@ -247,9 +244,9 @@ class Results:
         table = _Cells.read(file, (*KEYS, *_MEASURED))
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
-        for one in table.lines():
-            row = Row(**one.key(table.factors), **_measured(one))
-            first = lines.setdefault((*row.but(), row.metric), one.number)
+        for one, key, identity in table.keyed():
+            row = Row(**key, **_measured(one))
+            first = lines.setdefault((*identity, row.metric), one.number)
             if first != one.number:
                 raise one.fault("metric", f"the same is in line {first}")
             rows.append(row)
@@ -325,16 +322,9 @@ class QueryRows:
         file = path / QUERIES if path.is_dir() else path
         table = _Cells.read(file, (*KEYS, *_NEEDED_ANSWERS), tuple(_ANSWERS))
         names = [name for name in _ANSWERS if name in table.columns]
-        # One key may be spelled in several ways.
-        spelled: dict[tuple[str, ...], list[_Line]] = {}
         found: dict[tuple[object, ...], tuple[dict, list[_Line]]] = {}
-        for one in table.lines():
-            cells = one.cells_of((*_BEFORE, *table.factors, *_BEHIND))
-            if cells not in spelled:
-                key = one.key(table.factors)
-                _, lines = found.setdefault(Key(**key).but(), (key, []))
-                spelled[cells] = lines
-            spelled[cells].append(one)
+        for one, key, identity in table.keyed():
+            found.setdefault(identity, (key, []))[1].append(one)
         return cls(
             table.factors,
             tuple(
@@ -427,6 +417,15 @@ def _answered(
     return columns
 
 
+@cache
+def _range(metric: str) -> tuple[float, float]:
+    """Returns the least and the greatest value of a metric."""
+    for pattern, *ends in _RANGES:
+        if re.fullmatch(pattern, metric):
+            return ends[0], ends[1]
+    return -math.inf, math.inf
+
+
 def _measured(one: _Line) -> dict[str, Any]:
     """Returns what a row holds behind its key."""
     metric = one.text("metric")
@@ -435,13 +434,12 @@ def _measured(one: _Line) -> dict[str, Any]:
     )
     if math.isnan(value) and metric in _ALWAYS_KNOWN:
         raise one.fault("value", f"{metric} needs a number")
-    for pattern, least, greatest in _RANGES:
-        fits = re.fullmatch(pattern, metric) is not None
-        if fits and (value < least or value > greatest):
-            limits = f"from {least:g} to {greatest:g}"
-            if math.isinf(greatest):
-                limits = f"{least:g} or more"
-            raise one.fault("value", f"{value:g}, but {metric} is {limits}")
+    least, greatest = _range(metric)
+    if value < least or value > greatest:
+        limits = f"from {least:g} to {greatest:g}"
+        if math.isinf(greatest):
+            limits = f"{least:g} or more"
+        raise one.fault("value", f"{value:g}, but {metric} is {limits}")
     if math.isnan(low) != math.isnan(high):
         raise one.fault("low", "an interval has a low and a high end")
     if low > high:
@@ -469,7 +467,7 @@ class _Line:
         return InputError(f"{self.file}: line {self.number}: {column}: {fault}")
 
     def cells_of(self, names: Iterable[str]) -> tuple[str, ...]:
-        return tuple(self.cells[self.columns[name]] for name in names)
+        return tuple([self.cells[self.columns[name]] for name in names])
 
     def text(self, column: str) -> str:
         cell = self.cells[self.columns[column]]
@@ -583,17 +581,30 @@ class _Cells:
                 fault = "is there twice" if name else "has no name"
                 raise InputError(f"{file}: line 1: column '{name}' {fault}")
         factors = [n for n in names if n not in {*needed, *known}]
+        for name in factors:
+            if name in _NAMED:
+                raise InputError(f"{file}: line 1: '{name}' names no factor")
         columns = {name: k for k, name in enumerate(names)}
         rows = [one for one in rows if any(one[1])]
         if not rows:
             raise InputError(f"{file}: no rows")
         return cls(file, columns, tuple(factors), rows)
 
-    def lines(self) -> Iterator[_Line]:
+    def keyed(
+        self,
+    ) -> Iterator[tuple[_Line, dict[str, Any], tuple[object, ...]]]:
+        """Yields the lines, the attributes of their `Key`, and its `but`."""
+        names = (*_BEFORE, *self.factors, *_BEHIND)
+        known: dict[tuple[str, ...], tuple[dict, tuple[object, ...]]] = {}
         for number, cells in self.rows:
             if len(cells) != len(self.columns):
                 raise InputError(
                     f"{self.file}: line {number}: {len(cells)} cells instead"
                     f" of {len(self.columns)}"
                 )
-            yield _Line(self.file, number, self.columns, cells)
+            one = _Line(self.file, number, self.columns, cells)
+            spelled = one.cells_of(names)
+            if spelled not in known:
+                key = one.key(self.factors)
+                known[spelled] = key, Key(**key).but()
+            yield one, *known[spelled]

@@ -10,12 +10,18 @@ import re
 from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError, one_line
 from evaluation.drives import open_drive
+from evaluation.drives.helipr import holds_helipr
+from evaluation.drives.mulran import holds_mulran
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.surveys import DriveSource, RecordedDrive, described_key
 
-_NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
+# The names of drives that state map and stage, the latter ones as MulRan's.
+_NAMES = (
+    re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)"),
+    re.compile(r"(?P<map>.*\D)(?P<stage>\d+)"),
+)
 _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 
 
@@ -172,11 +178,12 @@ def find_recordings(
 ) -> list[RecordingInfo]:
     """Opens all recordings in a folder and its direct subfolders.
 
-    Drives in the layout of CNS, and in that of KITTI if a `scenario.yaml`
+    They may have the layout of MulRan or HeLiPR. Drives in the layout of CNS,
+    and in that of KITTI if a `scenario.yaml`
     lies in them, are found up to three levels down, where exports put them.
     A recording states its map and stage in its scenario; without one they
-    are taken from its name, `<map>_<stage>`. A recording with neither is left
-    out.
+    are taken from its name, `<map>_<stage>` or, as KAIST01, without `_`. A
+    recording with neither is left out.
 
     Raises:
         InputError: if no recording has a map and a stage, or one cannot be
@@ -240,8 +247,11 @@ def _find_drives(folder: Path) -> list[Path]:
     """Returns the paths of the drives in a folder, in order."""
     paths = []
     for child in sorted(folder.iterdir()):
-        if child.suffix == ".mcap" or (
-            child.is_dir() and any(child.glob("*.mcap"))
+        if (
+            child.suffix == ".mcap"
+            or (child.is_dir() and any(child.glob("*.mcap")))
+            or holds_mulran(child)
+            or holds_helipr(child)
         ):
             paths.append(child)
         elif child.is_dir():
@@ -267,7 +277,8 @@ def _place(path: Path, lidar: str | None) -> RecordingInfo | None:
         map_name = one_line(Path(str(scenario["map"])).name)
         stage = one_line(scenario["stage"])
     else:
-        match = _NAME.fullmatch(drive.name)
+        matches = (name.fullmatch(drive.name) for name in _NAMES)
+        match = next(filter(None, matches), None)
         if match is None:
             return None
         map_name, stage = match["map"], match["stage"]

@@ -66,10 +66,7 @@ def test_names_of_commands_exist():
         if re.fullmatch(r"cns-(drake|eval) [\w-]+", code)
     }
     assert named
-    former = {
-        ("CHANGELOG.md", f"cns-eval {name}") for name in evaluation_cli.RENAMED
-    }
-    assert {name for _, name in named - former} <= commands().keys()
+    assert named <= commands().keys()
 
 
 def test_files_of_the_project_are_there():

@@ -123,7 +123,7 @@ def test_metrics_are_those_of_the_tasks():
 @pytest.mark.parametrize(
     ("page", "start", "number"),
     [
-        ("docs/studies.md", "about: Does an old map", 6),
+        ("docs/studies.md", "name: season-and-age", 8),
         ("docs/studies.md", "about: What do leaves", 7),
         ("docs/ladder.md", "about: Do snow", 4),
         ("docs/tutorial.md", "maps: riverside", 3),
@@ -143,6 +143,16 @@ def test_examples_have_their_conditions(tmp_path, page, start, number):
     # No two are the same.
     for a, b in itertools.combinations(found, 2):
         assert a.factors != b.factors
+
+
+def test_the_question_of_the_page_is_the_file_beside_it():
+    (block,) = (
+        block.text
+        for block in documents.fenced(PAGE)
+        if block.text.startswith("name: season-and-age")
+    )
+    path = documents.ROOT / "docs/examples/season_and_age.yaml"
+    assert yaml.safe_load(block) == yaml.safe_load(path.read_text())
 
 
 def test_inline_examples_load(tmp_path):

@@ -519,18 +519,17 @@ RECIPES = {
         ".venv/bin/cns-drake study --list",
         prints=("map-pairs", "cases:"),
     ),
-    "seasons": Recipe(
-        "about: Does an old map fail sooner",
+    "season and age": Recipe(
+        "name: season-and-age",
         changes=(
-            ("suburbia", "town"),
-            ("[btc, layered-overlap]", "[solid]"),
+            ("[suburbia, riverside]", "town"),
             ("[1, 2, 3]", "[1]"),
         ),
-        file="seasons.yaml",
+        file="season_and_age.yaml",
     ),
     "study": Recipe(
-        ".venv/bin/cns-drake study seasons.yaml",
-        after=("seasons", "start a city"),
+        ".venv/bin/cns-drake study season_and_age.yaml",
+        after=("season and age", "start a city"),
         prints=("seasons/index.html",),
         makes=("seasons/results.csv", "seasons/queries.csv"),
     ),
@@ -563,10 +562,6 @@ RECIPES = {
     "crossed causes": Recipe(
         "about: Do snow and another lane",
         file="crossed.yaml",
-    ),
-    "compare of a study": Recipe(
-        ".venv/bin/cns-eval compare ladder",
-        after=("ladder",),
     ),
     "age": Recipe(
         ".venv/bin/cns-drake age suburbia",
@@ -864,7 +859,6 @@ NOT_RUN = {
     ".venv/bin/cns-drake study fresh": "draws shipped cities and drives "
     "through them, for many minutes; test_fresh_cities draws a small one",
     "cns-drake study levels": "takes hours",
-    "cns-eval compare mine": "needs these hours",
     "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
     "script of another project; test_traffic_recording records traffic",
     ".venv/bin/cns-drake study stages --method heights.py": "drives through "

@@ -173,6 +173,13 @@ def test_a_scatter_of_points_on_a_line(number):
     )
 
 
+def test_a_single_point_has_no_correlation():
+    drawn = charts.draw(
+        {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(1)
+    )
+    assert drawn.message == "AUC over TCR_sym"
+
+
 def test_other_keys_select_rows():
     rows = [*aged().rows, row(0.01, {YEARS: 0}, "mine", gate=True)]
     chart = {"kind": "lines", "over": YEARS, "metric": "auc", "seed": 2}
@@ -180,6 +187,48 @@ def test_other_keys_select_rows():
     (axes,) = drawn.figure.axes
     (line,) = axes.get_lines()
     np.testing.assert_allclose(line.get_ydata(), [0.72, 0.62, 0.42])
+
+
+def test_maps_may_be_the_lines_of_a_matrix():
+    rows = [
+        row(value, {}, name, "miou", town, task="map")
+        for town, value in (("x", 0.5), ("y", 0.25))
+        for name in ("free-space", "distance")
+    ]
+    chart = {"kind": "matrix", "over": "map", "metric": "miou"}
+    drawn = charts.draw(chart, Results.of(rows))
+    (axes,) = drawn.figure.axes
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["x", "y"]
+    assert drawn.message == (
+        "The worst case is distance under y: mean IoU 0.25"
+    )
+
+
+def test_times_are_on_a_logarithmic_axis():
+    rows = [
+        row(value, {YEARS: year}, metric="query_ms", task="cost")
+        for year, value in ((0, 1.0), (5, 100.0))
+    ]
+    chart = {"kind": "lines", "over": YEARS, "metric": "query_ms"}
+    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    assert axes.get_yscale() == "log"
+
+
+@pytest.mark.parametrize(
+    ("tasks", "share"),
+    [(("pose", "place"), 0.9), (("localise", "pose"), 0.8)],
+)
+def test_the_task_is_place_or_the_first_with_the_metric(tasks, share):
+    shares = {"place": 0.9, "localise": 0.8, "pose": 0.7}
+    rows = [
+        row(shares[task], {YEARS: year}, metric="kept", task=task)
+        for task in tasks
+        for year in (0, 5)
+    ]
+    chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
+    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    (line,) = axes.get_lines()
+    np.testing.assert_allclose(line.get_ydata(), share)
 
 
 @pytest.mark.parametrize(
@@ -203,6 +252,14 @@ def test_other_keys_select_rows():
             "method: 'ring",
         ),
         ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, "no auc has a tcr"),
+        (
+            {"kind": "dumbbell", "over": "map", "metric": "auc"},
+            "map: the table has one value",
+        ),
+        (
+            {"kind": "matrix", "over": YEARS, "metric": "auc", "strips": 3},
+            "strips: a name",
+        ),
     ],
 )
 def test_faults_of_a_chart_are_named(chart, words):
@@ -276,7 +333,7 @@ def test_a_page_stands_alone(tmp_path):
         tmp_path / "page",
         title="Age & <years>",
         about="How old?",
-        charts=[chart],
+        charts=[chart, {**chart, "metric": "r1"}],
         experiment_text="name: <age>\n",
         notes=["seeds 0 & 2"],
     )
@@ -289,14 +346,16 @@ def test_a_page_stands_alone(tmp_path):
     outside = {link for link in page.links if not link.startswith("#")}
     assert outside == {"results.csv"}
     assert "name: &lt;age&gt;" in text
+    assert "Chart 2 is left out: charts: lines: the table has no r1" in text
     assert "Age &amp; &lt;years&gt;" in text
     assert "At 30 years, the AUC" in text[text.index("<h1>") :][:100]
     summary, whole = page.tables
     header, *lines = summary
-    assert header == ["method", "AUC"]
-    # The mean over years of 0, 10 and 30 less 0.01 a year, and of both seeds.
-    mean = 0.9 - 0.4 / 3.0 + 0.01
-    assert lines[1] == ["RING++", f"{mean:.3f}0.600 to 0.920"]
+    assert header == ["method", "0", "10", "30"]
+    # The mean of both seeds, and their range: 0.01 less a year.
+    means = [f"{0.91 - 0.01 * year:.3f}" for year in (0, 10, 30)]
+    assert lines[1][0] == "RING++"
+    assert [cell[:5] for cell in lines[1][1:]] == means
     header, *lines = whole
     assert header == ["seed", "method", YEARS, "auc"]
     assert len(lines) == 3 * 3 * 2
@@ -307,5 +366,11 @@ def test_a_page_stands_alone(tmp_path):
 
 def test_a_page_without_a_chart_or_a_value(tmp_path):
     results = Results.of([row(math.nan, {YEARS: 0}, metric="kept")])
-    path = write_page(results, None, tmp_path, title="nothing")
-    assert "<h1>nothing</h1>" in path.read_text()
+    chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
+    path = write_page(results, None, tmp_path, title="none", charts=[chart])
+    assert "<h1>none</h1>" in path.read_text()
+    assert "Chart 1 is left out" in path.read_text()
+    header, first, _ = (tmp_path / "summaries.csv").read_text().splitlines()
+    assert header == "what,map,task,method,gate,value,low,high,n"
+    # A single year without a share has no lifetime.
+    assert first.endswith("left (of 0),town,place,mine,0,,,,")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from cns_drake.base.errors import InputError
 from evaluation.recognition.metrics import Interval
 from evaluation.results import summaries
 from evaluation.results.table import Answers, QueryRows, Results, Row
@@ -233,22 +232,45 @@ def test_rank_correlations_are_those_of_scipy():
     assert interval.low < value < interval.high
 
 
-def test_differences_are_corrected_together():
-    right = {"a": firsts(20), "b": np.arange(20) % 4 < 2, "c": firsts(20)}
+def test_summaries_of_charts():
+    rows = [
+        *(
+            row(value, {YEARS: year}, metric="kept")
+            for year, value in ((0, 1.0), (10, 0.6))
+        ),
+        *(
+            row(10.0 ** (k * 2), {YEARS: 10**k}, metric="query_ms", task="cost")
+            for k in (0, 1)
+        ),
+        *(row(0.9 - 0.1 * k, {YEARS: k, "query.nth": k}) for k in range(4)),
+    ]
+    causes = {"none": (20, 0), "a": (10, 1), "b": (16, 1), "a+b": (4, 1)}
     queries = QueryRows.of(
-        [answers(one, {SNOW: 0}, method=name) for name, one in right.items()]
+        answers(firsts(number), {"cause": cause, "level": level})
+        for cause, (number, level) in causes.items()
     )
-    found = summaries.method_differences(queries)
-    names = [(d.first.method, d.second.method) for d in found]
-    assert names == [("a", "b"), ("a", "c"), ("b", "c")]
-    values = [d.difference.value for d in found]
-    assert values == pytest.approx([0.5, 0.0, -0.5])
-    assert found[1].p_value == 1.0
-    other = answers(firsts(8)[:8], {SNOW: 0}, method="d")
-    with pytest.raises(InputError, match="a and d answered different queries"):
-        summaries.method_differences(
-            QueryRows.of([*queries.answers[:1], other])
-        )
+    lines = {"kind": "lines", "over": YEARS}
+    found = summaries.summarised(
+        Results.of(rows),
+        queries,
+        [
+            {**lines, "metric": "kept"},
+            {**lines, "metric": "query_ms"},
+            {"kind": "scatter", "x": "query.nth", "y": "auc"},
+            {"kind": "matrix", "over": "method", "metric": "auc"},
+        ],
+    )
+    numbers = {one.what: one.value for one in found}
+    assert numbers == pytest.approx(
+        {
+            f"{YEARS} until 90 % is left (of 10)": 2.5,
+            f"{YEARS} until 50 % is left (of 10)": math.inf,
+            f"exponent of query_ms over {YEARS}, at 10": 2.0,
+            "rank correlation of 1 - auc with query.nth": 1.0,
+            "excess of a and b": 0.2,
+        }
+    )
+    assert {one.method for one in found} == {"btc"}
 
 
 def test_a_ranking_counts_what_all_methods_have():

@@ -203,6 +203,7 @@ def test_a_number_twice_is_refused(tmp_path):
         (HEADER.replace(",low", ",value"), "no column 'low'"),
         (HEADER + ",map", "column 'map' is there twice"),
         (HEADER + ",", "has no name"),
+        (HEADER + ",label", "'label' names no factor"),
         ("", "no column 'experiment'"),
         (
             "map,db,query,cause,level,method,gate,auc,r1,kept",
