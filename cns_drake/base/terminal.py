@@ -64,7 +64,8 @@ def make_program(
                 new = renamed[cmd_name]
                 if not new.startswith("cns-"):
                     new = f"{name} {new}"
-                raise _UsageError(f"'{name} {cmd_name}' is now '{new}'")
+                # Typer adds a similar command to errors of usage.
+                raise InputError(f"'{name} {cmd_name}' is now '{new}'")
             return super().get_command(ctx, cmd_name)
 
         def format_commands(self, ctx: Any, formatter: Any) -> None:

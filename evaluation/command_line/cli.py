@@ -64,7 +64,7 @@ def tcr(
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
-    """Measure the structural change between two drives or maps.
+    """Measure the change between drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
@@ -139,7 +139,7 @@ def pr(
     *,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Recognise the places of one drive in another.
+    """Recognise the places of another drive.
 
     Measures how well the scans of QUERY find their place in DATABASE. Both are
     recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in

@@ -46,7 +46,7 @@ def trajectory(
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
-    """Measure the errors of an estimated trajectory.
+    """Measure the errors of a trajectory.
 
     They are those of evo and KITTI. The estimate is a TUM file: seconds, x y z,
     and a quaternion x y z w. Prints ATE, the root mean square of its distances
