@@ -64,7 +64,7 @@ def tcr(
     lidar: options.LidarName = None,
     json: options.Json = False,
 ) -> None:
-    """Measure the change between drives or maps.
+    """Measure change between drives or maps.
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
