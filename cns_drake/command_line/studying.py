@@ -122,8 +122,8 @@ def study(
     for field, names in (("tasks", task), ("methods", method)):
         if names:
             # They keep their settings.
-            known = getattr(experiment, field) or {}
-            chosen.append((field, {one: known.get(one, {}) for one in names}))
+            given = getattr(experiment, field) or {}
+            chosen.append((field, {one: given.get(one, {}) for one in names}))
     experiment = load_experiment(name, chosen, quick=quick)
     if output is None:
         raise InputError("--output: missing")

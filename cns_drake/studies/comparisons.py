@@ -165,6 +165,14 @@ class PairOfDrives:
             side: _joined(fields.get("both", {}), fields.get(side, {}))
             for side in ("database", "query")
         }
+        # Years of cases may need the rates of all conditions.
+        alone = {} if CAUSE in condition.factors else fields
+        for side, values in alone.items():
+            ages = [sides[side]] if side in sides else [*sides.values()]
+            if "rates" in values and not any("years" in one for one in ages):
+                raise InputError(
+                    f"{self.source}: {side}.rates: those of no years"
+                )
         for side, changes in sides.items():
             self._check_side(side, changes)
             # What one drive is older, the other one's city has lived on.
@@ -266,8 +274,6 @@ class PairOfDrives:
         """
         drive = self._unchanged[side]
         left = dict(changes)
-        if "rates" in left and "years" not in left:
-            raise InputError(f"{self.source}: {side}.rates: those of no years")
         for name in (*_QUERY_FIELDS, "distractors", "years", "rates"):
             left.pop(name, None)
         if "lidar" in left:

@@ -432,6 +432,8 @@ def _split(
         if isinstance(value, _Values):
             try:
                 _check_once(list(value))
+                # Nor may two values have one cell in a table.
+                _check_once([str(_shown(one)) for one in value])
             except ValueError as error:
                 raise ValueError(f"{path}: {error}") from None
             varied[path] = list(value)
@@ -499,6 +501,8 @@ def _nested(path: str, value: Any) -> Any:
 
 def _shown(value: Any) -> Any:
     """Returns a factor's value as a table holds it: a number or text."""
+    if value is None:
+        return "none"
     if isinstance(value, dict | list):
         text = json.dumps(value, separators=(",", ": ")).replace('"', "")
         return text.strip("{}") or "none"

@@ -533,7 +533,7 @@ def test_maps_that_are_made(query_drive):
     """Sections of both sides and of cases come together."""
     found = Conditions(
         experiment(
-            both={"rates": 2, "years": 0},
+            both={"rates": 2},
             cases={
                 "old": {"database": {"years": [5, 20]}},
                 "young": {"query": {"years": 5, "rates": 1}},
@@ -592,6 +592,11 @@ FAULTS = [
     ("cases: {a: {query: {stage: next}}}", "query.stage: 'next'"),
     ("{database: {stage: '01'}, query: {years: 5}}", "years: stage last ages"),
     ("database: {rates: 2}", "database.rates: those of no years"),
+    ("both: {rates: 2}", "both.rates: those of no years"),
+    (
+        "{database: {rates: 2}, query: {years: 5}}",
+        "database.rates: those of no years",
+    ),
     ("query: {distractors: 3}", "query.distractors: it is a field of database"),
     ("both: {lateral: 3}", "query.lateral: it is a field of database"),
     ("database: {hide_sector: 3}", "database.hide_sector: .* field of query"),

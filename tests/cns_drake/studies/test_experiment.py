@@ -2,6 +2,7 @@
 
 import itertools
 
+from helpers import documents
 import pytest
 import yaml
 
@@ -120,6 +121,7 @@ def test_one_at_a_time(read):
         ("[near]", ["near"]),
         ("[{snow: 0.1, leaves: 0}, {}]", ["snow: 0.1,leaves: 0", "none"]),
         ("[true, false]", [True, False]),
+        ("[null, {snow: 1}]", ["none", "snow: 1"]),
         ('["01", "04"]', ["01", "04"]),
     ],
 )
@@ -290,6 +292,14 @@ def test_shipped_experiments_are_read_and_written(name):
         assert experiment.about.endswith("?")
 
 
+def test_the_page_of_the_ladder_has_every_cause():
+    table = documents.table(
+        documents.read("docs/ladder.md"), "## What is compared"
+    )
+    causes = [row[0].strip("`") for row in table]
+    assert causes == list(load_experiment("ladder").cases)
+
+
 FAULTS = [
     ("- 1", "not a mapping of an experiment's fields"),
     ("", "not a mapping"),
@@ -316,6 +326,8 @@ FAULTS = [
     ("database: {years: [1, 1.0]}", "database.years: 1 is there twice"),
     ("both: {fresh: [2, 2]}", "both.fresh: 2 is there twice"),
     ("protocol: {radius: [5, 5]}", "protocol.radius: 5 is there twice"),
+    ("database: {a: [null, {}]}", "database.a: 'none' is there twice"),
+    ("database: {a: [1, '1']}", "database.a: '1' is there twice"),
     ("database: {a.b: 1, a: {b: [2, 3]}}", "database.a.b: it is there twice"),
     ("database: {missing: .nan}", "database.missing: nan is not finite"),
     ("query: {a: {b: [0, .inf]}}", "query.a.b: .*inf.* is not finite"),

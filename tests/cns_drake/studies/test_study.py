@@ -1,6 +1,7 @@
 """`cns-drake study`: whole experiments on a small town, and their tables."""
 
 from collections import Counter
+from pathlib import Path
 import shutil
 
 from helpers import studies
@@ -14,6 +15,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.studies import made_maps
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
@@ -521,6 +523,44 @@ class Counting(Method):
         (row.method, row.factors["methods.counting.unit"])
         for row in results.rows
     } == {("counting", 1), ("counting", 2)}
+
+
+class PlannedError(Exception):
+    """All maps are known."""
+
+
+def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
+    runs = []
+    monkeypatch.setattr(
+        made_maps, "run_jobs", lambda jobs, _: runs.append([*jobs])
+    )
+
+    def stop(jobs, cluster):
+        runs.append([*jobs])
+        raise PlannedError
+
+    monkeypatch.setattr(study_module, "run_jobs", stop)
+    wanted = experiment(
+        town,
+        database={"version": [3, 8]},
+        query={"years": [0, 5]},
+        both={"rates": 2},
+        cases={"old": {"query": {"years": 20, "rates": 1}}},
+        seeds=[1, 2],
+    )
+    with pytest.raises(PlannedError):
+        run_study(wanted, tmp_path / "out", Cluster())
+    cities, measuring = runs
+    made = {job.step.folder: job.name for job in cities}
+    assert len(made) == len(cities) == 2 * 2 + 2
+    used = {
+        Path(job.step.source.scenario.map)
+        for job in measuring
+        if job.name.startswith("describe ")
+    }
+    # Each drive is through the town, or a city that was made.
+    assert used - {town} <= made.keys()
+    assert {path.name for path in made} >= {"town_c3", "town_c8"}
 
 
 @pytest.mark.parametrize(
