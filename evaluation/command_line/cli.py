@@ -44,6 +44,7 @@ def tcr(
     control: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     json: options.Json = False,
 ) -> None:
     """Structural change of two drives or maps.
@@ -57,11 +58,10 @@ def tcr(
             stage. It gives the TCR_sym that the routes alone cause.
     """
     from evaluation.change import drive_change as change
-    from evaluation.drives import Drive
 
     paths = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
-        paths, align, terminal.track, lidar
+        paths, align, terminal.track, lidar, columns
     )
     report = change.compare(
         surveys[0],
@@ -70,9 +70,8 @@ def tcr(
         alignment=alignments[0] if alignments else None,
     )
     for one in surveys:
-        if isinstance(one.drive, Drive):
-            for note in one.drive.notes:
-                terminal.note(note)
+        for note in one.notes:
+            terminal.note(note)
         ignored = one.voxels.num_ignored
         if ignored:
             terminal.note(
@@ -105,6 +104,7 @@ def pr(
     sensor_height: options.SensorHeight = 1.6,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
         str, typer.Option(metavar="radius|overlap:PART")
@@ -167,7 +167,7 @@ def pr(
         )
     chosen = _chosen_method(method, parameter, sensor_height)
     places, query_drive = options.aligned(
-        options.open_noted(database, query, lidar=lidar),
+        options.open_noted(database, query, lidar=lidar, columns=columns),
         align,
         across_maps=across_maps,
     )
@@ -217,6 +217,7 @@ def scores(
     sensor_height: options.SensorHeight = 1.6,
     gate: Annotated[bool, typer.Option("--gate")] = False,
     radius: float = DEFAULT_PROTOCOL.radius,
+    columns: options.Columns = None,
 ) -> None:
     """Scores of all pairs of scans of folders.
 
@@ -244,6 +245,8 @@ def scores(
         output,
         terminal.track,
         gate_radius=protocol.gate_radius,
+        columns=columns,
+        on_note=terminal.note,
     )
     if num_ignored:
         terminal.note(f"{num_ignored} points are not finite, and left out")

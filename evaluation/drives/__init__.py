@@ -20,7 +20,9 @@ __all__ = [
 ]
 
 
-def open_drive(path: Path, lidar: str | None = None) -> Drive:
+def open_drive(
+    path: Path, lidar: str | None = None, columns: int | None = None
+) -> Drive:
     """Opens the recorded drive at `path` with the reader it needs.
 
     Args:
@@ -29,6 +31,8 @@ def open_drive(path: Path, lidar: str | None = None) -> Drive:
             odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
             chooses the LiDAR.
         lidar: which LiDAR's scans to read, of a recording with several.
+        columns: number of float32 of a point of KITTI's and MulRan's `.bin`;
+            by default as their values show.
 
     Raises:
         InputError: if nothing there can be read as a drive, or it has no
@@ -59,17 +63,17 @@ def open_drive(path: Path, lidar: str | None = None) -> Drive:
     if len(fitting) > 1:
         names = ", ".join(reader.__name__ for reader in fitting)
         raise InputError(f"{path}: files of several formats ({names})")
-    if fitting and lidar is None:
-        return fitting[0](path)
-    if fitting:
-        if fitting[0] not in (
-            mcap_drive.McapDrive,
-            helipr.HeliprDrive,
-        ):
-            raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+    if fitting and fitting[0] in (mcap_drive.McapDrive, helipr.HeliprDrive):
         return fitting[0](path, lidar)
+    if fitting and lidar is not None:
+        raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+    if fitting:
+        return fitting[0](path, columns)
     if path.is_dir() and any(path.glob("*.mcap.part")):
-        raise InputError(f"{path}: the recording was not finished")
+        raise InputError(
+            f"{path}: the recording was not finished (cns-drake repair saves"
+            " what is whole)"
+        )
     raise InputError(
         f"{path}: not a recorded drive (a folder with an .mcap file, or"
         " one, or a drive of MulRan, HeLiPR, KITTI odometry or CNS)"

@@ -32,9 +32,10 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import index_instances, read_scenario
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import read_bytes, read_text
 from cns_drake.base.json_text import parse_json
-from evaluation.drives.scan_files import FileDrive, read_packed
+from cns_drake.base.number_rows import parse_rows
+from evaluation.drives.scan_files import BinDrive, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,
@@ -48,11 +49,10 @@ _LABELS = "labels"
 _FRAMES = "frames.txt"
 _FIRST_POSE = "first_pose.txt"
 _STRUCTURES = "structures.json"
-_RECORD = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
 _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 
 
-class KittiDrive(FileDrive):
+class KittiDrive(BinDrive):
     """A drive of KITTI odometry.
 
     Poses of the LiDAR are X_S0S = inverse(Tr) X_C0C Tr. W is S0, the frame
@@ -61,12 +61,14 @@ class KittiDrive(FileDrive):
     `labels` points have the fields `label` and `instance`.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, columns: int | None = None):
         """Opens a drive.
 
         Args:
             path: its folder; the poses lie in `../../poses/<name>.txt`, or
                 as `poses.txt` beside the scans.
+            columns: number of columns of a scan; by default as its values
+                show.
 
         Raises:
             InputError: if there is none, its files do not fit together, or
@@ -114,6 +116,7 @@ class KittiDrive(FileDrive):
         labels = path / _LABELS
         self._labels = labels if labels.is_dir() else None
         super().__init__(
+            columns,
             name=str((scenario or {}).get("name", name)),
             world_frame=world_frame,
             files=files,
@@ -135,7 +138,7 @@ class KittiDrive(FileDrive):
         return index_instances(table, str(path))
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = read_packed(path, _RECORD)
+        stored = super()._read(path, stamp_ns)
         if self._labels is None:
             return stored
         labels_path = self._labels / f"{path.stem}.label"
@@ -144,7 +147,9 @@ class KittiDrive(FileDrive):
             raise ValueError(
                 f"{len(stored)} points, but {len(labels)} in {labels_path}"
             )
-        points = np.empty(len(stored), dtype=[*_RECORD.descr, *_LABEL.descr])
+        points = np.empty(
+            len(stored), dtype=[*stored.dtype.descr, *_LABEL.descr]
+        )
         for part in (stored, labels):
             for name in part.dtype.names or ():
                 points[name] = part[name]
@@ -236,15 +241,11 @@ def _read_first_pose(path: Path) -> np.ndarray:
 
 def _read_calibration(path: Path) -> np.ndarray:
     """Returns X_CS (4, 4), the pose of the LiDAR in the camera's frame."""
-    try:
-        lines = read_bytes(path).decode("ascii").splitlines()
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a text file") from error
-    for line in lines:
+    for line in read_text(path).splitlines():
         key, colon, text = line.partition(":")
         if colon and key.strip() == "Tr":
             try:
-                values = np.array([[float(word) for word in text.split()]])
+                values = parse_rows([text], np.dtype(float))
             except ValueError as error:
                 raise InputError(f"{path}: Tr: {error}") from error
             if values.shape[1] != 12:

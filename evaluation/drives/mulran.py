@@ -16,10 +16,9 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
     DATUM,
-    FileDrive,
+    BinDrive,
     keep_spanned,
     list_stamped,
-    read_packed,
     to_world,
 )
 from evaluation.drives.text_tables import read_matrices
@@ -27,8 +26,8 @@ from evaluation.drives.text_tables import read_matrices
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")
 
-_STORED = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
-_WHOLE = np.dtype([*_STORED.descr, ("ring", "<u2"), ("t", "<u4")])
+# What the place of a point in a whole scan tells.
+_FOUND = [("ring", "<u2"), ("t", "<u4")]
 
 _NUM_RINGS = 64
 _NUM_COLUMNS = 1024
@@ -49,7 +48,7 @@ _X_BS = poses.make_pose(
 )
 
 
-class MulranDrive(FileDrive):
+class MulranDrive(BinDrive):
     """A drive of MulRan.
 
     W is the UTM grid with a nearer origin, see `scan_files.to_world`.
@@ -60,11 +59,13 @@ class MulranDrive(FileDrive):
     missing.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, columns: int | None = None):
         """Opens a drive.
 
         Args:
             path: its folder, with or without a `sensor_data`.
+            columns: number of columns of a scan; by default as its values
+                show.
 
         Raises:
             InputError: if there is none, or its poses cannot be used.
@@ -79,6 +80,7 @@ class MulranDrive(FileDrive):
         X_UB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(
+            columns,
             name=path.resolve().name,
             world_frame=f"mulran/{DATUM}",
             files=kept,
@@ -89,11 +91,11 @@ class MulranDrive(FileDrive):
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = read_packed(path, _STORED)
+        stored = super()._read(path, stamp_ns)
         if len(stored) != _NUM_RINGS * _NUM_COLUMNS:
             return stored
         # Points are stored column by column, each from ring to ring.
-        points = np.empty(len(stored), dtype=_WHOLE)
+        points = np.empty(len(stored), dtype=[*stored.dtype.descr, *_FOUND])
         for name in stored.dtype.names or ():
             points[name] = stored[name]
         number = np.arange(len(stored))

@@ -2,14 +2,17 @@
 
 import abc
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.base.points import FARTHEST_RETURN
+from cns_drake.base.points import FARTHEST_RETURN, check_range
+from evaluation.clouds.bin_columns import BinLayout, find_layout
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
@@ -130,6 +133,32 @@ class FileDrive(Drive):
         """
 
 
+class BinDrive(FileDrive):
+    """A drive whose scans are `.bin` files: float32 without a header."""
+
+    def __init__(self, columns: int | None, **drive: Any):
+        """Describes a drive.
+
+        Args:
+            columns: see `find_layout`.
+            drive: see `FileDrive`.
+        """
+        super().__init__(**drive)
+        self._columns = columns
+
+    @cached_property
+    def _layout(self) -> BinLayout:
+        return find_layout(self._files, self._columns)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        note = self._layout.note
+        return (*super().notes, *([note] if note else []))
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        return read_packed(path, self._layout.dtype)
+
+
 def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
     """Finds files whose names are their times.
 
@@ -211,18 +240,10 @@ def _returns(points: np.ndarray) -> np.ndarray:
     """Leaves out points without a return, which are stored at the origin.
 
     Raises:
-        ValueError: if a coordinate is not finite, or too large for a point.
+        ValueError: if a coordinate is too large for a point.
     """
+    check_range(points, FARTHEST_RETURN)
     is_return = np.zeros(len(points), dtype=bool)
     for name in "xyz":
-        # A comparison with NaN is false, and NumPy warns of some NaN.
-        with np.errstate(over="ignore", invalid="ignore"):
-            bad = ~(np.abs(points[name]) < FARTHEST_RETURN)
-        if bad.any():
-            first = int(np.flatnonzero(bad)[0])
-            raise ValueError(
-                f"{name}: point {first} of {len(points)} is at"
-                f" {points[name][first]:g} m"
-            )
         is_return |= points[name] != 0.0
     return points[is_return]

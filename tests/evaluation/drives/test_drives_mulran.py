@@ -211,7 +211,7 @@ def test_poses_that_cannot_be_used(tmp_path, change, fault):
     [
         ("", "no row of numbers"),
         ("1561000444390857631,1,0,0\n", "row"),
-        ("1561000444390857631," + ",".join("abcdefghijkl"), "convert"),
+        ("1561000444390857631," + ",".join("abcdefghijkl"), "'a' is no number"),
         ("12x," + ",".join("100010001000"), "no row of numbers"),
         ("1561000444390857631," * 13, "row"),
     ],
@@ -263,7 +263,18 @@ def test_a_scan_cut_off_in_a_point(tmp_path):
     assert len(open_drive(tmp_path / "s").scan(0)) == 0
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -3e30])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_beams_without_a_return_have_no_finite_point(tmp_path, value):
+    write_drive(tmp_path / "s")
+    path = tmp_path / "s/sensor_data/Ouster" / f"{T0_NS}.bin"
+    points = make_points(20)
+    points[4, 1] = value
+    write_bytes(path, xyzi(points))
+    scan = open_drive(tmp_path / "s").scan(0)
+    assert np.flatnonzero(~np.isfinite(scan["y"])).tolist() == [4]
+
+
+@pytest.mark.parametrize("value", [1.1e4, -3e30])
 def test_a_point_that_is_no_point(tmp_path, value):
     write_drive(tmp_path / "s")
     path = tmp_path / "s/sensor_data/Ouster" / f"{T0_NS}.bin"
@@ -271,7 +282,7 @@ def test_a_point_that_is_no_point(tmp_path, value):
     points[4, 1] = value
     write_bytes(path, xyzi(points))
     drive = open_drive(tmp_path / "s")
-    with pytest.raises(InputError, match=f"^{path}: y: point 4 of 20 is at"):
+    with pytest.raises(InputError, match=f"^{path}: y: point 4 is at"):
         drive.scan(0)
 
 

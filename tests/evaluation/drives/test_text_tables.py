@@ -16,8 +16,8 @@ from evaluation.drives.text_tables import read_numbers, read_stamped_rows
         (b" , ,\n1 2\n", ""),
         (b"time,x\n", "no row of numbers"),
         (b"", "no row of numbers"),
-        (b"\xff\n", "not a text file"),
-        (b"1 2\n3\n", "columns"),
+        (b"\xff\n", "not UTF-8 text"),
+        (b"1 2\n3\n", "row 2: 1 numbers instead of 2"),
     ],
 )
 def test_tables_that_are_none(tmp_path, text, fault):
