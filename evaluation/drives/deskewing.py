@@ -12,6 +12,9 @@ from cns_drake.base.errors import InputError
 # The ends of the splines are free; an error there fades to about a quarter from
 # pose to pose.
 _REACH = 4
+# The points of a scan take about as long as from scan to scan. Times of another
+# unit are off by a thousand.
+_MOST_OFF = 300.0
 
 
 def deskew(drive: Drive, index: int) -> np.ndarray:
@@ -35,12 +38,13 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
 
     Raises:
         InputError: if the scan cannot be read or does not say when its
-            points were measured, or there are too few poses.
+            points were measured, in nanoseconds, or there are too few poses.
     """
     points = drive.scan(index).copy()
     if "t" not in (points.dtype.names or ()):
         raise InputError(
             f"{drive.name}: scan {index}: no field t, the time of each point"
+            " [ns]"
         )
     first = max(0, index - _REACH)
     around = slice(first, index + _REACH + 2)
@@ -51,6 +55,15 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     stamps_ns = drive.stamps_ns[around] - drive.stamps_ns[index]
     # Most points share their firing time with a whole column.
     t_ns, column = np.unique(points["t"], return_inverse=True)
+    scan_s = np.ptp(t_ns) * 1e-9 if len(t_ns) else 0.0
+    step_s = np.diff(stamps_ns).mean() * 1e-9
+    if points["t"].dtype.kind not in "iu" or (
+        scan_s > 0.0 and not 1.0 / _MOST_OFF < scan_s / step_s < _MOST_OFF
+    ):
+        raise InputError(
+            f"{drive.name}: scan {index}: t: from {t_ns[0]:g} to {t_ns[-1]:g};"
+            f" no nanoseconds of a scan, where scans are {step_s:.3g} s apart"
+        )
     X_WT = _evaluate(stamps_ns * 1e-9, X_WS, t_ns * 1e-9)
     X_ST = poses.inverse(X_WS[index - first]) @ X_WT
     p_T = np.stack([points[axis] for axis in "xyz"], axis=1).astype(float)

@@ -21,6 +21,9 @@ _LABEL_FIELDS = ("label", "instance")
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
 _LONGEST_NS = 2.0**32
+# The latest time of a scan in nanoseconds, if it is that: in seconds it is later
+# than any scan ends, and earlier than 2001.
+_NS_OF_A_SCAN = (1e6, 1e9)
 # Autoware's type of the only, and strongest, return of a beam.
 _SINGLE_STRONGEST = 1
 
@@ -102,7 +105,7 @@ def _check_apart(dtype: np.dtype) -> None:
 def _record_type(message: Any) -> np.dtype:
     order = ">" if message.is_bigendian else "<"
     names: list[str] = []
-    formats = []
+    formats: list[tuple] = []
     for field in message.fields:
         if field.datatype not in _DATATYPES:
             raise ValueError(
@@ -116,7 +119,14 @@ def _record_type(message: Any) -> np.dtype:
             )
         names.append(field.name)
         # Some writers leave the count of a scalar at zero.
-        formats.append((scalar, (field.count,)) if field.count > 1 else scalar)
+        shape = (field.count,) if field.count > 1 else ()
+        formats.append((scalar, shape))
+        end = field.offset + np.dtype(formats[-1]).itemsize
+        if end > message.point_step:
+            raise ValueError(
+                f"the point cloud's field {field.name} ends at byte {end} of"
+                f" points of {message.point_step}"
+            )
     return np.dtype(
         {
             "names": names,
@@ -225,9 +235,11 @@ def from_layout(
         labels: (N,) records of other fields of the same points, if any.
 
     Returns:
-        (N,). `velodyne` has `t` [ns] in place of `time` [s]; `autoware` has
-        `t` and `ring` in place of `time_stamp` and `channel`, and
-        intensities from 0 to 1. Where nothing changes, `points` itself.
+        (N,). `velodyne` has `t` [ns] in place of `time` [s]; a `t` of floats
+        becomes one of nanoseconds; `autoware` has `t` and `ring` in place of
+        `time_stamp` and `channel`, and intensities from 0 to 1. Times whose
+        unit is not certain stay as they are. Where nothing changes, `points`
+        itself.
 
     Raises:
         ValueError: if the labels are not those of as many points.
@@ -238,22 +250,46 @@ def from_layout(
         columns["t"] = columns.pop("time_stamp")
         columns["ring"] = columns.pop("channel")
         columns["intensity"] = points["intensity"] / np.float32(255.0)
-    elif "time" in names and "t" not in names:
-        t_ns = np.rint(points["time"].astype(float) * _NS_PER_S)
-        # Some drivers count backwards from the last point, or since 1970.
-        if ((t_ns >= 0.0) & (t_ns < _LONGEST_NS)).all():
-            columns["t"] = t_ns.astype(np.uint32)
-            del columns["time"]
+    else:
+        timed = next((name for name in ("t", "time") if name in names), "t")
+        t_ns = _nanoseconds(columns.get(timed))
+        if t_ns is not None:
+            columns["t"] = t_ns
+            columns.pop("time", None)
     if labels is not None:
         if len(labels) != len(points):
             raise ValueError(f"{len(points)} points, but {len(labels)} labels")
         columns |= {name: labels[name] for name in labels.dtype.names or ()}
-    if list(columns) == list(names):
+    fields = [
+        (name, column.dtype, column.shape[1:])
+        for name, column in columns.items()
+    ]
+    if fields == [
+        (name, points[name].dtype, points[name].shape[1:]) for name in names
+    ]:
         return points
-    made = np.empty(
-        len(points),
-        [(name, column.dtype) for name, column in columns.items()],
-    )
+    made = np.empty(len(points), fields)
     for name, column in columns.items():
         made[name] = column
     return made
+
+
+def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
+    """Returns floats as nanoseconds since the stamp, if they surely are times.
+
+    Some drivers count backwards from the last point, or since 1970.
+
+    Args:
+        times: (N,) of a point's field, if there is one.
+
+    Returns:
+        (N,) uint32 [ns]; None if there is none, or its unit is not certain.
+    """
+    if times is None or times.dtype.kind != "f":
+        return None
+    t_ns = times.astype(float)
+    if not _NS_OF_A_SCAN[0] <= t_ns.max(initial=0.0) < _NS_OF_A_SCAN[1]:
+        t_ns = t_ns * _NS_PER_S
+    if not ((t_ns >= 0.0) & (t_ns < _LONGEST_NS)).all():
+        return None
+    return np.rint(t_ns).astype(np.uint32)
