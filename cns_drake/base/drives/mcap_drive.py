@@ -106,6 +106,14 @@ class McapDrive(Drive):
         return _lidar_name(self._lidar_topic)
 
     @property
+    def lidar_section(self) -> Mapping:
+        """What the scenario says of the LiDAR; empty if it says nothing."""
+        section: Any = self.scenario or {}
+        for key in ("lidars", self.lidar_name):
+            section = section.get(key) if isinstance(section, dict) else None
+        return section if isinstance(section, dict) else {}
+
+    @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         return self._first(_ODOMETRY_TOPIC).header.frame_id
 
@@ -126,15 +134,20 @@ class McapDrive(Drive):
                     f"{self._path}: {topic}: the clock goes back by {back:.3g}"
                     " s; messages are read in the order of their log times"
                 )
-        lidar = (self.scenario or {}).get("lidars")
-        if isinstance(lidar, dict):
-            lidar = lidar.get(self.lidar_name)
-        if isinstance(lidar, dict) and lidar.get("motion_distortion"):
-            notes.append(
-                f"{self._path}: taken while the LiDAR moved, and used as taken"
-                " (evaluation.drives.deskewing takes the motion out)"
-            )
-        return tuple(notes)
+        return (*notes, *filter(None, [self.distortion_note]))
+
+    @property
+    def distortion_note(self) -> str | None:
+        """The note on a simulated LiDAR with motion distortion, if it is one.
+
+        Whether scans of other recorders are distorted is not known.
+        """
+        if not self.lidar_section.get("motion_distortion"):
+            return None
+        return (
+            f"{self._path}: taken while the LiDAR moved, and used as taken"
+            " (evaluation.drives.deskewing takes the motion out)"
+        )
 
     @property
     def scenario(self) -> Mapping | None:
@@ -164,8 +177,9 @@ class McapDrive(Drive):
         ):
             points = point_layouts.to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
+            calibrated = self.lidar_section.get("returns") == "calibrated"
             return point_layouts.from_layout(
-                points, self._labels(index, message)
+                points, self._labels(index, message), calibrated=calibrated
             )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:

@@ -21,11 +21,13 @@ _LABEL_FIELDS = ("label", "instance")
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
 _LONGEST_NS = 2.0**32
-# The latest time of a scan in nanoseconds, if it is that: in seconds it is later
-# than any scan ends, and earlier than 2001.
+# The latest time in a scan, if it is in nanoseconds: in seconds it would be
+# later than any scan ends, and before 2001.
 _NS_OF_A_SCAN = (1e6, 1e9)
 # Autoware's type of the only, and strongest, return of a beam.
 _SINGLE_STRONGEST = 1
+# The greatest intensity of calibrated returns, and of a byte.
+_FULL = 255.0
 
 
 def point_field_datatype(dtype: np.dtype) -> int:
@@ -179,7 +181,7 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
 
     Args:
         points: (N,) with the fields x y z intensity ring t; intensities from
-            0 to 1.
+            0 to 1, or, if one is larger, calibrated ones up to 255.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
 
@@ -193,7 +195,8 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
         return points
     x, y, z = (points[axis].astype(float) for axis in "xyz")
     distance = np.sqrt(x * x + y * y + z * z)
-    brightness = np.rint(255.0 * np.clip(points["intensity"], 0.0, 1.0))
+    full = _FULL if points["intensity"].max(initial=0.0) > 1.0 else 1.0
+    brightness = np.rint(_FULL * np.clip(points["intensity"] / full, 0.0, 1.0))
     columns = {name: points[name] for name in points.dtype.names or ()}
     columns |= {
         "reflectivity": brightness,
@@ -226,18 +229,23 @@ def to_labels(points: np.ndarray) -> np.ndarray:
 
 
 def from_layout(
-    points: np.ndarray, labels: np.ndarray | None = None
+    points: np.ndarray,
+    labels: np.ndarray | None = None,
+    calibrated: bool = False,
 ) -> np.ndarray:
     """Returns points with the fields of this project beside their own.
 
     Args:
         points: (N,) in any layout.
         labels: (N,) records of other fields of the same points, if any.
+        calibrated: whether the intensities are those of calibrated returns,
+            from 0 to 255 in any layout.
 
     Returns:
         (N,). `velodyne` has `t` [ns] in place of `time` [s]; a `t` of floats
         becomes one of nanoseconds; `autoware` has `t` and `ring` in place of
-        `time_stamp` and `channel`, and intensities from 0 to 1. Times whose
+        `time_stamp` and `channel`, and intensities from 0 to 1 unless they are
+        calibrated. Times whose
         unit is not certain stay as they are. Where nothing changes, `points`
         itself.
 
@@ -249,7 +257,8 @@ def from_layout(
     if {"time_stamp", "channel", "intensity"} <= set(names):
         columns["t"] = columns.pop("time_stamp")
         columns["ring"] = columns.pop("channel")
-        columns["intensity"] = points["intensity"] / np.float32(255.0)
+        full = np.float32(1.0 if calibrated else _FULL)
+        columns["intensity"] = points["intensity"] / full
     else:
         timed = next((name for name in ("t", "time") if name in names), "t")
         t_ns = _nanoseconds(columns.get(timed))
