@@ -171,6 +171,11 @@ def pr(
         align,
         across_maps=across_maps,
     )
+    for note in dict.fromkeys(
+        chosen.assumption(one.lidar_field) for one in (places, query_drive)
+    ):
+        if note is not None:
+            terminal.note(note)
     exact = None
     if exact_overlaps is not None:
         frames = overlap_truth.compared_frames(places, query_drive, protocol)
@@ -238,6 +243,8 @@ def scores(
 
     protocol = RetrievalProtocol(radius=radius, gate=gate)
     chosen = _chosen_method(method, parameter, sensor_height)
+    if (note := chosen.assumption(None)) is not None:
+        terminal.note(note)
     num_ignored = scan_folders.write_scores(
         chosen,
         database,

@@ -85,6 +85,7 @@ class CnsFolderDrive(FileDrive):
             stamps_ns=stamps_ns,
             X_WS=X_WB @ _read_mount(mount),
             scenario=scenario,
+            unit="cns",
         )
 
     @cached_property

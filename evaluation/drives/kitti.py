@@ -49,6 +49,9 @@ _LABELS = "labels"
 _FRAMES = "frames.txt"
 _FIRST_POSE = "first_pose.txt"
 _STRUCTURES = "structures.json"
+# Below that of KITTI's cameras, 707 or more [pixels]; other projections in such
+# files are the identity.
+_KITTIS_FOCAL_LENGTH = 100.0
 _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 
 
@@ -84,21 +87,25 @@ class KittiDrive(BinDrive):
         check_increasing(times_path, stamps_ns, "row")
         poses_path = _poses_path(path)
         X_C0C = read_poses(poses_path)
-        rows = len(stamps_ns), len(X_C0C)
+        counts = len(stamps_ns), len(X_C0C)
         notes: list[str] = []
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
         # If numbers are missing, one table may have a row for each number and
         # the other a row for each scan.
         gaps = numbers != list(range(len(files)))
-        if rows[0] != rows[1] and not gaps:
+        if counts[0] != counts[1] and not gaps:
             raise InputError(
-                f"{poses_path}: {rows[1]} rows, but {rows[0]} in {times_path}"
+                f"{poses_path}: {counts[1]} rows, but {counts[0]} in"
+                f" {times_path}"
             )
         calibration = path / "calib.txt"
-        X_CS = np.eye(4)
+        X_CS, unit = np.eye(4), None
         if calibration.exists():
-            X_CS = _read_calibration(calibration)
+            rows = _read_calibration(calibration)
+            X_CS = pose_matrices(calibration, rows["Tr"])[0]
+            if "P0" in rows and rows["P0"][0, 0] > _KITTIS_FOCAL_LENGTH:
+                unit = "hdl-64e"
         else:
             notes.append(
                 f"{calibration}: not there; the poses in {poses_path.name} are"
@@ -124,6 +131,7 @@ class KittiDrive(BinDrive):
             X_WS=X_WS,
             notes=tuple(notes),
             scenario=scenario,
+            unit=unit,
         )
 
     @property
@@ -239,18 +247,28 @@ def _read_first_pose(path: Path) -> np.ndarray:
     return rows[0]
 
 
-def _read_calibration(path: Path) -> np.ndarray:
-    """Returns X_CS (4, 4), the pose of the LiDAR in the camera's frame."""
+def _read_calibration(path: Path) -> dict[str, np.ndarray]:
+    """Returns the rows P0 and Tr, if they are there, (1, 12) each.
+
+    Tr is the upper 3 x 4 of X_CS, the pose of the LiDAR in the camera's frame.
+
+    Raises:
+        InputError: Tr is missing, or a row is not twelve numbers.
+    """
+    rows = {}
     for line in read_text(path).splitlines():
         key, colon, text = line.partition(":")
-        if colon and key.strip() == "Tr":
+        key = key.strip()
+        if colon and key in ("P0", "Tr"):
             try:
                 values = parse_rows([text], np.dtype(float))
             except ValueError as error:
-                raise InputError(f"{path}: Tr: {error}") from error
+                raise InputError(f"{path}: {key}: {error}") from error
             if values.shape[1] != 12:
                 raise InputError(
-                    f"{path}: Tr: {values.shape[1]} numbers instead of 12"
+                    f"{path}: {key}: {values.shape[1]} numbers instead of 12"
                 )
-            return pose_matrices(path, values)[0]
-    raise InputError(f"{path}: Tr: missing")
+            rows[key] = values
+    if "Tr" not in rows:
+        raise InputError(f"{path}: Tr: missing")
+    return rows

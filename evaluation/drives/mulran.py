@@ -88,6 +88,7 @@ class MulranDrive(BinDrive):
             X_WS=to_world(X_UB, trajectory.path) @ _X_BS,
             notes=notes,
             datum=DATUM,
+            unit="os1-64-33",
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:

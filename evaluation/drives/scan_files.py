@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.points import FARTHEST_RETURN, check_range
@@ -67,6 +68,7 @@ class FileDrive(Drive):
         notes: tuple[str, ...] = (),
         datum: str | None = None,
         scenario: Mapping | None = None,
+        unit: str | None = None,
     ):
         """Describes a drive of N >= 1 scans.
 
@@ -79,6 +81,7 @@ class FileDrive(Drive):
             notes: see `Drive.notes`.
             datum: see `Drive.datum`.
             scenario: see `Drive.scenario`.
+            unit: name of the LiDAR's unit, if the data set has only one.
         """
         self.name = name
         self.world_frame = world_frame
@@ -88,6 +91,7 @@ class FileDrive(Drive):
         self._notes = notes
         self._datum = datum
         self._scenario = scenario
+        self._unit = unit
 
     def __len__(self) -> int:
         return len(self._files)
@@ -111,6 +115,10 @@ class FileDrive(Drive):
     @property
     def scenario(self) -> Mapping | None:
         return self._scenario
+
+    @property
+    def lidar_field(self) -> LidarField | None:
+        return super().lidar_field or lidar_field(self._unit)
 
     def scan(self, index: int) -> np.ndarray:
         if not 0 <= index < len(self):

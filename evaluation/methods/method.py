@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
 
+from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import make_pose
 
@@ -108,6 +109,19 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """
         one = self.describe_place if of_places else self.describe
         return [one(cloud) for cloud in clouds]
+
+    def for_lidar(self, field: LidarField | None) -> "Method":
+        """Returns the method for scans of a LiDAR; None if it is not known.
+
+        By default it is the method itself.
+        """
+        del field
+        return self
+
+    def assumption(self, field: LidarField | None) -> str | None:
+        """Returns what the method takes for granted of a LiDAR, if anything."""
+        del field
+        return None
 
     @property
     def describes_alike(self) -> bool:

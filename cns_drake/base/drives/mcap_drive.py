@@ -105,12 +105,10 @@ class McapDrive(Drive):
         """Name of the LiDAR whose scans are read."""
         return _lidar_name(self._lidar_topic)
 
-    @property
-    def lidar_section(self) -> Mapping:
-        """What the scenario says of the LiDAR; empty if it says nothing."""
-        section: Any = self.scenario or {}
-        for key in ("lidars", self.lidar_name):
-            section = section.get(key) if isinstance(section, dict) else None
+    @cached_property
+    def lidar_section(self) -> Mapping:  # type: ignore[override]  # Read once.
+        lidars = (self.scenario or {}).get("lidars")
+        section = lidars.get(self.lidar_name) if isinstance(lidars, dict) else 0
         return section if isinstance(section, dict) else {}
 
     @property
@@ -177,9 +175,10 @@ class McapDrive(Drive):
         ):
             points = point_layouts.to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
-            calibrated = self.lidar_section.get("returns") == "calibrated"
             return point_layouts.from_layout(
-                points, self._labels(index, message), calibrated=calibrated
+                points,
+                self._labels(index, message),
+                lambda: self.lidar_section.get("returns") == "calibrated",
             )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:

@@ -5,6 +5,7 @@ uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is PointXYZIRT of Velodyne's
 ROS 2 driver; `autoware` is PointXYZIRCAEDT. These layouts have no field for
 labels and instances, which come in another message."""
 
+from collections.abc import Callable
 import itertools
 from typing import Any, Literal, get_args
 
@@ -231,15 +232,15 @@ def to_labels(points: np.ndarray) -> np.ndarray:
 def from_layout(
     points: np.ndarray,
     labels: np.ndarray | None = None,
-    calibrated: bool = False,
+    is_calibrated: Callable[[], bool] = lambda: False,
 ) -> np.ndarray:
     """Returns points with the fields of this project beside their own.
 
     Args:
         points: (N,) in any layout.
         labels: (N,) records of other fields of the same points, if any.
-        calibrated: whether the intensities are those of calibrated returns,
-            from 0 to 255 in any layout.
+        is_calibrated: asked whether a byte of intensity is one of calibrated
+            returns, which have 0 to 255 in any layout.
 
     Returns:
         (N,). `velodyne` has `t` [ns] in place of `time` [s]; a `t` of floats
@@ -257,7 +258,7 @@ def from_layout(
     if {"time_stamp", "channel", "intensity"} <= set(names):
         columns["t"] = columns.pop("time_stamp")
         columns["ring"] = columns.pop("channel")
-        full = np.float32(1.0 if calibrated else _FULL)
+        full = np.float32(1.0 if is_calibrated() else _FULL)
         columns["intensity"] = points["intensity"] / full
     else:
         timed = next((name for name in ("t", "time") if name in names), "t")

@@ -110,5 +110,5 @@ def test_drives_of_one_number(tmp_path):
 def test_points_without_an_intensity(tmp_path):
     scan = np.zeros(3, [(axis, "<f4") for axis in "xyz"])
     recording = write_recording(tmp_path / "bare", [scan] * 2, [np.eye(4)] * 2)
-    with pytest.raises(InputError, match="scan 0: .* no field intensity"):
+    with pytest.raises(InputError, match=r"scan 0: .* no field intensity"):
         export_drive(recording, "kitti", tmp_path / "out")

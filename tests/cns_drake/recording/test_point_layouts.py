@@ -105,7 +105,8 @@ def test_points_come_back(points, layout):
 def test_calibrated_intensities_come_back(points, layout):
     points["intensity"] = np.arange(500) % 256
     read = from_layout(
-        to_points(sent(to_layout(points, layout))), calibrated=True
+        to_points(sent(to_layout(points, layout))),
+        is_calibrated=lambda: True,
     )
     np.testing.assert_array_equal(read["intensity"], points["intensity"])
     if layout == "ouster":
