@@ -63,6 +63,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         point_fields: further fields of points that it needs, such as intensity,
             ring, t or label.
         batch_size: number of clouds for a call of `describe_batch`.
+        skips_places: whether it scores NaN, even exhaustively, for places that
+            are no candidates; without it such a score is a fault.
         rerank_best: number of best places that a second stage, `rerank`,
             compares by their points; 0 without one.
         config: the parameters in use.
@@ -85,6 +87,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     scans_per_place: ClassVar[int] = 1
     point_fields: ClassVar[tuple[str, ...]] = ()
     batch_size: ClassVar[int] = 1
+    skips_places: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
 
     def __init__(self, config: MethodConfig | None = None):
@@ -146,7 +149,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         Returns:
             (D,) float64, higher is more similar; NaN for a place that is no
-            candidate.
+            candidate, see `skips_places`.
         """
 
     def score_in_drive(

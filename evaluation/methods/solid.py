@@ -116,6 +116,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     """
 
     Config = SolidConfig
+    skips_places = True
     config: SolidConfig
 
     def for_lidar(self, field: LidarField | None) -> SolidMethod:

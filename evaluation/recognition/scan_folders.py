@@ -94,6 +94,7 @@ def write_scores(
                 is_known,
                 gate_radius=gate_radius,
                 exhaustive=True,
+                where=str(path),
             )
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
