@@ -17,6 +17,7 @@ from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
     DATUM,
     BinDrive,
+    is_local,
     keep_spanned,
     list_stamped,
     to_world,
@@ -51,7 +52,8 @@ _X_BS = poses.make_pose(
 class MulranDrive(BinDrive):
     """A drive of MulRan.
 
-    W is the UTM grid with a nearer origin, see `scan_files.to_world`.
+    W is the UTM grid with a nearer origin, see `scan_files.to_world`; for poses
+    in local coordinates it is the drive's own frame.
     The pose of a scan is interpolated at its stamp. Points without a return,
     which are stored as (0, 0, 0), are left out. A complete scan has the fields
     `ring` and `t` [ns since the stamp] beside the stored ones. A scan with too
@@ -79,15 +81,24 @@ class MulranDrive(BinDrive):
         trajectory = read_matrices(path / _POSES, ",")
         X_UB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
+        name = path.resolve().name
+        local = is_local(trajectory.X_WB)
+        if local:
+            notes += (
+                f"{trajectory.path}: no UTM coordinates; taken for those of a"
+                f" frame of {name} alone",
+            )
+        else:
+            X_UB = to_world(X_UB, trajectory.path)
         super().__init__(
             columns,
-            name=path.resolve().name,
-            world_frame=f"mulran/{DATUM}",
+            name=name,
+            world_frame=f"mulran/{name if local else DATUM}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
-            X_WS=to_world(X_UB, trajectory.path) @ _X_BS,
+            X_WS=X_UB @ _X_BS,
             notes=notes,
-            datum=DATUM,
+            datum=None if local else DATUM,
             unit="os1-64-33",
         )
 

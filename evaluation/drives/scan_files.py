@@ -28,6 +28,11 @@ ORIGIN = (350_000.0, 4_020_000.0, 0.0)
 _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 
+def is_local(X_WB: np.ndarray) -> bool:
+    """Returns whether poses (N, 4, 4) are all too near to be in UTM metres."""
+    return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
+
+
 def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
     """Returns poses X_WB (N, 4, 4) from poses in the UTM grid U, zone 52N.
 

@@ -66,6 +66,20 @@ def test_the_lidar_is_above_the_base(tmp_path):
     )
 
 
+def test_local_coordinates(tmp_path):
+    stamps_ns, X_UB = pose_table()
+    write_drive(tmp_path / "utm", table=(stamps_ns, X_UB))
+    wanted = open_drive(tmp_path / "utm").X_WS
+    X_UB[:, :3, 3] -= UTM
+    write_drive(tmp_path / "local", table=(stamps_ns, X_UB))
+    drive = open_drive(tmp_path / "local")
+    wanted[:, :3, 3] -= UTM - ORIGIN
+    np.testing.assert_allclose(drive.X_WS, wanted, atol=1e-8)
+    assert drive.world_frame == "mulran/local"
+    assert drive.datum is None
+    assert "no UTM coordinates" in drive.notes[-1]
+
+
 def test_utm_loses_nothing(tmp_path):
     stamps_ns, X_UB = pose_table()
     # Two drives, one a thousandth of a millimetre beside the other.
@@ -172,8 +186,8 @@ def mirrored(stamps_ns, X_UB):
     X_UB[:, :3, 2] *= -1.0
 
 
-def local_metres(stamps_ns, X_UB):
-    X_UB[:, :3, 3] -= UTM
+def lost_for_a_while(stamps_ns, X_UB):
+    X_UB[3, :3, 3] = 0.0
 
 
 def other_day(stamps_ns, X_UB):
@@ -192,7 +206,7 @@ def long_gap(stamps_ns, X_UB):
         (nan_value, "row 21: a number is not finite"),
         (no_rotation, "row 21: no rotation matrix"),
         (mirrored, "row 1: no rotation matrix"),
-        (local_metres, "easting: .* is no UTM coordinate"),
+        (lost_for_a_while, "easting: .* is no UTM coordinate"),
         (other_day, "time: no pose for any scan"),
         (long_gap, "time: no pose for the scan at .* nothing for 2.01 s"),
     ],
