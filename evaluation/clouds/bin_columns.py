@@ -2,7 +2,7 @@
 
 A `.bin` is a sequence of float32. KITTI has four for each point: x y z
 intensity; others leave out the intensity, or add a ring, a time or a colour.
-Read with a wrong number, a file is a cloud that nobody measured. The values
+Read with a wrong number, a file is a cloud that was never measured. The values
 show the right one: the columns of a cloud are distributed differently, and read
 with a wrong number of columns they are mixed, hence alike.
 """
@@ -145,22 +145,22 @@ def _period(values: np.ndarray, places: np.ndarray) -> int | None:
         )[0]
         for k in candidates
     }
-    tells = {k: _information(table) for k, table in tables.items()}
-    most = max(tells.values())
+    told = {k: _information(table) for k, table in tables.items()}
+    most = max(told.values())
     if most <= _LEAST_INFORMATION:
         return None
-    found = min(k for k in tells if tells[k] >= _ALMOST * most)
+    found = min(k for k in told if told[k] >= _ALMOST * most)
     degrees = len(edges) * (found - 1)
     chance = _SIGNIFICANCE * math.sqrt(2.0 * degrees) / (2.0 * len(values))
     # Twice as many must have been tried.
     too_few = min(2 * found, _CANDIDATES[-1]) not in candidates
-    if too_few or tells[found] <= chance:
+    if too_few or told[found] <= chance:
         return None
     half = found // 2
-    if found % 2 == 0 and half in tells:
+    if found % 2 == 0 and half in told:
         table = tables[found] / tables[found].sum(axis=1, keepdims=True)
         apart = np.abs(table[:2] - table[half : half + 2]).sum(axis=1) / 2.0
-        if tells[half] >= _HALF * tells[found] and (apart < _HALF).all():
+        if told[half] >= _HALF * told[found] and (apart < _HALF).all():
             return half
     return found
 
@@ -178,6 +178,6 @@ def _information(table: np.ndarray) -> float:
     shares = table / number
     independent = np.outer(shares.sum(axis=1), shares.sum(axis=0))
     filled = shares > 0.0
-    told = shares[filled] * np.log(shares[filled] / independent[filled])
+    terms = shares[filled] * np.log(shares[filled] / independent[filled])
     degrees = (table.shape[0] - 1) * (table.shape[1] - 1)
-    return float(told.sum() - degrees / (2.0 * number))
+    return float(terms.sum() - degrees / (2.0 * number))

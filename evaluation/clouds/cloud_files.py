@@ -443,7 +443,7 @@ def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
 
 
 def no_note(note: str) -> None:
-    """Takes a note that nobody wants."""
+    """Takes a note that is not wanted."""
 
 
 def read_cloud(

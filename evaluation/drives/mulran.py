@@ -27,7 +27,7 @@ from evaluation.drives.text_tables import read_matrices
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")
 
-# What the place of a point in a whole scan tells.
+# Fields that follow from the place of a point in a whole scan.
 _FOUND = [("ring", "<u2"), ("t", "<u4")]
 
 _NUM_RINGS = 64

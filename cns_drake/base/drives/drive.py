@@ -187,8 +187,8 @@ class Drive(abc.ABC):
     def lidar_section(self) -> Mapping:
         """What the scenario says of the LiDAR; empty if it says nothing.
 
-        Of several LiDARs, one that ends the drive's name is meant, or else the
-        first.
+        A drive whose name ends with that of a LiDAR is that LiDAR's, others
+        are of the first.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:

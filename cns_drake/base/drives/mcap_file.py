@@ -178,7 +178,7 @@ class _Contents:
         indexes: for each block, channel id -> where its message index begins.
         attachments: (name, where it begins) of each.
         found: channel id -> (block, offset in it, log time [ns]) of each
-            message; None where the index tells.
+            message; None where the index has them.
         statistics: the file's own, if any.
     """
 
@@ -192,7 +192,7 @@ class _Contents:
 
     @classmethod
     def of(cls, summary: Summary) -> "_Contents":
-        """Returns what a summary tells."""
+        """Returns the contents of a summary."""
         chunks = sorted(
             summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset
         )
@@ -210,7 +210,7 @@ class _Contents:
         )
 
     def is_whole(self) -> bool:
-        """Returns whether the statistics confirm what a summary tells."""
+        """Returns whether the statistics confirm a summary."""
         counts = self.statistics
         used = set().union(*self.indexes)
         return counts is not None and (

@@ -111,7 +111,7 @@ def test_values_that_show_nothing(tmp_path):
     np.ones((6, 4), "<f4").tofile(path)
     assert len(read_cloud(path, on_note=notes.append)) == 6
     assert "do not show" in notes.pop()
-    # Of the numbers of columns, only four fit.
+    # Only four columns fit.
     np.ones((1, 4), "<f4").tofile(path)
     assert len(read_cloud(path, on_note=notes.append)) == 1
     assert notes == []
