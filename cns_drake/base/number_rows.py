@@ -1,6 +1,6 @@
 """Rows of numbers that are written as text."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import math
 import warnings
 
@@ -42,7 +42,7 @@ def parse_rows(
 
 
 def _fault(
-    lines: Sequence[str] | Sequence[bytes],
+    lines: Iterable[str | bytes],
     dtype: np.dtype,
     separator: str | None,
     first: int,

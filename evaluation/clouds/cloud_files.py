@@ -8,6 +8,7 @@ import itertools
 import math
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
+import warnings
 
 import numpy as np
 
@@ -363,14 +364,14 @@ def _read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     for name in "xyz":
         if name not in (dtype.names or ()) or dtype[name].kind != "f":
             raise ValueError(f"PLY header: no floating-point property {name}")
-    count, alone = element.count, element is elements[-1]
+    count, alone = element.number, element is elements[-1]
     if encoding == "ascii":
-        offset = _behind_lines(path, offset, sum(one.count for one in before))
+        offset = _behind_lines(path, offset, sum(one.number for one in before))
         # A vertex takes at least one byte.
         _check_size(path, offset + count, exactly=False)
         more = not alone
         return _text_records(path, offset, count, block, dtype, "PLY", more)
-    offset += sum(one.count * one.dtype(order).itemsize for one in before)
+    offset += sum(one.number * one.dtype(order).itemsize for one in before)
     _check_size(path, offset + count * dtype.itemsize, exactly=alone)
     return _records(path, dtype, offset, count, block)
 
@@ -388,7 +389,7 @@ class _Element(NamedTuple):
     """One element of a PLY file: (name, type) of its properties."""
 
     name: str
-    count: int
+    number: int
     properties: list[tuple[str, str]]
 
     def dtype(self, order: str) -> np.dtype:
@@ -584,7 +585,10 @@ def _read_npy_header(
 ) -> tuple[np.dtype, tuple[int, ...], bool, int]:
     """Returns type, shape, whether stored by columns, and the offset."""
     try:
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
+        with warnings.catch_warnings():
+            # A damaged header can overflow the size of the array.
+            warnings.simplefilter("ignore")
+            values = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:
         raise
     except Exception as error:

@@ -1,6 +1,7 @@
 """Readers of recorded drives and of point clouds, one for each format."""
 
 from pathlib import Path
+from typing import Any
 
 from cns_drake.base.drives.drive import (
     Drive,
@@ -59,7 +60,7 @@ def open_drive(
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
-    fitting = [reader for holds, reader in readers if holds(path)]
+    fitting: list[Any] = [reader for holds, reader in readers if holds(path)]
     if len(fitting) > 1:
         names = ", ".join(reader.__name__ for reader in fitting)
         raise InputError(f"{path}: files of several formats ({names})")

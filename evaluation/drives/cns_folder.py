@@ -89,7 +89,7 @@ class CnsFolderDrive(FileDrive):
         )
 
     @cached_property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]  # Read late.
+    def notes(self) -> tuple[str, ...]:
         notes: list[str] = []
         read_cloud(self._files[0], on_note=notes.append)
         return tuple(notes)

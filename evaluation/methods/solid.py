@@ -64,13 +64,14 @@ class SolidConfig(MethodConfig):
 
     def field(self, lidar: LidarField = _CNS) -> LidarField:
         """Returns the field of view: that given, or else the LiDAR's."""
-        given = self.elevations, self.lowest_deg, self.highest_deg
-        return LidarField(
-            *(
-                own if one is None else one
-                for one, own in zip(given, lidar, strict=True)
-            )
-        )
+        elevations, lowest_deg, highest_deg = lidar
+        if self.elevations is not None:
+            elevations = self.elevations
+        if self.lowest_deg is not None:
+            lowest_deg = self.lowest_deg
+        if self.highest_deg is not None:
+            highest_deg = self.highest_deg
+        return LidarField(elevations, lowest_deg, highest_deg)
 
 
 @dataclass(frozen=True)

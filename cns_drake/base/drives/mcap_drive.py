@@ -106,7 +106,7 @@ class McapDrive(Drive):
         return _lidar_name(self._lidar_topic)
 
     @cached_property
-    def lidar_section(self) -> Mapping:  # type: ignore[override]  # Read once.
+    def lidar_section(self) -> Mapping:
         lidars = (self.scenario or {}).get("lidars")
         section = lidars.get(self.lidar_name) if isinstance(lidars, dict) else 0
         return section if isinstance(section, dict) else {}

@@ -415,7 +415,12 @@ class McapFile:
                 count.
         """
         told = self._contents.statistics
-        contents = _Contents(found={}, statistics=told)
+        contents = _Contents(
+            dict(self._contents.schemas),
+            dict(self._contents.channels),
+            found={},
+            statistics=told,
+        )
         assert contents.found is not None
         with self._reading() as stream:
             size = stream.seek(0, os.SEEK_END)
@@ -430,7 +435,10 @@ class McapFile:
                     break
                 if end > size:
                     raise EOFError("a record ends behind the file")
-                if opcode == Opcode.ATTACHMENT:
+                if (
+                    opcode == Opcode.ATTACHMENT
+                    and length <= _ATTACHMENT_LIMIT_BYTES
+                ):
                     stream.seek(offset)
                     body = _read_body(
                         stream, _ATTACHMENT_LIMIT_BYTES, "an attachment"
