@@ -278,6 +278,9 @@ def export(
     output: Annotated[Path, typer.Option()],
     sensor: Annotated[str | None, typer.Option(metavar="NAME")] = None,
     absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
+    sequence: Annotated[
+        int | None, typer.Option(metavar="NN", min=0, max=999)
+    ] = None,
 ) -> None:
     """Export a recording to a common layout.
 
@@ -290,6 +293,8 @@ def export(
         absent_in: Label points on structures that this stage of the map lacks
             with SemanticKITTI's labels of moving objects (252 to 259); with
             kitti.
+        sequence: Number of the drive, sequences/NN; with kitti. By default the
+            digits at the end of its name.
     """
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
@@ -302,6 +307,8 @@ def export(
             output,
             lidar=sensor,
             absent_in=absent_in,
+            sequence=sequence,
+            on_note=note,
             on_frame=count_progress(progress, task),
         )
     typer.echo(drive)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from cns_drake.base.elementary import cos, sin
 
@@ -397,25 +398,34 @@ def make_flash_pattern(
     )
 
 
-# Numbers of cells in elevation and in azimuth; a cell has a width of 1 deg.
-_ROWS, _COLUMNS = 180, 360
+# Width of a cell in elevation and in azimuth [deg], and numbers of cells.
+_CELL_DEG = 0.25
+_ROWS, _COLUMNS = round(180 / _CELL_DEG), round(360 / _CELL_DEG)
+# What lies between two beams is covered if they are at most twice this apart.
+_REACH_CELLS = 12
 
 
 class BeamCoverage:
     """The directions that the beams of a turn cover.
 
-    A beam covers its cell of 1 deg by 1 deg in elevation and azimuth, and the
-    eight cells around it.
+    These are cells of 0.25 deg with a beam, those beside them, since points are
+    where their beams were up to rounding, and all between beams that are up to
+    6 deg apart: a morphological closing.
     """
 
     def __init__(self, d_Sset: np.ndarray):
-        """Covers the cells about beams (N, 3), unit directions in S."""
-        hit = np.zeros((_ROWS, _COLUMNS), bool)
-        hit[_cells(d_Sset)] = True
-        beside = hit | np.roll(hit, 1, axis=1) | np.roll(hit, -1, axis=1)
-        self._is_covered = beside.copy()
-        self._is_covered[1:] |= beside[:-1]
-        self._is_covered[:-1] |= beside[1:]
+        """Covers the cells of beams (N, 3), unit directions in S."""
+        covered = np.zeros((_ROWS, _COLUMNS), np.uint8)
+        covered[_cells(d_Sset)] = 1
+        grown = 2 * _REACH_CELLS + 1
+        for grow, size, beyond in (
+            (maximum_filter1d, grown, 0),
+            # Two cells less: those beside the beams stay.
+            (minimum_filter1d, grown - 2, 1),
+        ):
+            covered = grow(covered, size, axis=0, mode="constant", cval=beyond)
+            covered = grow(covered, size, axis=1, mode="wrap")
+        self._is_covered = covered.astype(bool)
 
     def covers(self, d_Sset: np.ndarray) -> np.ndarray:
         """Returns which directions (N, 3) in S are covered, (N,) bool."""
@@ -428,5 +438,5 @@ def _cells(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     elevation_deg = np.degrees(np.arcsin(np.clip(z, -1.0, 1.0))) + 90.0
     azimuth_deg = np.degrees(np.arctan2(y, x)) + 180.0
     # The direction straight up is rounded to the upper limit.
-    rows = np.minimum(elevation_deg.astype(np.int64), _ROWS - 1)
-    return rows, azimuth_deg.astype(np.int64) % _COLUMNS
+    rows = np.minimum((elevation_deg / _CELL_DEG).astype(np.int64), _ROWS - 1)
+    return rows, (azimuth_deg / _CELL_DEG).astype(np.int64) % _COLUMNS
