@@ -87,7 +87,7 @@ def _parse_world(
     """Parses a world, and returns notes on omitted parts."""
     _check_file(path)
     root = None if path.suffix.lower() == ".urdf" else read_xml(path)
-    if root is None or not is_gazebo_world(root):
+    if root is None or not is_gazebo_world(path, root):
         _parse_models(parser, path)
         return ()
     text, notes = simplify_world(path, root, model_paths)
