@@ -240,6 +240,16 @@ def _count_unused(
         one.name for one in features.areas if reading.is_building(one.tags)
     }
     used |= also
+    tagged = {
+        name: tags
+        for name, tags, *_ in [
+            *features.ways, *features.areas, *features.trees
+        ]
+    }  # fmt: skip
+    for name, tags in tagged.items():
+        for key, usual in TABLES["unread"].items():
+            if tags.get(key, "") not in ("", *usual):
+                features.faults.add(f"tag {key}, not read", name)
     for name, kind in features.kinds.items():
         is_relation_of_parts = kind == "relation of type building"
         if name not in used and not is_relation_of_parts:
