@@ -693,6 +693,9 @@ def _surfaces(
             faults.add("solid turned inside out, reversed", name)
             faces = [triangles[:, ::-1] for triangles in faces]
         for triangles, kind in zip(faces, geometry.kinds, strict=True):
+            if kind == "ClosureSurface":
+                faults.add("face that only closes a solid, left out", name)
+                continue
             part = "roof" if kind == "RoofSurface" else "body"
             found.setdefault(part, []).append(triangles)
     return {part: np.concatenate(found[part]) for part in sorted(found)}

@@ -258,6 +258,9 @@ class _Simplifier:
         self._note_references(root)
         saved = world.findall("state//model/pose")
         self.skip("saved places of models (state)", len(saved))
+        for tag in ("insertions", "deletions"):
+            for _ in world.iterfind(f"state/{tag}/*"):
+                self.skip(f"saved {tag} (state)")
         self._add_children(world, target, self._path.absolute().parent, 0)
 
     def _note_references(self, root: Element) -> None:
@@ -470,6 +473,8 @@ class _Simplifier:
         except ValueError:
             return
         if len(values) in (3, 4) and all(map(math.isfinite, values)):
+            if len(values) == 4 and values[3] < 1.0:
+                self.skip("transparent colours", how="taken as solid")
             made = SubElement(target, "material")
             text = " ".join([*numbers, "1"][:4])
             SubElement(made, "diffuse").text = text

@@ -583,3 +583,16 @@ def test_lines_of_two_systems_are_refused(tmp_path):
     read = read_cityjson(path)
     kind = "object that is there twice, its last taken"
     assert read.faults.rows() == [(kind, 1, "a")]
+
+
+def test_faces_that_only_close_a_solid_are_not_seen(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2))
+    (geometry,) = city.objects["a"]["geometry"]
+    for one in geometry["semantics"]["surfaces"]:
+        if one["type"] == "RoofSurface":
+            one["type"] = "ClosureSurface"
+    read, found = structures(city.write(tmp_path / "city.json"))
+    assert area(found["a"]) == pytest.approx(20.0)
+    kind = "face that only closes a solid, left out"
+    assert read.faults.rows() == [(kind, 1, "a")]

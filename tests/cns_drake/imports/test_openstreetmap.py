@@ -687,3 +687,43 @@ def test_tags_that_are_not_read_are_counted(tmp_path):
         "tag oneway, not read": 1,
         "tag diameter_crown, not read": 1,
     }
+
+
+@pytest.mark.parametrize(
+    ("tags", "is_there"),
+    [
+        ({}, True),
+        ({"level": "0"}, True),
+        ({"indoor": "no"}, True),
+        ({"level": "-1"}, False),
+        ({"layer": "-2"}, False),
+        ({"indoor": "yes"}, False),
+        ({"location": "underground"}, False),
+    ],
+)
+def test_things_within_buildings_or_the_ground_are_not_seen(
+    tmp_path, tags, is_there
+):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.node(20, 20, natural="tree", **tags)
+    osm.node(30, 20, amenity="bench", **tags)
+    city, found = read(osm.write(tmp_path / "a.osm"))
+    assert len(found) == 1 + is_there
+    assert len(city.things) == is_there
+    kinds = {kind for kind, _, _ in city.faults.rows()}
+    assert ("natural=tree, left out" in kinds) == (not is_there)
+
+
+@pytest.mark.parametrize(
+    ("direction", "degrees"),
+    [("90", 0), ("E", 0), ("sw", -135), ("NNW", 112.5)],
+)
+def test_things_face_where_their_tag_says(tmp_path, direction, degrees):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.node(30, 20, amenity="bench", direction=direction)
+    city, _ = read(osm.write(tmp_path / "a.osm"))
+    (thing,) = city.things
+    turn = np.degrees(thing.yaw) - degrees
+    assert turn % 360.0 == pytest.approx(0.0, abs=1e-9)

@@ -354,6 +354,9 @@ NOTED = {
     "<visibility_flags>0x0</visibility_flags>": "1 invisible visuals ignored",
     "<visibility_flags>3</visibility_flags>": "1 visibility flags ignored",
     "<meta><layer>1</layer></meta>": "1 elements <meta> in <visual> ignored",
+    "<material><diffuse>1 1 1 0</diffuse></material>": (
+        "1 transparent colours taken as solid"
+    ),
     "<scale>2 2 2</scale>": "1 elements <scale> in <visual> ignored",
 }
 
@@ -374,12 +377,14 @@ def test_saved_places_and_old_frames_are_named(tmp_path):
         tmp_path,
         f"<model name='m'><pose frame='x'>5 0 1 0 0 0</pose>{link()}</model>"
         "<state world_name='default'><model name='m'>"
-        "<pose>8 3 1 0 0 0</pose></model></state>",
+        "<pose>8 3 1 0 0 0</pose></model><deletions><name>m</name></deletions>"
+        "</state>",
     )
     world = load_world(path)
     assert place(world, "m") == [5.0, 0.0, 1.0]
     assert [note.split(": ")[1] for note in world.notes] == [
         "1 frames of poses in SDF before 1.7 ignored",
+        "1 saved deletions (state) ignored",
         "1 saved places of models (state) ignored",
     ]
 
