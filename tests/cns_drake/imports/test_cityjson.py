@@ -511,7 +511,7 @@ def solid(city, lod, *box):
         (("2", 0, 0, 0, (20, 10, 9)), ["2.2", "2.2"], 1100.0, 1),
         # Parts that are worse than the whole.
         (("2.2", 0, 0, 0, (20, 10, 9)), ["1", "1"], 1800.0, 2),
-        # Of equal levels both are there; so is what stands aside.
+        # Both are there at equal levels, or beside each other.
         (("2.2", 0, 0, 0, (20, 10, 9)), ["2.2", "2.2"], 2900.0, 0),
         (("1", 0, 30, 0, (20, 10, 9)), ["2.2", "2.2"], 2900.0, 0),
         (("2.2", 0, 30, 0, (20, 10, 9)), ["1", "2.2"], 2900.0, 0),
