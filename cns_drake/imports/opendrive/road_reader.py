@@ -148,6 +148,8 @@ def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
         own = name
         if child.tag in ("road", "junction"):
             own = child.attrib.get("id", "")
+        if not child.attrib and not len(child):
+            continue
         if known is not None and child.tag not in known:
             faults.add(f"{child.tag} of {element.tag}, not read", own)
         elif child.tag != "userData":

@@ -365,7 +365,7 @@ UNREAD = {
     '<speed sOffset="0" max="5"/>': "speed of lane, not read",
     '<access sOffset="0" rule="deny"/>': "access of lane, not read",
     '<folding a="1"/>': "folding of lane, not read",
-    '<roadMark sOffset="0" type="solid"><sway/></roadMark>': (
+    '<roadMark sOffset="0" type="solid"><sway ds="1"/></roadMark>': (
         "sway of roadMark, not read"
     ),
 }
@@ -425,7 +425,10 @@ def test_attributes_of_lanes(tmp_path, attribute, fault):
             "positionInertial of signal, not read",
         ),
         ('<surface><CRG file="a.crg"/></surface>', "surface of road, not read"),
-        ("<railroad/>", "railroad of road, not read"),
+        (
+            '<surface/><railroad><switch name="a"/></railroad>',
+            "railroad of road, not read",
+        ),
         ('<include file="b.xodr"/>', "include of road, not read"),
     ],
 )
