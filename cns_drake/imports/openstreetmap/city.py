@@ -248,12 +248,9 @@ def _count_unused(
         one.name for one in features.areas if reading.is_building(one.tags)
     }
     used |= also
-    tagged = {
-        name: tags
-        for name, tags, *_ in [
-            *features.ways, *features.areas, *features.trees
-        ]
-    }  # fmt: skip
+    tagged = {one.name: one.tags for one in features.ways}
+    tagged |= {one.name: one.tags for one in features.areas}
+    tagged |= {name: tags for name, tags, _ in features.trees}
     for name, tags in tagged.items():
         for key, usual in TABLES["unread"].items():
             if tags.get(key, "") not in ("", *usual):

@@ -6,7 +6,7 @@ editors give negative numbers to new things and mark deleted ones, and files
 with a history have each version of a thing.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
@@ -48,7 +48,7 @@ def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
         return path
     things: dict[tuple[int, int], _Thing] = {}
     places: dict[int, tuple[float, float]] = {}
-    for one in osmium.FileProcessor(str(path)):
+    for one in _read(path):
         kind = _KINDS.index(type(one).__name__)
         key = kind, one.id
         name = f"{_KINDS[kind][0].lower()}{one.id}"
@@ -77,7 +77,7 @@ def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
                 name = f"{_KINDS[kind][0].lower()}{number}"
                 faults.add("deleted thing, left out", name)
                 continue
-            common = {
+            common: dict[str, Any] = {
                 "id": _new(number),
                 "tags": dict(thing.tags),
                 "version": 1,
@@ -97,6 +97,12 @@ def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
     return target
 
 
+def _read(path: Path) -> Iterator[Any]:
+    import osmium
+
+    yield from osmium.FileProcessor(str(path))
+
+
 def _new(number: int) -> int:
     return number if number > 0 else _FIRST_NEW - number
 
@@ -112,10 +118,8 @@ def _content(one: Any) -> Any:
 
 def _is_sorted(path: Path) -> bool:
     """Returns whether things have an order, and ways only numbers of nodes."""
-    import osmium
-
     last = 0, 0
-    for one in osmium.FileProcessor(str(path)):
+    for one in _read(path):
         key = _KINDS.index(type(one).__name__), one.id
         if key <= last or one.id <= 0 or not one.visible:
             return False

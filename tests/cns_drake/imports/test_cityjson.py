@@ -544,7 +544,7 @@ def test_a_building_and_its_parts_of_different_levels(
     [
         (set_in("transform", "rotate", [0, 0, 1]), "transform.rotate is not"),
         (set_in("transform", "scale", [1, 0, 1]), "transform.scale: not above"),
-        (set_in("transform", "scale", [1, -1, 1]), "transform.scale: not abov"),
+        (set_in("transform", "scale", [1, -1, 1]), "transform.scale: not"),
         (set_in("transform", [1, 1, 1]), "transform: not an object"),
     ],
 )
