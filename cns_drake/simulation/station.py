@@ -14,7 +14,7 @@ from pydrake.systems.framework import (
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.vehicle_motion import VehicleMotion
+from cns_drake.motion.vehicle_motion import VehicleMotion, VehicleSweep
 from cns_drake.pictures.drive_page import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.background_writer import BackgroundWriter
@@ -145,7 +145,6 @@ def make_station(
             name=name,
             seed=scenario.seed,
             weather=scenario.weather,
-            trajectory=trajectory,
             unseen=[
                 plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)
             ],
@@ -157,6 +156,14 @@ def make_station(
         builder.Connect(
             poses.get_output_port(), lidar.GetInputPort("frame_poses")
         )
+        if config.motion_distortion:
+            sweep = builder.AddNamedSystem(
+                f"{name}_sweep",
+                VehicleSweep(trajectory, lidar.pattern.column_t_ns * 1e-9),
+            )
+            builder.Connect(
+                sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
+            )
         if moving is not None:
             connect_traffic(builder, moving, lidar, config.motion_distortion)
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")

@@ -7,6 +7,7 @@ Directions depend only on the time, so that a frame is always the same.
 
 from abc import abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
+import math
 
 import numpy as np
 
@@ -42,6 +43,20 @@ class _TimedPattern(BeamPattern):
     repeats = False
     # Firing times follow from the duration of a frame.
     num_columns = None
+
+    def __post_init__(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: one of them is impossible.
+        """
+        self.check()
+        if not 0.0 < self.points_per_second < math.inf:
+            raise ValueError(
+                f"points_per_second: {self.points_per_second:g} is no rate"
+            )
+        if self.num_lines < 1:
+            raise ValueError(f"num_lines: {self.num_lines} is no number")
 
     @property
     def num_rings(self) -> int:
@@ -95,6 +110,14 @@ class RosettePattern(_TimedPattern):
     fov_deg: float
     height_deg: float = field(default=0.0, kw_only=True)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (0.0 < self.fov_deg <= 360.0 and 0.0 <= self.height_deg < 180.0):
+            raise ValueError(
+                f"fov_deg {self.fov_deg:g}, height_deg {self.height_deg:g}: "
+                "beyond 0 to 360 deg, or 0 to 180 deg"
+            )
+
     def _directions(self, times: np.ndarray) -> np.ndarray:
         first, second = (2.0 * np.pi * hz * times for hz in _PRISMS_HZ)
         bend = np.deg2rad(self.fov_deg) / 4.0
@@ -139,6 +162,15 @@ class NoddingPattern(_TimedPattern):
     """
 
     elevations_deg: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        low, high = self.elevations_deg
+        if not -90.0 <= low < high <= 90.0:
+            raise ValueError(
+                f"elevations_deg: {low:g}, {high:g}: not from the lowest to "
+                "the highest, within -90 to 90 deg"
+            )
 
     def _directions(self, times: np.ndarray) -> np.ndarray:
         azimuth = (np.pi - 2.0 * np.pi * _TURNS_HZ * times)[:, None]

@@ -51,11 +51,11 @@ class LidarPreset(NamedTuple):
         return cls(pattern, source)
 
 
+_UNITS = parse_yaml(Path(__file__).with_name("presets.yaml").read_bytes())
+# Units with more columns in a slower turn.
+_STEADY = {n for n, unit in _UNITS.items() if unit.pop("fires_steadily", False)}
 LIDAR_PRESETS: dict[str, LidarPreset] = {
-    name: LidarPreset.of(**fields)
-    for name, fields in parse_yaml(
-        Path(__file__).with_name("presets.yaml").read_bytes()
-    ).items()
+    name: LidarPreset.of(**unit) for name, unit in _UNITS.items()
 }
 
 
@@ -71,14 +71,16 @@ def make_beam_pattern(
 
     Args:
         preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
-        period: duration of a turn [s].
-        num_columns: columns in a turn.
+        period: duration of a turn [s]; by default that of the data sheet.
+        num_columns: columns in a turn; by default those of the data sheet, of a
+            unit that fires steadily as many as fit into the period.
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
 
     Raises:
         KeyError: there is no preset of that name.
-        ValueError: the preset has no columns to choose.
+        ValueError: the preset has no columns to choose, or a value is
+            impossible.
 
     Example:
         from cns_drake import LIDAR_PRESETS, make_beam_pattern
@@ -92,6 +94,8 @@ def make_beam_pattern(
     base = LIDAR_PRESETS[preset].pattern
     if num_columns is not None and base.num_columns is None:
         raise ValueError(f"the preset '{preset}' has no columns")
+    if preset in _STEADY and period and not num_columns:
+        num_columns = max(round(base.num_columns * period / base.period), 1)
     changes: dict[str, Any] = {
         "period": period,
         "num_columns": num_columns,
