@@ -315,7 +315,7 @@ class EmbreeScene:
         is_near = self._near.contain(rays.p_OSset)
         is_unsure = hits.owner == primitives.PROXY_OWNER
         if is_near.any():  # Origins are taken in turn.
-            is_unsure |= np.resize(is_near, len(is_unsure))
+            is_unsure |= is_near[np.arange(len(is_unsure)) % len(is_near)]
         again = np.flatnonzero(is_unsure)
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))

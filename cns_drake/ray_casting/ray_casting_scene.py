@@ -207,7 +207,7 @@ class RayCastingScene:
 
         Rays meet a plane from both sides, like any other surface.
         """
-        limits = np.resize(rays.max_ranges, len(rays.d_Sset))
+        limits = rays.max_ranges_of(np.arange(len(rays.d_Sset)))
         met = np.full(len(limits), -1, np.int32)
         for row, group in self._planes.items():
             times = _AT_ONCE if group.motion is None else rays.times
@@ -280,22 +280,22 @@ def _meet_plane(
     NumPy takes as long as all other geometry. Ray i takes pose i mod (K,) of
     the (K, 3, 4) X_OLs.
     """
+    # Indices are counted along, since remainders take long.
+    origin = turn = pose = -1
     for ray in range(len(rays.d_Sset)):
-        p = rays.p_OSset[ray % len(rays.p_OSset)]
-        R = rays.R_OSset[ray % len(rays.R_OSset)]
-        X, d = X_OLs[ray % len(X_OLs)], rays.d_Sset[ray]
+        origin = origin + 1 if origin + 1 < len(rays.p_OSset) else 0
+        turn = turn + 1 if turn + 1 < len(rays.R_OSset) else 0
+        pose = pose + 1 if pose + 1 < len(X_OLs) else 0
+        R, X, d = rays.R_OSset[turn], X_OLs[pose], rays.d_Sset[ray]
         height = along = 0.0
         for i in range(3):
             d_O = R[i, 0] * d[0] + R[i, 1] * d[1] + R[i, 2] * d[2]
-            height += X[i, 2] * (X[i, 3] - p[i])
+            height += X[i, 2] * (X[i, 3] - rays.p_OSset[origin, i])
             along += X[i, 2] * d_O
         # A ray along the plane does not meet it.
-        if along == 0.0 or height / along < 0.0:
-            continue
-        distance = height / along
-        if distance < limits[ray] or (
-            met[ray] < 0 and distance <= limits[ray]
-        ):
+        distance = height / along if along != 0.0 else -1.0
+        is_first = met[ray] < 0 and distance == limits[ray]
+        if distance >= 0.0 and (distance < limits[ray] or is_first):
             limits[ray], met[ray] = distance, row
 
 

@@ -127,6 +127,7 @@ class McapRecorder(LeafSystem):
         schedule: Schedule | None = None,
         further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
+        num_rings: Mapping[str, int] | None = None,
         imu_variances: tuple[float, float] = (0.0, 0.0),
         with_imu_samples: bool = False,
         with_objects: bool = False,
@@ -146,6 +147,7 @@ class McapRecorder(LeafSystem):
             further: name -> further sensor.
             layouts: LiDAR name -> layout of its points (see
                 `point_layouts`), `cns` unless given.
+            num_rings: LiDAR name -> rings of the unit; see `to_layout`.
             imu_variances: variances of specific force [m^2/s^4] and of
                 angular velocity [rad^2/s^2].
             with_imu_samples: whether there is a port `imu_samples`.
@@ -200,7 +202,8 @@ class McapRecorder(LeafSystem):
         if with_objects:
             self._add_objects()
         for name in X_BSs:
-            self._add_lidar(name, layouts.get(name, "cns"))
+            rings = (num_rings or {}).get(name)
+            self._add_lidar(name, layouts.get(name, "cns"), rings)
         for name, X_BS in X_BSs.items():
             if X_BS is None:
                 self._add_pose(name, RigidTransform())
@@ -252,12 +255,13 @@ class McapRecorder(LeafSystem):
 
         self._add_port("objects", recorded_topics.OBJECTS_TOPIC, make)
 
-    def _add_lidar(self, name: str, layout: str) -> None:
+    def _add_lidar(self, name: str, layout: str, num_rings: int | None) -> None:
         topic = recorded_topics.points_topic(name)
         encode = messages.encode_point_cloud
 
         def make(scan: np.ndarray, stamp_ns: int) -> dict:
-            made = {topic: encode(to_layout(scan, layout), name, stamp_ns)}
+            points = to_layout(scan, layout, num_rings)
+            made = {topic: encode(points, name, stamp_ns)}
             if layout != "cns":
                 labels = encode(to_labels(scan), name, stamp_ns)
                 made[recorded_topics.labels_topic(name)] = labels

@@ -355,6 +355,14 @@ class Scenario(Section):
         taken = {"map", "base_link", "imu"} & lidars.keys()
         if taken:
             raise ValueError(f"'{taken.pop()}' is the name of another frame")
+        # Every scan has the odometry of its own time.
+        fastest = _fastest(lidars)
+        for name, one in lidars.items():
+            if fastest % one.rate:
+                raise ValueError(
+                    f"{name}.rate: {one.rate} does not divide {fastest}, the "
+                    "rate of the fastest LiDAR"
+                )
         return lidars
 
     @field_validator("imu", "odometry")

@@ -42,7 +42,8 @@ def drive_schedule(scenario: Scenario) -> Schedule:
 
     If the scenario has a number of frames, LiDARs end with the last one. An IMU
     or odometry with its own rate continues until that scan is complete, so that
-    its samples enclose every scan.
+    its samples enclose every scan; and so does `/tf` with motion distortion,
+    which can be put right by it.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -74,6 +75,8 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         until["/imu/data"] = complete
     if scenario.odometry.rate is not None:
         until["/odometry"] = until["/tf"] = complete
+    elif any(one.motion_distortion for one in scenario.lidars.values()):
+        until["/tf"] = complete
     # The number of the first sample at or after the end.
     return make_schedule(
         periods,

@@ -27,6 +27,7 @@ from cns_drake.scene.world import World
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.imu import add_described_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
+from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation import loaded_drive, recording_schedule
 from cns_drake.traffic.traffic_adding import add_traffic, connect_traffic
@@ -208,6 +209,10 @@ def make_station(
             },
             schedule=recording_schedule.drive_schedule(scenario),
             layouts=recording_schedule.point_layouts(scenario),
+            num_rings={
+                n: make_pattern(one).num_rings
+                for n, one in scenario.lidars.items()
+            },
             imu_variances=scenario.imu.noise(scenario.seed).variances(
                 scenario.imu.sample_rate(scenario.fastest_rate)
             ),

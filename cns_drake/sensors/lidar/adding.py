@@ -221,18 +221,29 @@ def add_described_lidar(
     name: str = "lidar",
     seed: int = 0,
     weather: WeatherConfig = _CLEAR,
+    period: float | None = None,
     **options: Any,
 ) -> Lidar:
     """Adds the LiDAR that a description describes to a diagram.
 
-    The body P carries it, or a frame on one does.
+    Args:
+        config: the description.
+        builder: holds `scene_graph`.
+        scene_graph: the SceneGraph to scan.
+        body: P, or a frame on it.
+        X_PS: pose of the sensor in P.
+        name: name of the system.
+        seed: seed of noise and returns.
+        weather: of calibrated returns.
+        period: duration of a turn [s]; by default by the description's rate.
+        options: further arguments of `add_lidar`.
     """
     return add_lidar(
         builder,
         scene_graph,
         body,
         X_PS,
-        make_pattern(config),
+        make_pattern(config, period),
         name=name,
         measurement=MeasurementModel(
             resolution=config.resolution,

@@ -263,8 +263,18 @@ class Lidar(LeafSystem):
         )
         for name, calc, prerequisites, fields in (
             ("point_cloud_S", self._calc_point_cloud_S, scan, _WITH_GREY),
-            ("point_cloud_W", self._calc_positions_W, scan | inputs, _WITH_GREY),
-            ("positions_W", self._calc_positions_W, scan | inputs, _WITHOUT_GREY),
+            (
+                "point_cloud_W",
+                self._calc_positions_W,
+                scan | inputs,
+                _WITH_GREY,
+            ),
+            (
+                "positions_W",
+                self._calc_positions_W,
+                scan | inputs,
+                _WITHOUT_GREY,
+            ),
         ):
             self.DeclareAbstractOutputPort(
                 name,
@@ -537,7 +547,9 @@ class Lidar(LeafSystem):
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
         self._fill(output.get_mutable_value(), p_SRset, scan["intensity"])
 
-    def _calc_positions_W(self, context: Context, output: AbstractValue) -> None:
+    def _calc_positions_W(
+        self, context: Context, output: AbstractValue
+    ) -> None:
         scan = self._measured.Eval(context).scan
         p_WSset, R_WSset = self._calc_poses(context)
         # The pose of S when each point was measured: one, or each column's.

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.sensors.lidar import livox_patterns
-from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
+from cns_drake.sensors.lidar.patterns import SpinningPattern
+
+UnitPattern: TypeAlias = (
+    SpinningPattern
+    | livox_patterns.RosettePattern
+    | livox_patterns.NoddingPattern
+)
 
 
 class LidarPreset(NamedTuple):
     """The beams of a unit, and the source of their numbers."""
 
-    pattern: (
-        SpinningPattern
-        | livox_patterns.RosettePattern
-        | livox_patterns.NoddingPattern
-    )
+    pattern: UnitPattern
     source: str
 
     @classmethod
@@ -66,7 +68,7 @@ def make_beam_pattern(
     num_columns: int | None = None,
     min_range: float | None = None,
     max_range: float | None = None,
-) -> BeamPattern:
+) -> UnitPattern:
     """Returns the pattern of a preset, with other values if given.
 
     Args:
