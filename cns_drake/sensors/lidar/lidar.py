@@ -209,7 +209,7 @@ class Lidar(LeafSystem):
         self.structures = structures
         self.anchored_frames = frozenset(anchored_frames)
         self.num_threads = num_threads
-        self._first = self._latest = _first_turn(pattern.beams(0), returns)
+        self._first = _ready(pattern.beams(0), returns)
         # When each column fires, as a part of a turn.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
@@ -494,12 +494,7 @@ class Lidar(LeafSystem):
         frame = round(time / self.pattern.period) - self.causal
         if self.pattern.repeats:
             return frame, self._first
-        # Two threads may ask for different turns.
-        turn = self._latest
-        if turn.frame != frame:
-            beams = self.pattern.beams(frame)
-            turn = self._latest = _Turn(frame, beams, self._returns)
-        return frame, turn
+        return frame, _ready(self.pattern.beams(frame), self._returns)
 
     def _calc_pose(self, context: Context) -> RigidTransform:
         """Returns the pose of S at the time of the output."""
@@ -753,17 +748,14 @@ class BeamTable(NamedTuple):
 
 
 class _Turn:
-    """The beams of a turn of a number, ready for casting and assembling.
+    """The beams of a turn, ready for casting and assembling.
 
     `d_Sset_cast` has (N, 3) directions in the order of casting, `table` what
     beams add to points, and `calibrated` the same for calibrated returns, None
     for ideal ones. `beams` are in firing order.
     """
 
-    def __init__(
-        self, frame: int, beams: Beams, returns: CalibratedReturns | None
-    ):
-        self.frame = frame
+    def __init__(self, beams: Beams, returns: CalibratedReturns | None):
         self.beams = beams
         self.d_Sset_cast = beams.d_Sset[beams.packet_order]
         d_Sset, p_Sset = beams.d_Sset, np.zeros((0, 3))
@@ -781,12 +773,12 @@ class _Turn:
 
 
 @lru_cache(maxsize=4)
-def _first_turn(beams: Beams, returns: CalibratedReturns | None) -> _Turn:
-    """Returns turn 0, the same for all LiDARs that are alike.
+def _ready(beams: Beams, returns: CalibratedReturns | None) -> _Turn:
+    """Returns a turn, the same for all LiDARs that are alike.
 
     Drake's bindings may keep a dropped Diagram, and with it its LiDARs.
     """
-    return _Turn(0, beams, returns)
+    return _Turn(beams, returns)
 
 
 @compiled

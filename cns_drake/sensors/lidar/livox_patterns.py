@@ -7,6 +7,7 @@ Directions depend only on the time, so that a frame is always the same.
 
 from abc import abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
+from functools import lru_cache
 import math
 
 import numpy as np
@@ -69,20 +70,29 @@ class _TimedPattern(BeamPattern):
         return max(round(points / self.num_lines), 1)
 
     def beams(self, frame: int) -> Beams:
-        firing = np.arange(self.num_firings)
-        step = self.period / self.num_firings
-        # A float can hold the number of any frame.
-        first = float(frame * self.num_firings)
-        d_Sset = self._directions((first + firing) * step)
-        return make_beams(
-            d_Sset.reshape(-1, 3),
-            np.tile(np.arange(self.num_lines), self.num_firings),
-            np.repeat(np.round(firing * step * 1e9), self.num_lines),
-        )
+        return _fire(self, frame)
 
     @abstractmethod
-    def _directions(self, times: np.ndarray) -> np.ndarray:
+    def directions(self, times: np.ndarray) -> np.ndarray:
         """Returns the (num_firings, num_lines, 3) directions at times [s]."""
+
+
+@lru_cache(maxsize=4)
+def _fire(pattern: _TimedPattern, frame: int) -> Beams:
+    """Returns the beams of a frame, the same for all patterns that are equal.
+
+    Drake's bindings may keep a dropped Diagram, and with it its patterns.
+    """
+    firing = np.arange(pattern.num_firings)
+    step = pattern.period / pattern.num_firings
+    # A float can hold the number of any frame.
+    first = float(frame * pattern.num_firings)
+    d_Sset = pattern.directions((first + firing) * step)
+    return make_beams(
+        d_Sset.reshape(-1, 3),
+        np.tile(np.arange(pattern.num_lines), pattern.num_firings),
+        np.repeat(np.round(firing * step * 1e9), pattern.num_lines),
+    )
 
 
 @dataclass(frozen=True)
@@ -118,7 +128,7 @@ class RosettePattern(_TimedPattern):
                 "beyond 0 to 360 deg, or 0 to 180 deg"
             )
 
-    def _directions(self, times: np.ndarray) -> np.ndarray:
+    def directions(self, times: np.ndarray) -> np.ndarray:
         first, second = (2.0 * np.pi * hz * times for hz in _PRISMS_HZ)
         bend = np.deg2rad(self.fov_deg) / 4.0
         left = bend * (np.cos(first) + np.cos(second))
@@ -172,7 +182,7 @@ class NoddingPattern(_TimedPattern):
                 "the highest, within -90 to 90 deg"
             )
 
-    def _directions(self, times: np.ndarray) -> np.ndarray:
+    def directions(self, times: np.ndarray) -> np.ndarray:
         azimuth = (np.pi - 2.0 * np.pi * _TURNS_HZ * times)[:, None]
         phase = _NODS_HZ * times % 1.0
         height = 1.0 - np.abs(2.0 * phase - 1.0)  # 0 up to 1, and down.
