@@ -290,7 +290,7 @@ def test_patterns_that_never_repeat_have_limits_of_their_own():
         (lambda: RosettePattern(0, points_per_second=9, **common), "fov_deg 0"),
         (
             lambda: RosettePattern(9, points_per_second=0, **common),
-            "points_per",
+            "points_",
         ),
         (
             lambda: RosettePattern(
@@ -309,7 +309,7 @@ def test_the_latest_time_that_a_point_can_have():
     options = {"min_range": 0.1, "max_range": 9.0, "period": 60.0}
     pattern = DirectionPattern([[1, 0, 0]] * 2, times=[0.0, last], **options)
     assert pattern.beams(0).t_ns.tolist() == [0, 2**32 - 1]
-    with pytest.raises(ValueError, match="a firing time .* 4294967296 is not"):
+    with pytest.raises(ValueError, match=r"a firing time .* 4294967296"):
         DirectionPattern([[1, 0, 0]], times=[last + 1e-9], **options)
     # The last of ten columns fires after nine tenths of a turn.
     assert SpinningPattern((0.0,), 10, 0.1, 9.0, 4.77).beams(0).t_ns[-1] > 4e9
