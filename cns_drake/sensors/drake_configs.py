@@ -27,6 +27,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 
 from cns_drake.base.errors import describe_validation_error
+from cns_drake.scene.drake_releases import find_bus
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
@@ -351,7 +352,7 @@ def _interface(
     if lcm is not None:
         return lcm
     if lcm_buses is not None:
-        return lcm_buses.Find(caller, config.lcm_bus)
+        return find_bus(builder, lcm_buses, caller, config.lcm_bus)
     if config.lcm_bus != "default":
         raise RuntimeError(
             f"{caller}: lcm_bus: there is no bus '{config.lcm_bus}' without "

@@ -30,6 +30,7 @@ from cns_drake import (
     add_lidar,
     load_scenario,
 )
+from cns_drake.scene.drake_releases import find_bus
 
 X_WR = RigidTransform(RollPitchYaw(0.0, 0.0, 0.6), [1.0, -2.0, 0.5])
 X_RS = RigidTransform(RollPitchYaw(0.1, -0.2, 2.0), [0.3, 0.1, 0.9])
@@ -308,7 +309,7 @@ def test_buses_by_name():
             LcmSubscriberSystem.Make(
                 "DRAKE_POINT_CLOUD_roof",
                 lcmt_point_cloud,
-                buses.Find("test", name),
+                find_bus(builder, buses, "test", name),
             ),
         )
     simulator = Simulator(builder.Build())
