@@ -1,6 +1,6 @@
 """Prints a digest of the messages of each topic of a recording.
 
-    python tests/helpers/message_digests.py FOLDER
+python tests/helpers/message_digests.py FOLDER
 """
 
 import hashlib

@@ -96,7 +96,7 @@ def make_beam_pattern(
     base = LIDAR_PRESETS[preset].pattern
     if num_columns is not None and base.num_columns is None:
         raise ValueError(f"the preset '{preset}' has no columns")
-    if preset in _STEADY and period and not num_columns:
+    if base.num_columns and preset in _STEADY and period and not num_columns:
         num_columns = max(round(base.num_columns * period / base.period), 1)
     changes: dict[str, Any] = {
         "period": period,

@@ -93,9 +93,14 @@ class CalibratedReturns:
     def materials(
         self,
         geometries: Sequence[PerceptionGeometry],
-        structures: StructureTable | None,
+        structures: object,
     ) -> Materials:
-        """Returns the materials of geometries; rain wets the ground."""
+        """Returns the materials of geometries; rain wets the ground.
+
+        Structures have classes if they are a `StructureTable`.
+        """
+        if not isinstance(structures, StructureTable):
+            structures = StructureTable(())
         is_wet = self.weather.rain > 0.0
         return find_materials(geometries, structures, is_wet=is_wet)
 

@@ -74,7 +74,7 @@ class Materials(NamedTuple):
 
 def find_materials(
     geometries: Sequence[PerceptionGeometry],
-    structures: StructureTable | None,
+    structures: StructureTable,
     *,
     is_wet: bool,
 ) -> Materials:
@@ -87,7 +87,7 @@ def find_materials(
     Surfaces of a given reflectivity are even and reflect after Lambert.
     """
     names = [geometry.structure for geometry in geometries]
-    table = (structures or StructureTable(())).completed(names)
+    table = structures.completed(names)
     rows = [
         _material(geometry, table[name], is_wet)
         for geometry, name in zip(geometries, names, strict=True)
