@@ -55,13 +55,17 @@ class RecordedCamera(NamedTuple):
 class RecordedSensor(NamedTuple):
     """A further sensor of a recording, with a port of its name.
 
-    X_BC is the pose of its frame C, which has its name, in the vehicle's frame
-    B. The port's value, the frame's name and the time [ns] make a message.
+    X_BC is the pose of its frame C, which has the sensor's name unless another
+    one is given, in the vehicle's frame B. The port's value, the frame's name
+    and the time [ns] make a message. The example has the type of a value that
+    is no Python object.
     """
 
     topic: Topic
     X_BC: RigidTransform
     make_message: Callable[[Any, str, int], Any]
+    frame: str | None = None
+    example: Any = None
 
 
 class McapRecorder(LeafSystem):
@@ -179,7 +183,7 @@ class McapRecorder(LeafSystem):
         self._X_BCs = {name: X for name, X in X_BSs.items() if X is not None}
         if X_BI is not None:
             self._X_BCs[messages.IMU_FRAME] = X_BI
-        self._X_BCs |= {name: sensor.X_BC for name, sensor in further.items()}
+        self._X_BCs |= {s.frame or n: s.X_BC for n, s in further.items()}
         # Frame on the map -> the port with its pose, and the pose from there.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
         # A topic, and what makes the messages at its times, on others as well.
@@ -226,10 +230,14 @@ class McapRecorder(LeafSystem):
         self._poses[name] = (port, X_PC)
 
     def _add_port(
-        self, name: str, topic: Topic, make: Callable[[Any, int], dict]
+        self,
+        name: str,
+        topic: Topic,
+        make: Callable[[Any, int], dict],
+        example: object = None,
     ) -> None:
         """Declares a port; `make` takes its value and the time [ns]."""
-        port = self._declare(name, object())
+        port = self._declare(name, object() if example is None else example)
 
         def make_all(context: Context, stamp_ns: int) -> dict[Topic, Any]:
             value = _value_of(port, context)
@@ -274,8 +282,11 @@ class McapRecorder(LeafSystem):
             name,
             sensor.topic,
             lambda value, stamp_ns: {
-                sensor.topic: sensor.make_message(value, name, stamp_ns)
+                sensor.topic: sensor.make_message(
+                    value, sensor.frame or name, stamp_ns
+                )
             },
+            sensor.example,
         )
 
     def _add_camera(self, name: str, info: CameraInfo) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import FrameId, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
@@ -24,6 +25,8 @@ from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import World
+from cns_drake.sensors.camera.camera import add_cameras
+from cns_drake.sensors.camera.camera_scene import CameraScene
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.imu import add_described_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
@@ -58,8 +61,9 @@ def make_station(
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry`, `geometry_query`; `imu_samples` of such
-    an IMU; with traffic `objects`; and the port of each further sensor under
-    its name.
+    an IMU; with traffic `objects`; the port of each further sensor under its
+    name; and of each camera `<camera>_image`, `<camera>_depth` and
+    `<camera>_label`.
 
     Args:
         scenario: the scenario to build.
@@ -189,6 +193,21 @@ def make_station(
             seed=scenario.seed,
         )
 
+    further = {
+        name: RecordedSensor(
+            sensor.topic(name), sensor_pose(sensor), sensor.make_message
+        )
+        for name, sensor in scenario.further_sensors.items()
+    }
+    if scenario.cameras:
+        scene = _copy_for_cameras(scene_graph, world)
+        scene.connect(builder, poses.get_output_port())
+        frame = plant.GetBodyFrameIdOrThrow(base.index())
+        for name, (port, recorded) in add_cameras(
+            builder, scene, frame, scenario.cameras
+        ).items():
+            measured[name], further[name] = port, recorded
+
     if moving is not None:
         measured["objects"] = moving.GetOutputPort("objects")
     if page is not None:
@@ -201,12 +220,7 @@ def make_station(
             bag,
             X_BSs={n: sensor_pose(one) for n, one in scenario.lidars.items()},
             X_BI=sensor_pose(scenario.imu),
-            further={
-                name: RecordedSensor(
-                    sensor.topic(name), sensor_pose(sensor), sensor.make_message
-                )
-                for name, sensor in scenario.further_sensors.items()
-            },
+            further=further,
             schedule=recording_schedule.drive_schedule(scenario),
             layouts=recording_schedule.point_layouts(scenario),
             num_rings={
@@ -231,6 +245,29 @@ def make_station(
     diagram = builder.Build()
     diagram.set_name(scenario.name)
     return diagram
+
+
+def _copy_for_cameras(scene_graph: SceneGraph, world: World) -> CameraScene:
+    """Returns what cameras on the vehicle see."""
+    plant, inspector = world.plant, scene_graph.model_inspector()
+    context = plant.CreateDefaultContext()
+    world_frame = inspector.world_frame_id()
+
+    def calc_X_WF(frame: FrameId) -> RigidTransform:
+        if frame == world_frame:
+            return RigidTransform()
+        return plant.GetBodyFromFrameId(frame).EvalPoseInWorld(context)
+
+    base = plant.GetBodyByName("base_link", world.vehicle)
+    bodies = plant.GetBodyIndices(world.vehicle)
+    return CameraScene(
+        scene_graph,
+        world.structures,
+        calc_X_WF,
+        anchored=world.anchored_frames() | {world_frame},
+        vehicle={plant.GetBodyFrameIdIfExists(body) for body in bodies},
+        base=plant.GetBodyFrameIdOrThrow(base.index()),
+    )
 
 
 class _FramePoses(LeafSystem):
