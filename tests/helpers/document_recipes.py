@@ -833,8 +833,7 @@ NOT_RUN = {
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
     "network and runs these tests; `.ci/run` takes this very line",
     "apt install": "changes the system; `.ci/run` installs the same packages",
-    ".ci/drake_ends": "installs from the network, for each Python; the workflow "
-    "runs it",
+    ".ci/drake_ends": "installs from the network; the workflow runs it",
     "npm ci": "installs from the network; `.ci/run` does it",
     ".venv/bin/mypy && .venv/bin/lint-imports": (
         "these read this project, not an example; tests/packages runs them"

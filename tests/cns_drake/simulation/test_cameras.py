@@ -4,6 +4,7 @@ Oracle: the points of an exact LiDAR, projected by the messages alone.
 """
 
 import io
+import shutil
 
 from helpers.message_digests import message_digests
 from helpers.tiny_drive import tiny_scenario
@@ -223,3 +224,16 @@ def test_camera_of_the_command_line():
     for text in ("640x480", "640@2", "-1x3@2", "640x480@2.5", "a", "6x4@2 "):
         with pytest.raises(InputError, match="not of the form WxH@RATE"):
             _camera_fields(text)
+
+
+def test_an_interrupted_recording_goes_on_to_the_same_bytes(
+    recording, tmp_path
+):
+    mcap = (recording / "tiny_01_0.mcap").read_bytes()
+    folder = tmp_path / "tiny_01"
+    folder.mkdir()
+    (folder / "tiny_01_0.mcap.part").write_bytes(mcap[: len(mcap) * 7 // 10])
+    shutil.copy(recording / "fingerprint.txt", folder / "fingerprint.txt.part")
+    run = simulate(load_scenario(recording / "scenario.yaml"), tmp_path)
+    assert 0 < run.resumed_frames < FRAMES
+    assert (folder / "tiny_01_0.mcap").read_bytes() == mcap
