@@ -31,7 +31,7 @@ EXACT_COVARIANCE = _EXACT * np.eye(6).ravel()
 _MARK = 0x3A17C0DE
 IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
-# Of 100; colours are right to a few levels.
+# At 90 of 100, colours are right to a few levels.
 _JPEG_QUALITY = 90
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 # Kind of image -> its encoding in ROS.

@@ -240,7 +240,7 @@ def test_patterns_that_are_none(directions, options, fault):
     ],
 )
 def test_impossible_limits(limits, fault):
-    """Of every kind of pattern, a kind of one's own included."""
+    """Every kind of pattern refuses them, a kind of one's own included."""
     low, high, period = limits
     given = {"min_range": low, "max_range": high, "period": period}
 
