@@ -126,13 +126,18 @@ def add_lidar(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
             "preset"
         )
-    if returns == "calibrated" and preset is not None:
+    if returns != "ideal":
         from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
-        returns = CalibratedReturns.of_preset(
-            preset, seed=seed, sensor_name=name
-        )
-    if not isinstance(returns, str):
+        if returns == "calibrated" and preset is not None:
+            returns = CalibratedReturns.of_preset(
+                preset, seed=seed, sensor_name=name
+            )
+        if not isinstance(returns, CalibratedReturns):
+            raise ValueError(
+                f"returns: {returns!r}: give 'ideal', 'calibrated' with the "
+                "name of a preset as pattern, or CalibratedReturns"
+            )
         if preset is not None:
             pattern = returns.sheet.aimed(pattern)
         if range_noise or dropout:
@@ -141,11 +146,6 @@ def add_lidar(
                 "leave these out"
             )
         options["returns"] = returns
-    elif returns != "ideal":
-        raise ValueError(
-            f"returns: {returns!r}: give 'ideal', 'calibrated' with the name "
-            "of a preset as pattern, or CalibratedReturns"
-        )
     elif range_noise or dropout or seed:
         if "measurement" in options:
             raise ValueError(
