@@ -4,9 +4,10 @@
 
 A new process imports and scans; Downtown is scanned by 128 x 1024 beams,
 without and with 300 boxes that move between any two scans; then one geometry
-changes, of a box and of the city; and a world of 20,000 shapes is built and scanned; and Drake's own depth image and
-signed distances cast on 1,000 shapes, as the LiDAR does. Times are the
-processor's, on one thread, medians of 15 scans or more.
+changes, of a box and of the city; and a world of 20,000 shapes is built and
+scanned; and Drake's own depth image and signed distances cast on 1,000 shapes,
+as the LiDAR does. Times are the processor's, on one thread, medians of 15 scans
+or more.
 """
 
 from __future__ import annotations
