@@ -29,7 +29,11 @@ from cns_drake.scene.gazebo_worlds import (
 )
 from cns_drake.scene.gltf_check import GLTF, check_gltf
 from cns_drake.scene.model_check import check_model
-from cns_drake.scene.perception_geometry import check_shape, structure_name
+from cns_drake.scene.perception_geometry import (
+    anchored_frames,
+    check_shape,
+    structure_name,
+)
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
 
 
@@ -181,13 +185,6 @@ class World:
     def anchored_frames(self) -> frozenset[FrameId]:
         """Returns the geometry frames that can never move."""
         return anchored_frames(self.plant)
-
-
-def anchored_frames(plant: MultibodyPlant) -> frozenset[FrameId]:
-    """Returns the geometry frames of a plant that can never move."""
-    bodies = plant.GetBodiesWeldedTo(plant.world_body())
-    frames = (plant.GetBodyFrameIdIfExists(body.index()) for body in bodies)
-    return frozenset(frame for frame in frames if frame is not None)
 
 
 def load_world(

@@ -133,7 +133,9 @@ class Survey:
             with_vehicle=False,
             trajectory=self.simulated.trajectory,
         )
-        return still_scene(world, self.simulated.pattern)
+        simulated = self.simulated
+        X_WS = simulated.X_WBs[0] @ simulated.X_BS
+        return still_scene(world, X_WS, simulated.pattern)
 
 
 def open_survey(place: str | Path) -> Survey:

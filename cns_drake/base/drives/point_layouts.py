@@ -177,7 +177,9 @@ _LAYOUTS = {
 }
 
 
-def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
+def to_layout(
+    points: np.ndarray, layout: str, num_rings: int | None = None
+) -> np.ndarray:
     """Returns points in a layout.
 
     Args:
@@ -185,6 +187,8 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
             0 to 1, or, if one is larger, calibrated ones up to 255.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
+        num_rings: of the unit. In `velodyne`, whose driver counts rings from
+            below, they are then turned round.
 
     Returns:
         (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
@@ -213,6 +217,8 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
     }
     if layout == "autoware":
         columns["intensity"] = brightness
+    if layout == "velodyne" and num_rings is not None:
+        columns["ring"] = num_rings - 1 - points["ring"].astype(int)
     dtype = _LAYOUTS[layout]
     made = np.zeros(len(points), dtype)
     for name in dtype.names or ():

@@ -113,6 +113,15 @@ def test_calibrated_intensities_come_back(points, layout):
         np.testing.assert_array_equal(read["reflectivity"], points["intensity"])
 
 
+def test_velodynes_driver_counts_rings_from_below(points):
+    for layout, from_below in (("velodyne", True), ("ouster", False)):
+        ring = to_layout(points, layout, 128)["ring"].astype(int)
+        expected = points["ring"].astype(int)
+        if from_below:
+            expected = 127 - expected
+        np.testing.assert_array_equal(ring, expected)
+
+
 def test_derived_fields(points):
     p = np.stack([points[axis].astype(float) for axis in "xyz"], axis=1)
     distance = np.linalg.norm(p, axis=1)
