@@ -32,6 +32,7 @@ from cns_drake.scenarios.scenario import (
     TrafficConfig,
     TransientConfig,
 )
+from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.odometry.config import OdometrySection
@@ -51,6 +52,7 @@ SCENARIO: Sections = {
     "Traffic": TrafficConfig,
     "Transient": TransientConfig,
     "LiDARs": LidarSection,
+    "Cameras": CameraSection,
     "IMU": ImuSection,
     "Weather": WeatherConfig,
     "Odometry": OdometrySection,

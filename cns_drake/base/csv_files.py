@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes, write_text
+from cns_drake.base.files import read_text, write_text
 
 # Column of files of earlier versions -> what it is called now.
 _FORMER_COLUMNS = {
@@ -43,16 +43,12 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
     Raises:
         InputError: the file cannot be read or is not CSV in UTF-8.
     """
-    content = read_bytes(path)
+    text = read_text(path)
     try:
-        reader = csv.reader(
-            content.decode("utf-8-sig").splitlines(), skipinitialspace=True
-        )
+        reader = csv.reader(text.splitlines(), skipinitialspace=True)
         rows = [
             (reader.line_num, [cell.strip() for cell in row]) for row in reader
         ]
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text") from error
     except csv.Error as error:
         raise InputError(f"{path}: not CSV: {error}") from error
     return [(line, row) for line, row in rows if any(row)]

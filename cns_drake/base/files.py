@@ -1,5 +1,6 @@
 """Writing files that appear under their names only when they are whole."""
 
+import codecs
 from collections.abc import Callable, Iterator
 import contextlib
 import fcntl
@@ -124,6 +125,30 @@ def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
     if len(content) > limit:
         raise InputError(f"{path}: larger than {limit} bytes")
     return content
+
+
+def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:
+    """Reads a text file of at most `limit` bytes; see `decode_text`.
+
+    Raises:
+        InputError: if it cannot be read, or is no text.
+    """
+    try:
+        return decode_text(read_bytes(path, limit))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text") from error
+
+
+def decode_text(data: bytes) -> str:
+    """Returns text in UTF-8, or in UTF-16 with a mark; the mark is left out.
+
+    Editors of Windows begin files with such a byte order mark.
+
+    Raises:
+        UnicodeDecodeError: if it is neither.
+    """
+    is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return data.decode("utf-16" if is_utf16 else "utf-8-sig")
 
 
 def file_name(text: str) -> str:

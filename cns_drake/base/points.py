@@ -88,6 +88,8 @@ def to_xyzi(scan: np.ndarray) -> np.ndarray:
     """
     xyzi = np.empty((len(scan), 4), dtype="<f4")
     for column, name in enumerate(_XYZI):
+        if name not in (scan.dtype.names or ()):
+            raise ValueError(f"its points have no field {name}")
         xyzi[:, column] = scan[name]
     return xyzi
 

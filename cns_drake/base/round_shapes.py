@@ -1,7 +1,6 @@
 """Polyhedra in place of round shapes."""
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 
 def revolved(
@@ -17,6 +16,9 @@ def revolved(
         (V, 3) vertices [m]; (M, 3) int32 triangles, counter-clockwise seen
         from outside.
     """
+    # Slow to import, and most scenes have no round shapes.
+    from scipy.spatial import ConvexHull
+
     angle = 2.0 * np.pi * np.arange(sides)[:, None] / sides
     xyz = radius * np.cos(angle), radius * np.sin(angle), z
     upper = np.stack(np.broadcast_arrays(*xyz), axis=-1).reshape(-1, 3)

@@ -73,13 +73,12 @@ def make_program(
                 super().format_commands(ctx, formatter)
             widest = max(map(len, self.commands))
             for heading, names in (groups or {}).items():
-                limit = formatter.width - widest - 6
                 with formatter.section(heading):
                     formatter.write_dl(
                         [
                             (
                                 f"{one:<{widest}}",
-                                self.commands[one].get_short_help_str(limit),
+                                self.commands[one].get_short_help_str(500),
                             )
                             for one in names
                         ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 from pathlib import Path
+import re
 from typing import cast
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -71,6 +72,27 @@ class Element(ElementTree.Element):
         return value
 
 
+# What holds no elements; it may lack its end.
+_COMMENT = re.compile(
+    rb"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)", re.DOTALL
+)
+
+
+def without_comments(content: bytes) -> bytes:
+    """Returns a file without the text of its comments.
+
+    XML forbids two dashes there, which many programs write and read.
+    """
+
+    def cleared(found: re.Match[bytes]) -> bytes:
+        text = found[0]
+        if text.startswith(b"<!--") and text.endswith(b"-->"):
+            return b"<!--" + b"\n" * text.count(b"\n") + b"-->"
+        return text
+
+    return _COMMENT.sub(cleared, content)
+
+
 def read_elements(
     path: Path, root: str | None = None, encoding: str | None = None
 ) -> Element:
@@ -123,7 +145,8 @@ def read_elements(
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = lambda *_: refuse("holds a document type")
     try:
-        parser.Parse(read_bytes(path, _MOST_BYTES), True)
+        content = without_comments(read_bytes(path, _MOST_BYTES))
+        parser.Parse(content, True)
     except expat.ExpatError as error:
         raise InputError(
             f"{path}: cannot be parsed: line {error.lineno}:"

@@ -28,6 +28,7 @@ def run_drive(
     driver: Literal["real", "none"] | None = None,
     ride: str | None = None,
     imu_rate: int | None = None,
+    camera: Mapping[str, int] | None = None,
     recording: Path | str | None = None,
     graphviz: Path | str | None = None,
     overwrite: bool = False,
@@ -48,6 +49,7 @@ def run_drive(
             place of the scenario's.
         ride: class of the road, A to E, or `none`, in place of the scenario's.
         imu_rate: samples per second of the IMU, in place of the scenario's.
+        camera: fields of a further camera, `camera`, with depths and labels.
         recording: where to save a web page of the drive.
         graphviz: where to save the Diagram as Graphviz text.
         overwrite: replace an existing recording.
@@ -84,6 +86,11 @@ def run_drive(
     if imu_rate is not None:
         change = {"imu": {"rate": imu_rate}}
         scenario = scenario.with_fields(change, "--imu-rate")
+    if camera is not None:
+        fields = {"depth": True, "label": True, **camera}
+        scenario = scenario.with_fields(
+            {"cameras": {"camera": fields}}, "--camera"
+        )
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
     with progress_bars.show_progress() as progress:

@@ -103,7 +103,8 @@ def export_pairs(
             --exact-overlaps reads, of a database and a query.
         output: Folder of the set; created if need be.
         vary: Export the members of a family, too.
-        held_out: A drive for the evaluation alone; may be repeated.
+        held_out: A drive for the evaluation alone, also among the others; may
+            be repeated.
         spacing: Between two clouds of a drive.
         scans: Merge N consecutive scans into each cloud, a submap.
         max_range: Leave out points with a greater x, y or z; by default 50, for
@@ -120,8 +121,7 @@ def export_pairs(
     cluster = choose_cluster(jobs, scheduler)
     tested = [load_scenario(name) for name in held_out or ()]
     if not names and vary is None:
-        taken = {one.name for one in tested}
-        names = [one for one in recordable_drives() if one not in taken]
+        names = list(recordable_drives())
     learned = [load_scenario(name) for name in names or ()]
     if vary is not None:
         learned += family_members(vary, output, cluster)
@@ -139,11 +139,13 @@ def export_pairs(
             )
         )
         return
+    taken = {one.name for one in tested}
+    learned = [one for one in learned if one.name not in taken]
     options = pair_export.ExportOptions(
         format, spacing, scans, max_range or 50.0
     )
     for path in pair_export.export_pairs(
-        learned, tested, output, options, cluster
+        learned, tested, output, options, cluster, terminal.note
     ):
         print(path)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+import re
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -118,6 +119,7 @@ def simulate(
     driver: Literal["real", "none"] | None = None,
     ride: Literal["A", "B", "C", "D", "E", "none"] | None = None,
     imu_rate: Annotated[int | None, typer.Option(metavar="HZ")] = None,
+    camera: Annotated[str | None, typer.Option(metavar="WxH@RATE")] = None,
     recording: options.Recording = None,
     graphviz: options.Graphviz = None,
     overwrite: options.Overwrite = False,
@@ -136,6 +138,8 @@ def simulate(
         ride: Put the car on springs, on a road of a class of ISO 8608 from A
             (new) to E (very poor).
         imu_rate: Samples of the IMU a second, in place of the scenario's.
+        camera: A camera that looks ahead, of so many pixels, images a second,
+            such as 640x480@2; with depths and classes.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive
@@ -153,10 +157,22 @@ def simulate(
         driver=driver,
         ride=ride,
         imu_rate=imu_rate,
+        camera=None if camera is None else _camera_fields(camera),
         recording=recording,
         graphviz=graphviz,
         overwrite=overwrite,
     )
+
+
+def _camera_fields(text: str) -> dict[str, int]:
+    """Returns width, height and rate of `--camera`."""
+    match = re.fullmatch(r"(\d{1,9})x(\d{1,9})@(\d{1,9})", text)
+    if match is None:
+        raise InputError(
+            f"--camera: '{text}' is not of the form WxH@RATE, such as 640x480@2"
+        )
+    width, height, rate = map(int, match.groups())
+    return {"width": width, "height": height, "rate": rate}
 
 
 def _switches(texts: Iterable[str]) -> dict[str, str]:
@@ -278,6 +294,9 @@ def export(
     output: Annotated[Path, typer.Option()],
     sensor: Annotated[str | None, typer.Option(metavar="NAME")] = None,
     absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
+    sequence: Annotated[
+        int | None, typer.Option(metavar="NN", min=0, max=999)
+    ] = None,
 ) -> None:
     """Export a recording to a common layout.
 
@@ -290,6 +309,8 @@ def export(
         absent_in: Label points on structures that this stage of the map lacks
             with SemanticKITTI's labels of moving objects (252 to 259); with
             kitti.
+        sequence: Number of the drive, sequences/NN; with kitti. By default the
+            digits at the end of its name.
     """
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
@@ -302,6 +323,8 @@ def export(
             output,
             lidar=sensor,
             absent_in=absent_in,
+            sequence=sequence,
+            on_note=note,
             on_frame=count_progress(progress, task),
         )
     typer.echo(drive)

@@ -5,16 +5,17 @@ describes its files, marks it as ours. A drive's own folder grows under a
 `.part` name and gets its final one when all of it is there.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import os
 from pathlib import Path
 import shutil
 
 from cns_drake.base import files
+from cns_drake.base.drives.deskewing import deskew
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.export.layouts import CNS, KITTI, TUM, Layout
+from cns_drake.export.layouts import CNS, KITTI, TUM, Layout, kitti_layout
 from cns_drake.recording.rosbag2_metadata import to_yaml
 
 _LAYOUTS = {"cns": CNS, "kitti": KITTI, "tum": TUM}
@@ -28,6 +29,8 @@ def export_drive(
     *,
     lidar: str | None = None,
     absent_in: str | None = None,
+    sequence: int | None = None,
+    on_note: Callable[[str], None] = lambda note: None,
     on_frame: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Exports a recording.
@@ -38,6 +41,10 @@ def export_drive(
         lidar: name of the LiDAR to export, if the recording has several.
         absent_in: another stage of the recording's map; points of structures
             that are absent there get the labels of `MarkedDrive`.
+        sequence: number of the drive in KITTI's layout; by default the digits
+            at the end of its name.
+        on_note: takes notes on how the recording was read and written.
+        on_frame: takes how many frames of how many are written.
 
     Returns:
         The folder of the drive.
@@ -50,6 +57,8 @@ def export_drive(
     layout = _LAYOUTS[format_name]
     if absent_in is not None and not layout.has_labels:
         raise InputError(f"--absent-in: {format_name} has no labels; use kitti")
+    if sequence is not None and layout is not KITTI:
+        raise InputError(f"--sequence: {format_name} has no numbers; use kitti")
     if not holds_mcap(recording):
         raise InputError(f"{recording}: no recording (.mcap) there")
     if absent_in is None:
@@ -59,6 +68,8 @@ def export_drive(
         from cns_drake.export.marked_drive import MarkedDrive
 
         drive = MarkedDrive(recording, lidar, absent_in)
+    if sequence is not None:
+        layout = kitti_layout(f"{sequence:02d}")
     folder = output / layout.drive_folder(drive)
     outer = {
         output / name: text for name, text in layout.outer_files(drive).items()
@@ -80,6 +91,8 @@ def export_drive(
                 )
     part = files.part_path(folder)
     try:
+        for note in _notes(drive, layout):
+            on_note(note)
         _write_drive(drive, layout, part, on_frame)
         for path, text in outer.items():
             files.make_folder(path.parent)
@@ -89,6 +102,29 @@ def export_drive(
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return folder
+
+
+def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
+    """Yields notes on how a drive is read and written."""
+    if layout.scan_files is None:
+        return
+    for note in drive.notes:
+        if drive.distortion_note == note:
+            note = (
+                f"{drive.name}: taken while the LiDAR moved; the motion is"
+                " taken out, and points are written as at the scan's stamp"
+            )
+        yield note
+    scan = drive.scan(0)
+    if (
+        not drive.lidar_section
+        and "intensity" in (scan.dtype.names or ())
+        and scan["intensity"].max(initial=0.0) > 1.0
+    ):
+        yield (
+            f"{drive.name}: intensities above 1 are written as recorded; those"
+            " of KITTI end at 0.99"
+        )
 
 
 def _claim(output: Path, format_name: str) -> None:
@@ -139,11 +175,14 @@ def _write_drive(
         if layout.scan_files is None:
             on_frame(len(drive), len(drive))
             return
-        for frame, (stamp_ns, scan) in enumerate(
-            zip(drive.stamps_ns.tolist(), drive, strict=True)
-        ):
+        for frame, stamp_ns in enumerate(drive.stamps_ns.tolist()):
+            scan = (
+                drive.scan(frame)
+                if drive.distortion_note is None
+                else deskew(drive, frame)
+            )
             try:
-                made = layout.scan_files(frame, stamp_ns, scan)
+                made = layout.scan_files(drive, frame, stamp_ns, scan)
             except ValueError as error:
                 where = f"{drive.name}: scan {frame}"
                 raise InputError(f"{where}: {error}") from error

@@ -44,8 +44,8 @@ class Layout:
         inner_files: drive -> path -> text of the files in that folder, relative
             to it, without the scans.
         outer_files: likewise outside that folder.
-        scan_files: frame number, stamp [ns] and scan -> its files: path in the
-            drive's folder -> content. None for layouts without scans.
+        scan_files: drive, frame number, stamp [ns] and scan -> its files: path
+            in the drive's folder -> content. None for layouts without scans.
         shared_outer_files: whether all drives share the outer files, which must
             then agree.
         has_labels: whether points have labels.
@@ -54,7 +54,9 @@ class Layout:
     drive_folder: Callable[[McapDrive], PurePosixPath]
     inner_files: Callable[[McapDrive], dict[str, str]]
     outer_files: Callable[[McapDrive], dict[str, str]] = lambda drive: {}
-    scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]] | None = None
+    scan_files: (
+        Callable[[McapDrive, int, int, np.ndarray], dict[str, bytes]] | None
+    ) = None
     shared_outer_files: bool = False
     has_labels: bool = False
 
@@ -178,7 +180,7 @@ CNS = Layout(
     _cns_folder,
     _cns_inner_files,
     outer_files=_cns_outer_files,
-    scan_files=lambda _, stamp_ns, scan: {
+    scan_files=lambda _, frame, stamp_ns, scan: {
         f"pcd/{stamp_ns}.pcd": encode_pcd(scan)
     },
     shared_outer_files=True,
@@ -217,10 +219,28 @@ def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
     }
 
 
+def _in_kittis_scale(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
+    """Returns a scan whose calibrated intensities have KITTI's scale.
+
+    That is a byte / 256 in hundredths, at most 0.99, as the scans of KITTI
+    odometry 00 show. Ideal intensities, from 0 to 1, stay as they are, and so
+    do those of other recorders, whose unit is not known.
+    """
+    if drive.lidar_section.get("returns") != "calibrated":
+        return scan
+    # The intensities of this preset are fitted to KITTI's hundredths.
+    is_kittis = drive.lidar_section.get("preset") == "hdl-64e"
+    hundredths = scan["intensity"] * (1.0 if is_kittis else 100.0 / 256.0)
+    scaled = scan.copy()
+    scaled["intensity"] = np.minimum(np.rint(hundredths), 99.0) / 100.0
+    return scaled
+
+
 def _kitti_scan_files(
-    frame: int, stamp_ns: int, scan: np.ndarray
+    drive: McapDrive, frame: int, stamp_ns: int, scan: np.ndarray
 ) -> dict[str, bytes]:
     del stamp_ns
+    scan = _in_kittis_scale(drive, scan)
     files = {f"velodyne/{frame:06d}.bin": encode_bin(scan)}
     if {"label", "instance"} <= set(scan.dtype.names or ()):
         files[f"labels/{frame:06d}.label"] = encode_labels(scan)
@@ -239,15 +259,24 @@ def _kitti_rows(X: np.ndarray) -> str:
     return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
 
 
-KITTI = Layout(
-    lambda drive: PurePosixPath("sequences", _kitti_number(drive)),
-    _kitti_inner_files,
-    outer_files=lambda drive: {
-        f"poses/{_kitti_number(drive)}.txt": _kitti_poses(drive)
-    },
-    scan_files=_kitti_scan_files,
-    has_labels=True,
-)
+def kitti_layout(number: str | None = None) -> Layout:
+    """Returns KITTI's layout; the drive has its own number, or a given one."""
+
+    def of(drive: McapDrive) -> str:
+        return number or _kitti_number(drive)
+
+    return Layout(
+        lambda drive: PurePosixPath("sequences", of(drive)),
+        _kitti_inner_files,
+        outer_files=lambda drive: {
+            f"poses/{of(drive)}.txt": _kitti_poses(drive)
+        },
+        scan_files=_kitti_scan_files,
+        has_labels=True,
+    )
+
+
+KITTI = kitti_layout()
 
 
 def _tum_inner_files(drive: McapDrive) -> dict[str, str]:

@@ -8,11 +8,14 @@ feature a line, each with vertices of its own.
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+import itertools
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
@@ -27,6 +30,17 @@ from cns_drake.imports.reference_systems import (
     reference_system,
 )
 
+# What objects have that is read, or that places nothing.
+_MEMBERS = {
+    "type", "geometry", "attributes", "parents", "children", "children_roles",
+    "geographicalExtent", "address", "bbox", "extent", "members",
+}  # fmt: skip
+# A city is mirrored if no more of its solids than this look outwards; of so
+# many, if they enclose enough [m^3, m^2].
+_MIRRORED, _MOST_VOTES, _LEAST_VOTE = 0.1, 1000, 1e-3
+_BEYOND = "coordinates beyond the area of their reference system"
+# A geometry of a lower level is left out if so much of it has a higher one.
+_COVERED = 0.5
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
 
@@ -90,11 +104,16 @@ class CityObject(NamedTuple):
 
 @dataclass
 class CityFile:
-    """The objects of a file by id, its system, and counts of faulty parts."""
+    """The objects of a file by id, its system, and counts of faulty parts.
+
+    The order of the first two coordinates is open where the other one leads
+    into the system's area, too.
+    """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
     system: ReferenceSystem = field(default_factory=ReferenceSystem)
     faults: ImportFaults = field(default_factory=ImportFaults)
+    order_is_open: bool = False
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns the least and the greatest coordinates, (3,) each [m].
@@ -122,6 +141,7 @@ def read_cityjson(path: Path) -> CityFile:
     """
     city = CityFile()
     whole: dict = {}
+    whole_system = ""
     for number, document in _documents(path):
         kind = document.get("type")
         where = str(path) if number == 0 else f"{path}: line {number}"
@@ -132,7 +152,14 @@ def read_cityjson(path: Path) -> CityFile:
                 raise InputError(
                     f"{where}: CityJSON of version {version!r}, not 1.0 to 2.0"
                 )
-            city.system = _reference_system(document, where)
+            system = _reference_system(document, where)
+            if city.objects and system.name != whole_system:
+                raise InputError(
+                    f"{where}: metadata.referenceSystem: not that of the lines"
+                    f" before, {whole_system or 'none'}"
+                )
+            if not city.objects:
+                city.system, whole_system = system, system.name
         elif kind != "CityJSONFeature" or not whole:
             raise InputError(f"{where}: type {kind!r} is not CityJSON")
         _read_objects(document, whole, where, city)
@@ -140,6 +167,7 @@ def read_cityjson(path: Path) -> CityFile:
         raise InputError(f"{path}: the file has no objects")
     if not any(city.faces()):
         raise InputError(f"{path}: no object has a surface")
+    _check_order(city)
     low, high = city.bounds()
     within = (np.abs([low, high]) <= [180.0, 90.0, np.inf]).all()
     if within and (high - low)[:2].max() < 1.0 < (high - low)[2]:
@@ -198,6 +226,8 @@ def _read_objects(
     if not objects:
         return
     transform = document.get("transform", whole.get("transform"))
+    if transform is None and not str(whole.get("version")).startswith("1.0"):
+        city.faults.add("no transform; vertices taken as coordinates", where)
     vertices = _vertices(document, transform, where)
     if not city.objects and len(vertices):
         _settle_axes(city, vertices)
@@ -209,6 +239,10 @@ def _read_objects(
         ):
             city.faults.add("object without a type, left out", name)
             continue
+        if name in city.objects:
+            city.faults.add("object that is there twice, its last taken", name)
+        for key in value.keys() - _MEMBERS:
+            city.faults.add(f"{key} of an object, not read", name)
         listed = value.get("geometry") or []
         geometries = [
             _read_geometry(geometry, templates, name, city.faults)
@@ -223,24 +257,35 @@ def _read_objects(
             list(map(str, parents if isinstance(parents, list) else [])),
             [one for one in geometries if one is not None],
         )
+    for name, value in objects.items():
+        children = value.get("children") if isinstance(value, dict) else None
+        for child in children if isinstance(children, list) else []:
+            part = city.objects.get(str(child))
+            if part is not None and not part.parents:
+                city.objects[part.name] = part._replace(parents=[name])
 
 
 def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
-    """Settles the order of coordinates, and counts assumptions."""
+    """Settles the order of coordinates, and counts assumptions.
+
+    Many programs write east first against a definition with north first. That
+    is assumed if only so a vertex of the middle is in the area of use.
+    Elsewhere the faces will tell, if the other order leads into the area, too.
+    """
     defined = city.system
-    middle = vertices[len(vertices) // 2]
-    city.system = defined.as_used(middle)
-    if city.system is not defined:
+    if not defined.name:
         city.faults.add(
-            "reference system with north first, but coordinates with east "
-            "first; read as east first",
-            defined.name,
+            "no reference system; metres east, north and up assumed", "the file"
         )
-    elif defined.name and not defined.has_place(*middle[:2].tolist()):
-        city.faults.add(
-            "coordinates beyond the area of their reference system",
-            defined.name,
-        )
+        return
+    first, second, _ = vertices[len(vertices) // 2].tolist()
+    is_there = defined.has_place(first, second)
+    city.order_is_open = defined.has_place(second, first)
+    if city.order_is_open and not is_there and defined.is_north_first:
+        city.order_is_open = False
+        _exchange_axes(city)
+    elif not is_there:
+        city.faults.add(_BEYOND, defined.name)
     if defined.heights_assumed and not defined.is_plain:
         city.faults.add(
             "reference system without heights; its horizontal unit taken for "
@@ -249,14 +294,83 @@ def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
         )
 
 
+def _exchange_axes(city: CityFile) -> None:
+    """Exchanges the first two coordinates, also of faces that are there."""
+    defined = city.system
+    city.system = defined.exchanged()
+    turn = city.system.matrix @ np.linalg.inv(defined.matrix)
+    for face in city.faces():
+        face[:] = [ring @ turn.T for ring in face]
+    order = [axis.partition(" ")[0] for axis in defined.axes[:2]]
+    city.faults.add(
+        f"reference system with {order[0]} first, but coordinates with"
+        f" {order[1]} first; read as {order[1]} first",
+        defined.name,
+    )
+
+
+def _check_order(city: CityFile) -> None:
+    """Exchanges coordinates that would mirror the city, where both may be.
+
+    Faces are counter-clockwise seen from outside: those of a mirrored city are
+    inside out.
+    """
+    if city.system.name and not city.order_is_open:
+        return
+    votes = list(itertools.islice(_outward(city), _MOST_VOTES))
+    if not votes:
+        if city.system.is_north_first:
+            kind = "order of axes that no face shows, taken as defined"
+            city.faults.add(kind, city.system.name)
+    elif sum(votes) < _MIRRORED * len(votes):
+        if city.order_is_open:
+            _exchange_axes(city)
+            if any(kind == _BEYOND for kind, _, _ in city.faults.rows()):
+                city.faults.take_back(_BEYOND)
+        elif len(votes) > 1:
+            city.faults.add(
+                "all inside out: the city may be mirrored (north first?)",
+                "the file",
+            )
+
+
+def _outward(city: CityFile) -> Iterator[bool]:
+    """Yields whether solids, roofs, floors and terrains look outwards."""
+    for one in city.objects.values():
+        above = {"RoofSurface": 1.0, "GroundSurface": -1.0}
+        if one.kind == "TINRelief":
+            above[""] = 1.0
+        for geometry in one.geometries:
+            if not geometry.faces:
+                continue
+            middle = geometry.faces[0][0][0]
+            total = 0.0
+            for face, kind in zip(geometry.faces, geometry.kinds, strict=True):
+                for ring in face:
+                    p = ring - middle
+                    twice = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
+                    if geometry.is_solid:
+                        total += float(p[0] @ twice)
+                    else:
+                        total += above.get(kind, 0.0) * float(twice[2])
+            if abs(total) > _LEAST_VOTE:
+                yield total > 0.0
+
+
 def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
     """Returns the vertices (N, 3) in coordinates of the file."""
     points = _numbers(document.get("vertices", []), f"{where}: vertices")
-    if isinstance(transform, dict):
+    if transform is not None and not isinstance(transform, dict):
+        raise InputError(f"{where}: transform: not an object")
+    for key in (transform or {}).keys() - {"scale", "translate"}:
+        raise InputError(f"{where}: transform.{key} is not read")
+    if transform:
         scale, move = (
             _numbers([transform.get(key)], f"{where}: transform.{key}")
             for key in ("scale", "translate")
         )
+        if not (scale > 0.0).all():
+            raise InputError(f"{where}: transform.scale: not above 0")
         with np.errstate(over="ignore", invalid="ignore"):
             points = points * scale + move
     if not (np.abs(points) <= _FARTHEST).all():  # NaN fails, too.
@@ -312,7 +426,10 @@ class _Templates:
         X = X.reshape(4, 4)
         with np.errstate(over="ignore", invalid="ignore"):
             placed = self._points @ X[:3, :3].T + X[:3, 3]
-        if reference < 0 or not (np.abs(placed) <= _FARTHEST).all():
+        is_affine = (X[3] == [0.0, 0.0, 0.0, 1.0]).all()
+        if reference < 0 or not is_affine:
+            raise ValueError
+        if not (np.abs(placed) <= _FARTHEST).all():
             raise ValueError
         return template, (
             self._system.to_metres(placed) + self.vertices[reference]
@@ -434,7 +551,7 @@ def import_structures(
     found = []
     for root, members in groups.items():
         first = city.objects[root]
-        chosen = _geometries(members, lod)
+        chosen = _geometries(members, lod, city.faults)
         surfaces = _surfaces(chosen, root, city.faults, origin)
         if not any(map(len, surfaces.values())):
             kind = "object without a surface"
@@ -510,17 +627,53 @@ def _unique_names(ids: Iterable[str]) -> dict[str, str]:
 
 
 def _geometries(
-    members: list[CityObject], lod: float | None
+    members: list[CityObject], lod: float | None, faults: ImportFaults
 ) -> list[CityGeometry]:
-    """Returns the geometry to use of an object and its parts."""
-    chosen = []
+    """Returns the geometry to use of an object and its parts.
+
+    What a part has in more detail is not used again from its whole, or the
+    other way round.
+    """
+    chosen: list[tuple[CityObject, CityGeometry]] = []
     for one in members:
         usable = [g for g in one.geometries if lod is None or g.lod == lod]
         if usable:
             highest = max(g.lod for g in usable)
-            chosen += [g for g in usable if g.lod == highest]
+            chosen += [(one, g) for g in usable if g.lod == highest]
     # A footprint is dropped if there is any better geometry.
-    return [g for g in chosen if g.lod >= 1.0] or chosen
+    chosen = [pair for pair in chosen if pair[1].lod >= 1.0] or chosen
+    kept = []
+    for one, geometry in chosen:
+        is_whole = not one.parents
+        # A chimney of level 2 stands on a house of level 2.2, too.
+        better = [
+            other
+            for _, other in chosen
+            if other.lod > geometry.lod
+            and (is_whole or int(other.lod) > int(geometry.lod))
+        ]
+        if better and _is_covered(geometry, better):
+            faults.add("geometry with a better one inside, left out", one.name)
+        else:
+            kept.append(geometry)
+    return kept
+
+
+def _is_covered(one: CityGeometry, others: Sequence[CityGeometry]) -> bool:
+    """Returns whether others stand where a geometry stands, seen from above."""
+    own = _footprint([one])
+    shared = own.intersection(_footprint(others)).area
+    return bool(shared > _COVERED * own.area)
+
+
+def _footprint(geometries: Iterable[CityGeometry]) -> BaseGeometry:
+    polygons = [
+        shapely.make_valid(shapely.Polygon(np.round(face[0][:, :2], 3)))
+        for geometry in geometries
+        for face in geometry.faces
+        if len(face[0]) > 2
+    ]
+    return shapely.union_all([one for one in polygons if one.area > 0.0])
 
 
 def _surfaces(
@@ -540,6 +693,9 @@ def _surfaces(
             faults.add("solid turned inside out, reversed", name)
             faces = [triangles[:, ::-1] for triangles in faces]
         for triangles, kind in zip(faces, geometry.kinds, strict=True):
+            if kind == "ClosureSurface":
+                faults.add("face that only closes a solid, left out", name)
+                continue
             part = "roof" if kind == "RoofSurface" else "body"
             found.setdefault(part, []).append(triangles)
     return {part: np.concatenate(found[part]) for part in sorted(found)}

@@ -101,6 +101,9 @@ def import_city(
             drives,
             side,
         )
+        if lanes is None and city.streets and drives:
+            kind = "no lanes for traffic: none leads on for ever"
+            city.faults.add(kind, source.name)
         if lanes is not None:
             (draft / LANES_NAME).write_text(lanes, "utf-8")
         bottom = dressing.bottom if dressing else bottom_of(bare, ground)

@@ -48,24 +48,22 @@ class ReferenceSystem:
         """Whether the coordinates are metres, east, north, up already."""
         return self.axes == _PLAIN
 
+    @property
+    def is_north_first(self) -> bool:
+        """Whether the first coordinate leads north or south."""
+        return self.axes[0].startswith(("north", "south"))
+
     def to_metres(self, points: np.ndarray) -> np.ndarray:
         """Returns coordinates (N, 3) as metres east, north and up (N, 3)."""
         if self.is_plain:
             return points
         return points @ self.matrix.T
 
-    def as_used(self, point: np.ndarray) -> ReferenceSystem:
-        """Returns the system as a file with a point (3,) uses it.
+    def exchanged(self) -> ReferenceSystem:
+        """Returns the system with its first two coordinates exchanged.
 
-        Many programs write east first against the definition. That is assumed
-        only if the point is in the area of use with its first two coordinates
-        exchanged, and not otherwise.
+        Many programs write east first, or north first, against the definition.
         """
-        if not self.axes[0].startswith(("north", "south")):
-            return self
-        first, second, _ = point.tolist()
-        if self.has_place(first, second) or not self.has_place(second, first):
-            return self
         axes = (self.axes[1], self.axes[0], self.axes[2])
         return replace(self, axes=axes, matrix=self.matrix[:, [1, 0, 2]])
 

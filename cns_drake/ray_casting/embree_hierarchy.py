@@ -19,7 +19,7 @@ from typing import NamedTuple
 import weakref
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from pydrake.math import RotationMatrix
 
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
@@ -315,7 +315,7 @@ class EmbreeScene:
         is_near = self._near.contain(rays.p_OSset)
         is_unsure = hits.owner == primitives.PROXY_OWNER
         if is_near.any():  # Origins are taken in turn.
-            is_unsure |= np.resize(is_near, len(is_unsure))
+            is_unsure |= is_near[np.arange(len(is_unsure)) % len(is_near)]
         again = np.flatnonzero(is_unsure)
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))
@@ -393,11 +393,14 @@ def _decompose_motion(group: RayGroup) -> np.ndarray:
     scale = np.linalg.norm(group.X_FL[:3, :3], axis=0)
     R_OL = group.X_OL[:, :3] / scale
     p_FL_L = rotated((group.X_FL[:3, :3] / scale).T, group.X_FL[:3, 3])
-    quaternion = Rotation.from_matrix(product(R_OO, R_OL)).as_quat()
+    quaternions = [
+        RotationMatrix.ProjectToRotationMatrix(R).ToQuaternion().wxyz()
+        for R in product(R_OO, R_OL)
+    ]
     steps = np.zeros((num_steps, 16))
     steps[:, 0:3] = scale
     steps[:, 6:9] = p_FL_L
-    steps[:, 9:13] = quaternion[:, [3, 0, 1, 2]]
+    steps[:, 9:13] = quaternions
     steps[:, 13:16] = group.X_OL[:, 3] - rotated(R_OL, p_FL_L) + way_F
     return np.ascontiguousarray(steps, np.float32)
 

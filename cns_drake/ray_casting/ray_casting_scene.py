@@ -17,7 +17,12 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting import moving_groups
-from cns_drake.ray_casting.ray_groups import Motion, RayGroup, group_geometries
+from cns_drake.ray_casting.ray_groups import (
+    Motion,
+    RayGroup,
+    group_geometries,
+    serves,
+)
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 
@@ -57,7 +62,8 @@ class RayCastingScene:
     geometry of every other frame is an instance that `set_frame_poses`
     places; half spaces are planes in closed form. Coordinates are kept
     relative to a point O in the middle of the merged geometry, so that float32
-    resolves 1e-5 m within 200 m of it, for any origin of the world.
+    resolves 1e-5 m within 200 m of it, for any origin of the world; if the
+    sensor is over 1 km from there, O is near the sensor.
     """
 
     def __init__(
@@ -68,18 +74,26 @@ class RayCastingScene:
         *,
         num_threads: int = 1,
         previous: RayCastingScene | None = None,
+        p_WS: np.ndarray | None = None,
     ):
         """Builds the scene; hits give indices into the geometries.
 
-        `num_threads` threads share the rays of a cast; hits do not depend on
-        it. A `previous` scene of similar geometry is replaced: frames whose
-        surfaces are still the same objects are not built anew.
+        Args:
+            geometries: what rays can meet.
+            anchored_frames: frames that never move.
+            calc_X_WF: gives the poses of frames.
+            num_threads: threads that share the rays of a cast; hits do not
+                depend on it.
+            previous: a scene of similar geometry, which is replaced: frames
+                whose surfaces are still the same objects are not built anew.
+            p_WS: the place of the sensor [m].
         """
         self._p_WO, self._groups = group_geometries(
             enumerate(geometries),
             anchored_frames,
             calc_X_WF,
             may_share=_has_embree(),
+            p_WS=p_WS,
         )
         for group in self._groups:
             group.place(self._p_WO, calc_X_WF)
@@ -89,10 +103,15 @@ class RayCastingScene:
             solid, num_threads, None if previous is None else previous._scene
         )
         self._moving = moving_groups.MovingGroups(self._groups, self._p_WO)
+        self._owners = np.array([g.members[0][0] for g in self._groups], int)
         self._normal_matrices: np.ndarray | None = None
         self._group_of = np.zeros(len(geometries), np.int64)
         for row, group in enumerate(self._groups):
             self._group_of[[index for index, *_ in group.members]] = row
+
+    def serves(self, p_WS: np.ndarray) -> bool:
+        """Returns whether it is precise for a sensor at p_WS [m]."""
+        return serves(self._p_WO, self._groups, p_WS)
 
     def set_frame_poses(
         self,
@@ -173,14 +192,31 @@ class RayCastingScene:
             np.ascontiguousarray(d_Sset, dtype=float),
             np.ascontiguousarray(times, dtype=np.float32),
         )
-        hits = self._scene.cast_rays(rays, with_normals)
         if self._planes:
-            _cast_on_planes(self._planes, rays, hits)
+            hits = self._cast_on_planes(rays, with_normals)
+        else:
+            hits = self._scene.cast_rays(rays, with_normals)
         is_outside = np.zeros(0, bool)
         if with_normals:
             matrices = self._calc_normal_matrices()
             is_outside = _face_origins(hits, matrices, rays.d_Oset())
         return RayHits(hits.ranges, hits.owner, hits.normals, is_outside)
+
+    def _cast_on_planes(self, rays: Rays, with_normals: bool) -> Hits:
+        """Casts rays on half spaces, and no farther on all else.
+
+        Rays meet a plane from both sides, like any other surface.
+        """
+        limits = rays.max_ranges_of(np.arange(len(rays.d_Sset)))
+        met = np.full(len(limits), -1, np.int32)
+        for row, group in self._planes.items():
+            times = _AT_ONCE if group.motion is None else rays.times
+            _meet_plane(group.X_OL_at(times).copy(), rays, row, limits, met)
+        hits = self._scene.cast_rays(
+            rays._replace(max_ranges=limits), with_normals
+        )
+        _take_planes(met, limits, self._owners, hits)
+        return hits
 
     def _calc_normal_matrices(self) -> np.ndarray:
         """Returns (G, 3, 3) maps of normals from groups' frames to O."""
@@ -231,30 +267,50 @@ def _face_origins(
     return is_outside
 
 
-def _cast_on_planes(
-    groups: Mapping[int, RayGroup], rays: Rays, hits: Hits
+@compiled
+def _meet_plane(
+    X_OLs: np.ndarray,
+    rays: Rays,
+    row: int,
+    limits: np.ndarray,
+    met: np.ndarray,
 ) -> None:
-    """Updates `hits` where rays meet a half space's plane first.
+    """Lowers the limits of rays that meet z = 0 of L, and notes the row.
 
-    Rays meet a plane from both sides, like any other surface.
+    NumPy takes as long as all other geometry. Ray i takes pose i mod (K,) of
+    the (K, 3, 4) X_OLs.
     """
-    p, d, ray = rays.p_Oset(), rays.d_Oset(), np.arange(len(rays.d_Sset))
-    for row, group in groups.items():
-        times = _AT_ONCE if group.motion is None else rays.times
-        X_OLs = group.X_OL_at(times)[ray % len(times)]
-        # In L, the plane is z = 0.
-        normal, origin = X_OLs[:, :, 2], X_OLs[:, :, 3]
-        height = (normal * (origin - p)).sum(axis=1)
+    # Indices are counted along, since remainders take long.
+    origin = turn = pose = -1
+    for ray in range(len(rays.d_Sset)):
+        origin = origin + 1 if origin + 1 < len(rays.p_OSset) else 0
+        turn = turn + 1 if turn + 1 < len(rays.R_OSset) else 0
+        pose = pose + 1 if pose + 1 < len(X_OLs) else 0
+        R, X, d = rays.R_OSset[turn], X_OLs[pose], rays.d_Sset[ray]
+        height = along = 0.0
+        for i in range(3):
+            d_O = R[i, 0] * d[0] + R[i, 1] * d[1] + R[i, 2] * d[2]
+            height += X[i, 2] * (X[i, 3] - rays.p_OSset[origin, i])
+            along += X[i, 2] * d_O
         # A ray along the plane does not meet it.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = height / (normal * d).sum(axis=1)
-        nearer = (distance >= 0.0) & (distance <= rays.max_ranges_of(ray))
-        nearer &= distance < hits.ranges
-        hits.ranges[nearer] = distance[nearer]
-        hits.owner[nearer] = group.members[0][0]
-        hits.group[nearer] = row
-        if hits.normals.shape[1]:
-            hits.normals[nearer] = (0.0, 0.0, 1.0)
+        distance = height / along if along != 0.0 else -1.0
+        is_first = met[ray] < 0 and distance == limits[ray]
+        if distance >= 0.0 and (distance < limits[ray] or is_first):
+            limits[ray], met[ray] = distance, row
+
+
+@compiled
+def _take_planes(
+    met: np.ndarray, limits: np.ndarray, owners: np.ndarray, hits: Hits
+) -> None:
+    """Sets hits of rays that have met nothing before a plane."""
+    for ray in range(len(met)):
+        row = np.int64(met[ray])
+        if row >= 0 and hits.owner[ray] == -1:
+            hits.ranges[ray] = limits[ray]
+            hits.owner[ray], hits.group[ray] = owners[row], row
+            for axis in range(hits.normals.shape[1]):
+                hits.normals[ray, axis] = axis == 2
 
 
 def _has_embree() -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, inv
-from scipy.spatial.transform import Rotation
 
-from cns_drake.base.elementary import product, rotated
+from cns_drake.base.elementary import product, rotated, turns
 from cns_drake.scene import surfaces
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 
@@ -25,6 +24,9 @@ MOST_COPIED_TRIANGLES = 2**18
 _LARGEST_STEP_RAD = 2.0
 # The most time steps that Embree supports.
 _MOST_STEPS = 129
+# Sides of the cubes with an origin each, for a scene with geometry that is
+# merged and for others, which are quick to build anew [m].
+_CUBE, _MOVING_CUBE = 2000.0, 256.0
 # A member of a scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, surfaces.Surface]
 
@@ -33,12 +35,13 @@ class Motion(NamedTuple):
     """A frame F that keeps its velocities for a turn, in the frame O.
 
     w [rad/s] is its angular velocity, v [m/s] that of its origin. The turn
-    takes `duration` [s].
+    takes `duration`, and begins `start` after the time of the pose of F [s].
     """
 
     w: np.ndarray
     v: np.ndarray
     duration: float
+    start: float = 0.0
 
     @property
     def num_steps(self) -> int:
@@ -56,13 +59,13 @@ class Motion(NamedTuple):
         return steps
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the motion of F up to (N,) parts of the turn, from 0 to 1.
+        """Returns the motion of F to (N,) parts of the turn, from 0 to 1.
 
         Returns:
             (N, 3, 3) rotations, and (N, 3) displacements of F's origin.
         """
-        t = (self.duration * np.asarray(times, float))[:, None]
-        return Rotation.from_rotvec(t * self.w).as_matrix(), t * self.v
+        t = self.duration * np.asarray(times, float)[:, None] + self.start
+        return turns(t * self.w), t * self.v
 
 
 @dataclass
@@ -141,12 +144,14 @@ def group_geometries(
     calc_X_WF: Callable[[FrameId], RigidTransform],
     *,
     may_share: bool = True,
+    p_WS: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[RayGroup]]:
     """Returns p_WO, and the groups of geometries, given with their indices.
 
     The world's is the first if there is one; half spaces are the last. If they
     may share, large surfaces with many copies get a group for each copy, all
-    with the same surface.
+    with the same surface. Where a sensor at p_WS is far from the middle of the
+    world's geometry, O is in the middle of the cube with the sensor.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries) if may_share else frozenset()
@@ -169,6 +174,9 @@ def group_geometries(
     if world:
         places = np.array([X_WG.translation() for _, X_WG, _ in world])
         p_WO = np.round((places.min(axis=0) + places.max(axis=0)) / 2.0)
+    if p_WS is not None:
+        cube = _CUBE if world else _MOVING_CUBE
+        p_WO += cube * np.round((p_WS - p_WO) / cube)
 
     groups, alone = [], []
     for frame_id, members in [(None, world), *by_frame.items()]:
@@ -206,6 +214,15 @@ def group_geometries(
                 RayGroup(frame_id, X_FL.GetAsMatrix4(), rest, frame_id is None)
             )
     return p_WO, groups + alone + half_spaces
+
+
+def serves(
+    p_WO: np.ndarray, groups: Sequence[RayGroup], p_WS: np.ndarray
+) -> bool:
+    """Returns whether groups about O are precise for a sensor at p_WS."""
+    has_world = any(group.is_merged_world for group in groups)
+    cube = _CUBE if has_world else _MOVING_CUBE
+    return bool((np.abs(p_WS - p_WO) <= cube / 2.0).all())
 
 
 def _find_shared(

@@ -55,13 +55,17 @@ class RecordedCamera(NamedTuple):
 class RecordedSensor(NamedTuple):
     """A further sensor of a recording, with a port of its name.
 
-    X_BC is the pose of its frame C, which has its name, in the vehicle's frame
-    B. The port's value, the frame's name and the time [ns] make a message.
+    X_BC is the pose of its frame C, which has the sensor's name unless another
+    one is given, in the vehicle's frame B. The port's value, the frame's name
+    and the time [ns] make a message. The example has the type of a value that
+    is no Python object.
     """
 
     topic: Topic
     X_BC: RigidTransform
     make_message: Callable[[Any, str, int], Any]
+    frame: str | None = None
+    example: Any = None
 
 
 class McapRecorder(LeafSystem):
@@ -127,6 +131,7 @@ class McapRecorder(LeafSystem):
         schedule: Schedule | None = None,
         further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
+        num_rings: Mapping[str, int] | None = None,
         imu_variances: tuple[float, float] = (0.0, 0.0),
         with_imu_samples: bool = False,
         with_objects: bool = False,
@@ -146,6 +151,7 @@ class McapRecorder(LeafSystem):
             further: name -> further sensor.
             layouts: LiDAR name -> layout of its points (see
                 `point_layouts`), `cns` unless given.
+            num_rings: LiDAR name -> rings of the unit; see `to_layout`.
             imu_variances: variances of specific force [m^2/s^4] and of
                 angular velocity [rad^2/s^2].
             with_imu_samples: whether there is a port `imu_samples`.
@@ -177,7 +183,7 @@ class McapRecorder(LeafSystem):
         self._X_BCs = {name: X for name, X in X_BSs.items() if X is not None}
         if X_BI is not None:
             self._X_BCs[messages.IMU_FRAME] = X_BI
-        self._X_BCs |= {name: sensor.X_BC for name, sensor in further.items()}
+        self._X_BCs |= {s.frame or n: s.X_BC for n, s in further.items()}
         # Frame on the map -> the port with its pose, and the pose from there.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
         # A topic, and what makes the messages at its times, on others as well.
@@ -200,7 +206,8 @@ class McapRecorder(LeafSystem):
         if with_objects:
             self._add_objects()
         for name in X_BSs:
-            self._add_lidar(name, layouts.get(name, "cns"))
+            rings = (num_rings or {}).get(name)
+            self._add_lidar(name, layouts.get(name, "cns"), rings)
         for name, X_BS in X_BSs.items():
             if X_BS is None:
                 self._add_pose(name, RigidTransform())
@@ -223,10 +230,14 @@ class McapRecorder(LeafSystem):
         self._poses[name] = (port, X_PC)
 
     def _add_port(
-        self, name: str, topic: Topic, make: Callable[[Any, int], dict]
+        self,
+        name: str,
+        topic: Topic,
+        make: Callable[[Any, int], dict],
+        example: object = None,
     ) -> None:
         """Declares a port; `make` takes its value and the time [ns]."""
-        port = self._declare(name, object())
+        port = self._declare(name, object() if example is None else example)
 
         def make_all(context: Context, stamp_ns: int) -> dict[Topic, Any]:
             value = _value_of(port, context)
@@ -252,12 +263,13 @@ class McapRecorder(LeafSystem):
 
         self._add_port("objects", recorded_topics.OBJECTS_TOPIC, make)
 
-    def _add_lidar(self, name: str, layout: str) -> None:
+    def _add_lidar(self, name: str, layout: str, num_rings: int | None) -> None:
         topic = recorded_topics.points_topic(name)
         encode = messages.encode_point_cloud
 
         def make(scan: np.ndarray, stamp_ns: int) -> dict:
-            made = {topic: encode(to_layout(scan, layout), name, stamp_ns)}
+            points = to_layout(scan, layout, num_rings)
+            made = {topic: encode(points, name, stamp_ns)}
             if layout != "cns":
                 labels = encode(to_labels(scan), name, stamp_ns)
                 made[recorded_topics.labels_topic(name)] = labels
@@ -270,8 +282,11 @@ class McapRecorder(LeafSystem):
             name,
             sensor.topic,
             lambda value, stamp_ns: {
-                sensor.topic: sensor.make_message(value, name, stamp_ns)
+                sensor.topic: sensor.make_message(
+                    value, sensor.frame or name, stamp_ns
+                )
             },
+            sensor.example,
         )
 
     def _add_camera(self, name: str, info: CameraInfo) -> None:

@@ -1,5 +1,6 @@
 """Areas of streets, and heights of their surface."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -24,6 +25,10 @@ class StreetAreas(Protocol):
 
     def medians(self) -> MultiPolygon:
         """Returns the medians: areas between the directions, a kerb higher."""
+
+
+# Returns the (N,) heights of sidewalks above the road at (N, 2) places [m].
+KerbMap = Callable[[np.ndarray], np.ndarray]
 
 
 class SurfaceHeights(Protocol):

@@ -22,6 +22,7 @@ from cns_drake.base.errors import validated
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
+from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.lidar.measurement import Echoes
@@ -278,6 +279,8 @@ class Scenario(Section):
         transient: passing changes since the stage was built.
         lidars: name -> LiDAR; frame and topic have this name; by default one
             named `lidar`.
+        cameras: name -> camera; its optical frame (x right, y down, z ahead)
+            and its topics have this name.
         imu: the IMU.
         weather: fog, rain and snowfall for calibrated returns.
         odometry: the odometry.
@@ -312,6 +315,7 @@ class Scenario(Section):
     lidars: dict[Name, LidarSection] = Field(
         default={"lidar": LidarSection()}, min_length=1
     )
+    cameras: dict[Name, CameraSection] = field_off_by_default({})
     imu: ImuSection = ImuSection()
     weather: WeatherConfig = field_off_by_default(WeatherConfig())
     odometry: OdometrySection = field_off_by_default(OdometrySection())
@@ -355,6 +359,14 @@ class Scenario(Section):
         taken = {"map", "base_link", "imu"} & lidars.keys()
         if taken:
             raise ValueError(f"'{taken.pop()}' is the name of another frame")
+        # Every scan has the odometry of its own time.
+        fastest = _fastest(lidars)
+        for name, one in lidars.items():
+            if fastest % one.rate:
+                raise ValueError(
+                    f"{name}.rate: {one.rate} does not divide {fastest}, the "
+                    "rate of the fastest LiDAR"
+                )
         return lidars
 
     @field_validator("imu", "odometry")
@@ -374,6 +386,22 @@ class Scenario(Section):
                 raise ValueError(f"'{name}' is the name of another frame")
             if sensor.rate is not None:
                 check_rate(sensor.rate, self.fastest_rate)
+        return self
+
+    @model_validator(mode="after")
+    def _check_cameras(self) -> Scenario:
+        frame_rate = next(iter(self.lidars.values())).rate
+        taken = {"map", "base_link", "imu", *self.lidars, *self.further_sensors}
+        for name, camera in self.cameras.items():
+            if name in taken:
+                raise ValueError(
+                    f"cameras: '{name}' is the name of another frame"
+                )
+            if frame_rate % camera.rate:
+                raise ValueError(
+                    f"cameras.{name}.rate: {camera.rate} does not divide "
+                    f"{frame_rate}, the rate of the first LiDAR"
+                )
         return self
 
     @model_validator(mode="after")

@@ -13,6 +13,7 @@ PARSER_ERRORS = (
     LookupError,
     OverflowError,
     SystemExit,
+    MemoryError,
 )
 
 

@@ -8,6 +8,7 @@ refer to are looked for in the folders that Gazebo searches.
 
 from collections import Counter
 from collections.abc import Iterable
+import contextlib
 import math
 import os
 from pathlib import Path
@@ -15,7 +16,7 @@ from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import read_elements
-from cns_drake.scene.model_check import check_model
+from cns_drake.scene.model_check import SIZES, check_model, lacks_size
 
 # Environment variables with folders of models, of old and new Gazebo and
 # libsdformat.
@@ -107,12 +108,14 @@ def read_xml(path: Path) -> Element:
     return read_elements(path, encoding="utf-8")
 
 
-# Elements that mark a world for Gazebo.
+# Elements that Drake does not read as Gazebo does.
 _SIGNS = (
     "include", "light", "plugin", "actor", "scene", "gui", "state", "sensor",
-    "road", "population", "submesh",
+    "road", "population", "submesh", "transparency", "visibility_flags",
+    "cone", "heightmap", "image", "polyline",
 )  # fmt: skip
 _ENDLESS_COLLISION = ".//collision/geometry/plane"
+_SIZED_PLANE = ".//visual/geometry/plane/size"
 # Elements that are left out -> words for them in a note.
 _SKIPPED = {
     "light": "lights",
@@ -124,6 +127,43 @@ _SKIPPED = {
     "particle_emitter": "particle emitters",
     "projector": "projectors",
 }
+# Element -> elements within it that are read, or that neither show nor move
+# anything.
+_KNOWN = {
+    "world": (
+        "model", "include", "frame", "joint", "state", "gravity", "physics",
+        "magnetic_field", "atmosphere", "scene", "gui", "wind", "audio",
+        "spherical_coordinates",
+    ),
+    "model": (
+        "pose", "model", "include", "frame", "joint", "link", "static",
+        "self_collide", "allow_auto_disable", "enable_wind", "gripper",
+    ),
+    "include": ("uri", "name", "pose", "placement_frame", "static"),
+    "link": (
+        "pose", "visual", "inertial", "collision", "gravity", "enable_wind",
+        "self_collide", "kinematic", "must_be_base_link", "velocity_decay",
+        "audio_source", "audio_sink", "battery",
+    ),
+    "visual": (
+        "pose", "geometry", "material", "transparency", "visibility_flags",
+        "cast_shadows", "laser_retro",
+    ),
+    "mesh": ("uri", "scale", "submesh"),
+    **{shape: tuple(sizes) for shape, sizes in SIZES.items()},
+    "plane": ("normal", "size"),
+}  # fmt: skip
+_ATTRIBUTES = {
+    "world": ("name",),
+    "model": ("name", "canonical_link", "placement_frame"),
+    "include": ("merge",),
+    "link": ("name",),
+    "visual": ("name",),
+    "pose": ("relative_to", "rotation_format", "degrees", "frame"),
+    "mesh": ("optimization",),
+}
+# Beginnings of names that SDF leaves to programs; Drake reads its own.
+_CUSTOM = ("drake:", "gz:", "ignition:")
 _SHAPES = (
     "box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh",
     "drake:capsule", "drake:ellipsoid",
@@ -134,14 +174,26 @@ _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 <geometry><plane><normal>0 0 1</normal></plane></geometry></visual></link>
 </model>"""
 _DEEPEST = 20
+# Thickness of a plane with a size, below its surface [m].
+_PLANE_THICKNESS = 1e-4
+_EVERY_FLAG = 0xFFFFFFFF
 
 
-def is_gazebo_world(root: Element) -> bool:
-    """Returns whether a world has elements of Gazebo's."""
-    world = root.find("world")
-    return world is not None and (
-        world.find(_ENDLESS_COLLISION) is not None
-        or any(next(world.iter(sign), None) is not None for sign in _SIGNS)
+def is_gazebo_world(path: Path, root: Element) -> bool:
+    """Returns whether a world or model has elements that Drake misreads."""
+    if root.find("world") is None and root.find("model") is None:
+        return False
+    return (
+        path.suffix.lower() == ".world"
+        or root.find(_ENDLESS_COLLISION) is not None
+        or root.find(_SIZED_PLANE) is not None
+        or root.find("world/joint") is not None
+        or any(next(root.iter(sign), None) is not None for sign in _SIGNS)
+        or any(
+            lacks_size(shape)
+            for geometry in root.iterfind(".//visual/geometry")
+            for shape in geometry
+        )
     )
 
 
@@ -151,14 +203,18 @@ def simplify_world(
     """Returns a world of static models with visuals only, and notes.
 
     Raises:
-        InputError: a model that was found cannot be read.
+        InputError: a model that was found cannot be read, or something would
+            be at a wrong place.
     """
     simplifier = _Simplifier(path, model_paths)
-    world = root.find("world")
-    assert world is not None
+    worlds = root.findall("world")
+    world = worlds[0] if worlds else Element("world", name="world")
+    if not worlds:
+        world.extend(root)
     made = Element("sdf", version="1.9")
     target = SubElement(made, "world", name=_legal(world.get("name", "world")))
-    simplifier.add_models(world, target, path.absolute().parent, 0)
+    simplifier.skip("further worlds of the file", len(worlds) - 1)
+    simplifier.add_world(root, world, target)
     return tostring(made, "unicode"), simplifier.notes()
 
 
@@ -173,13 +229,14 @@ class _Simplifier:
             "models": Counter(),
             "meshes": Counter(),
         }
+        # Names to which poses and frames refer, without their scopes.
+        self._referred: set[str] = set()
 
     def notes(self) -> tuple[str, ...]:
         """Returns one line for each kind of omitted element."""
         notes = [
-            f"{self._path}: {count} {what} ignored"
+            f"{self._path}: {count} {what}"
             for what, count in sorted(self._skipped.items())
-            if count
         ]
         for what, uris in self._missing.items():
             if uris:
@@ -191,36 +248,91 @@ class _Simplifier:
                 )
         return tuple(notes)
 
-    def add_models(
+    def skip(self, what: str, count: int = 1, how: str = "ignored") -> None:
+        """Counts what is not shown as the file has it."""
+        if count > 0:
+            self._skipped[f"{what} {how}"] += count
+
+    def add_world(self, root: Element, world: Element, target: Element) -> None:
+        """Adds the models of a world, which is in the file with this root."""
+        self._note_references(root)
+        saved = world.findall("state//model/pose")
+        self.skip("saved places of models (state)", len(saved))
+        for tag in ("insertions", "deletions"):
+            for _ in world.iterfind(f"state/{tag}/*"):
+                self.skip(f"saved {tag} (state)")
+        self._add_children(world, target, self._path.absolute().parent, 0)
+
+    def _note_references(self, root: Element) -> None:
+        for element in root.iter():
+            for key in ("relative_to", "attached_to", "placement_frame"):
+                self._referred.add(element.get(key, "").split("::")[-1])
+            if element.tag == "placement_frame":
+                self._referred.add((element.text or "").split("::")[-1].strip())
+
+    def _add_children(
         self, source: Element, target: Element, folder: Path, depth: int
     ) -> None:
-        """Adds the models in a world or a model, and included ones."""
+        """Adds what a world or a model shows, and the frames in it."""
         if depth > _DEEPEST:
             raise InputError(f"{self._path}: models include each other")
+        self._count_unknown(source)
         for element in source:
-            self._skip(element)
             if element.tag == "include":
                 self._include(element, target, folder, depth)
             elif element.tag == "model":
                 self._add_model(element, target, folder, depth)
+            elif element.tag == "link":
+                self._add_link(element, target, folder)
+            elif element.tag == "frame":
+                made = SubElement(target, "frame", element.attrib)
+                self._copy_pose(element, made)
+        taken = {sibling.get("name") for sibling in target}
+        for joint in source.iterfind("joint"):
+            name, child = joint.get("name", ""), joint.findtext("child") or ""
+            if name in self._referred - taken:
+                attached = {"name": name, "attached_to": child.strip()}
+                made = SubElement(target, "frame", attached)
+                self._copy_pose(joint, made)
 
-    def _skip(self, element: Element) -> None:
-        if element.tag in _SKIPPED:
-            self._skipped[_SKIPPED[element.tag]] += 1
+    def _count_unknown(self, element: Element) -> None:
+        """Counts elements and attributes that are not read."""
+        within = element.tag
+        for child in element:
+            if child.tag in _SKIPPED:
+                self.skip(_SKIPPED[child.tag])
+            elif child.tag not in _KNOWN[within] and (
+                not child.tag.startswith(_CUSTOM)
+            ):
+                self.skip(f"elements <{child.tag}> in <{within}>")
+        self._count_attributes(element)
+
+    def _count_attributes(self, element: Element) -> None:
+        for key in element.attrib:
+            if key not in _ATTRIBUTES.get(element.tag, ()) and (
+                not key.startswith("xmlns")
+            ):
+                self.skip(f"attributes {key} of <{element.tag}>")
 
     def _include(
         self, include: Element, target: Element, folder: Path, depth: int
     ) -> None:
+        self._count_unknown(include)
         uri = _local_uri((include.findtext("uri") or "").strip())
         place = self._finder.find(uri, folder)
         if place is not None:
             file = model_file(place)
             root = read_xml(file)
+            self._note_references(root)
             models, folder = root.findall("model"), file.parent
-            self._skipped["lights"] += len(root.findall("light"))
-            self._skipped["actors"] += len(root.findall("actor"))
+            lights, actors = root.findall("light"), root.findall("actor")
+            self.skip("lights", len(lights))
+            self.skip("actors", len(actors))
+            self.skip("further models of included files", len(models) - 1)
+            if not (models or lights or actors):
+                self.skip("included files without a model of SDF")
         elif uri.rstrip("/") == _SUN:
-            self._skipped["lights"] += 1
+            self.skip("lights")
             return
         elif uri.rstrip("/") == _GROUND_PLANE:
             models = [fromstring(_GROUND)]
@@ -235,43 +347,80 @@ class _Simplifier:
                 for old in model.findall("pose"):
                     model.remove(old)
                 model.append(pose)
-            self._add_model(model, target, folder, depth)
+            placement = include.findtext("placement_frame")
+            if placement:
+                model.set("placement_frame", placement.strip())
+            if include.get("merge", "").strip().lower() in ("true", "1"):
+                self._merge(model, target, folder, depth)
+            else:
+                self._add_model(model, target, folder, depth)
+
+    def _merge(
+        self, model: Element, target: Element, folder: Path, depth: int
+    ) -> None:
+        """Adds the parts of a model as parts of the one that includes it."""
+        if model.get("placement_frame"):
+            raise InputError(
+                f"{self._path}: include of {model.get('name')}: a"
+                " placement_frame together with merge is not read"
+            )
+        own = f"_merged_{_name(model, target)}"
+        self._copy_pose(model, SubElement(target, "frame", name=own))
+        for part in model:
+            if part.tag not in ("link", "model", "include", "frame", "joint"):
+                continue
+            inside = part.iter("pose") if part.tag == "link" else part
+            for pose in [one for one in inside if one.tag == "pose"]:
+                if pose.get("relative_to") == "__model__":
+                    pose.set("relative_to", own)
+            attached = part.get("attached_to") or "__model__"
+            if part.tag == "frame" and attached == "__model__":
+                part.set("attached_to", own)
+            elif part.tag in ("link", "model", "include"):
+                place = part.find("pose")
+                if place is None:
+                    place = SubElement(part, "pose")
+                if not place.get("relative_to"):
+                    place.set("relative_to", own)
+        self._add_children(model, target, folder, depth + 1)
 
     def _add_model(
         self, model: Element, target: Element, folder: Path, depth: int
     ) -> None:
         made = Element("model", name=_name(model, target))
+        if model.get("placement_frame"):
+            made.set("placement_frame", model.get("placement_frame", ""))
         if target.tag == "world":
             SubElement(made, "static").text = "true"
-        _copy_pose(model, made)
-        self.add_models(model, made, folder, depth + 1)
-        for frame in model.findall("frame"):
-            made.append(frame)
-        for link in model.findall("link"):
-            self._add_link(link, made, folder)
-        if made.find("link") is not None or made.find("model") is not None:
+        self._copy_pose(model, made)
+        self._add_children(model, made, folder, depth + 1)
+        if any(one.tag in ("link", "model", "frame") for one in made):
             target.append(made)
 
     def _add_link(self, link: Element, target: Element, folder: Path) -> None:
-        made = Element("link", name=_name(link, target))
-        _copy_pose(link, made)
-        for element in link:
-            self._skip(element)
-            if element.tag == "visual":
-                self._add_visual(element, made, folder)
+        self._count_unknown(link)
+        made = SubElement(target, "link", name=_name(link, target))
+        self._copy_pose(link, made)
         # An invisible element stays if others are placed relative to it.
-        target.append(made)
+        for visual in link.iterfind("visual"):
+            self._add_visual(visual, made, target, folder)
 
     def _add_visual(
-        self, visual: Element, target: Element, folder: Path
+        self, visual: Element, link: Element, model: Element, folder: Path
     ) -> None:
         geometry = visual.find("geometry")
         shapes = [] if geometry is None else list(geometry)
         if not shapes or shapes[0].tag not in _SHAPES:
             if shapes and shapes[0].tag != "empty":
-                self._skipped[f"visuals of type {shapes[0].tag}"] += 1
+                self.skip(f"visuals of type {shapes[0].tag}")
+            return
+        self._count_unknown(visual)
+        if self._is_invisible(visual):
             return
         shape = shapes[0]
+        made = Element("visual", name=_name(visual, link))
+        self._copy_pose(visual, made)
+        self._count_unknown(shape)
         if shape.tag == "mesh":
             uri = (shape.findtext("uri") or "").strip()
             place = self._finder.find(uri, folder)
@@ -285,28 +434,97 @@ class _Simplifier:
             if scale is not None:
                 mesh.append(scale)
             if shape.find("submesh") is not None:
-                self._skipped["choices of a part of a mesh"] += 1
+                self.skip("choices of a part of a mesh")
             shape = mesh
-        made = SubElement(target, "visual", name=_name(visual, target))
-        _copy_pose(visual, made)
-        SubElement(made, "geometry").append(shape)
+        elif shape.tag == "plane" and shape.find("size") is not None:
+            shape = _thin_box(shape, made, link, model)
+            self.skip("planes", how="end at their size, as Gazebo shows them")
+        elif lacks_size(shape):
+            what = f"shapes without a size ({shape.tag})"
+            self.skip(what, how="made as large as SDF's default")
+        kept = SubElement(SubElement(made, "geometry"), shape.tag)
+        kept.extend(one for one in shape if one.tag in _KNOWN[shape.tag])
+        made.extend(one for one in visual if one.tag.startswith("drake:"))
+        link.append(made)
         material = visual.find("material")
         if material is not None:
             self._add_material(material, made)
 
+    def _is_invisible(self, visual: Element) -> bool:
+        """Returns whether Gazebo does not show a visual; counts doubts."""
+        transparency = _number(visual.findtext("transparency"), 0.0)
+        flags = _number(visual.findtext("visibility_flags"), _EVERY_FLAG)
+        if transparency >= 1.0 or flags == 0:
+            self.skip("invisible visuals")
+            return True
+        if transparency > 0.0:
+            self.skip("transparent visuals", how="taken as solid")
+        if flags != _EVERY_FLAG:
+            self.skip("visibility flags")
+        return False
+
     def _add_material(self, material: Element, target: Element) -> None:
         for tag in ("script", "pbr"):
             if material.find(tag) is not None:
-                self._skipped["materials by script or texture"] += 1
+                self.skip("materials by script or texture")
         numbers = (material.findtext("diffuse") or "").split()
         try:
             values = [float(number) for number in numbers]
         except ValueError:
             return
         if len(values) in (3, 4) and all(map(math.isfinite, values)):
+            if len(values) == 4 and values[3] < 1.0:
+                self.skip("transparent colours", how="taken as solid")
             made = SubElement(target, "material")
             text = " ".join([*numbers, "1"][:4])
             SubElement(made, "diffuse").text = text
+
+    def _copy_pose(self, source: Element, target: Element) -> None:
+        pose = source.find("pose")
+        if pose is None:
+            return
+        self._count_attributes(pose)
+        # Before version 1.7, `frame` had no meaning to Gazebo.
+        if pose.get("frame"):
+            self.skip("frames of poses in SDF before 1.7")
+        kept = {k: v for k, v in pose.attrib.items() if k != "frame"}
+        if (pose.text or "").strip():
+            SubElement(target, "pose", kept).text = pose.text
+        elif pose.get("relative_to"):
+            # Without numbers it is the frame itself.
+            SubElement(target, "pose", relative_to=kept["relative_to"])
+
+
+def _thin_box(
+    plane: Element, visual: Element, link: Element, model: Element
+) -> Element:
+    """Returns a box below a plane with a size, and places its visual.
+
+    As in Gazebo, the shortest turn from z to the normal turns its sides. The
+    numbers of the plane are valid.
+    """
+    words = (plane.findtext("normal") or "").split() or ["0", "0", "1"]
+    normal = [float(word) for word in words]
+    x, y, z = (value / math.hypot(*normal) for value in normal)
+    # The pose of the visual becomes that of a frame, with the box below it.
+    own = link.get("name", "")
+    frame = Element("frame", name=f"_plane_of_{own}", attached_to=own)
+    frame.set("name", _name(frame, model))
+    model.append(frame)
+    frame.extend(visual.findall("pose"))
+    for pose in visual.findall("pose"):
+        visual.remove(pose)
+    box = Element("box")
+    SubElement(
+        box, "size"
+    ).text = f"{(plane.findtext('size') or '').strip()} {_PLANE_THICKNESS}"
+    turn = [-y, x, 0.0, 1.0 + z] if z > -1.0 else [1.0, 0.0, 0.0, 0.0]
+    turn = [value / math.hypot(*turn) for value in turn]
+    down = [-value * _PLANE_THICKNESS / 2.0 for value in (x, y, z)]
+    pose = SubElement(visual, "pose", relative_to=frame.get("name", ""))
+    pose.set("rotation_format", "quat_xyzw")
+    pose.text = " ".join(map(repr, [*down, *turn]))
+    return box
 
 
 def _local_uri(uri: str) -> str:
@@ -317,12 +535,12 @@ def _local_uri(uri: str) -> str:
     return "model://" + name.split("/")[0].strip().lower().replace(" ", "_")
 
 
-def _copy_pose(source: Element, target: Element) -> None:
-    pose = source.find("pose")
-    if pose is not None and (pose.text or "").strip():
-        # Before version 1.7, `frame` meant nothing.
-        pose.attrib.pop("frame", None)
-        target.append(pose)
+def _number(text: str | None, default: float) -> float:
+    """Returns a number in a text; the default if it holds none."""
+    for kind in (float, lambda word: int(word, 16)):
+        with contextlib.suppress(ValueError):
+            return float(kind((text or "").strip()))
+    return default
 
 
 def _name(element: Element, target: Element) -> str:

@@ -20,6 +20,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene.gltf_check import GLTF, check_gltf
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 _LIMIT_BYTES = 1 << 28
@@ -105,7 +106,7 @@ def _block(
 
 
 # Formats whose y axis points up. Drake turns them, so that z does.
-_Y_UP = (".gltf", ".glb", ".dae")
+_Y_UP = (*GLTF, ".dae")
 # What is larger is parsed at each reading, so that it does not stay in memory.
 _SMALL_BYTES = 1 << 18
 
@@ -188,6 +189,8 @@ class MeshFiles:
         if not path.is_file():
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
+        if ending in GLTF:
+            check_gltf(path)
         p_GVset, triangles = _READERS.get(ending, self._foreign.read)(path)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
@@ -219,6 +222,9 @@ def _source_key(source: MeshSource) -> object:
 
 def _read_hull(shape: Convex) -> TriangleSurface:
     """Returns Drake's own convex hull, with the scale applied."""
+    source = shape.source()
+    if source.is_path() and source.extension() in GLTF:
+        check_gltf(Path(source.path()))
     hull = shape.GetConvexHull()
     vertices = [hull.vertex(k) for k in range(hull.num_vertices())]
     triangles = []

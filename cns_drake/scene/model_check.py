@@ -8,17 +8,18 @@ import math
 from pathlib import Path
 import re
 from typing import NoReturn, cast
+from xml.etree import ElementTree
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.scene.mesh_files import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 
-_MODELS = (".sdf", ".urdf")
+_MODELS = (".sdf", ".world", ".urdf")
 _LONGEST_NAME = 1000
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # Shape -> elements of its size, and the numbers in each.
-_SIZES = {
+SIZES = {
     "box": {"size": 3},
     "sphere": {"radius": 1},
     "cylinder": {"radius": 1, "length": 1},
@@ -26,8 +27,10 @@ _SIZES = {
     "ellipsoid": {"radii": 3},
     "drake:capsule": {"radius": 1, "length": 1},
     "drake:ellipsoid": {"a": 1, "b": 1, "c": 1},
+    # Without a size it is endless.
+    "plane": {"size": 2},
 }
-_OTHER_SHAPES = ("mesh", "plane", "heightmap", "polyline", "cone", "empty")
+_OTHER_SHAPES = ("mesh", "heightmap", "polyline", "cone", "empty")
 _OTHER_NUMBERS = {
     ("mesh", "scale"),
     *(
@@ -35,6 +38,13 @@ _OTHER_NUMBERS = {
         for colour in ("ambient", "diffuse", "specular", "emissive")
     ),
 }
+
+
+def lacks_size(shape: ElementTree.Element) -> bool:
+    """Returns whether a shape of SDF has a size only by SDF's defaults."""
+    if shape.tag == "plane" or shape.tag.startswith("drake:"):
+        return False
+    return any(shape.find(name) is None for name in SIZES.get(shape.tag, ()))
 
 
 def check_model(path: Path) -> None:
@@ -74,12 +84,13 @@ class _ModelCheck:
 
     def _check(self, element: Element, parent: str, parents: list[str]) -> None:
         text = element.text or ""
-        if parent == "geometry" and element.tag in _SIZES:
+        if parent == "geometry" and element.tag in SIZES:
             self._check_sizes(element)
         elif element.tag == "geometry":
-            shapes = [*_SIZES, *_OTHER_SHAPES]
+            shapes = [*SIZES, *_OTHER_SHAPES]
             found = [one.tag for one in element if one.tag in shapes]
-            if len(found) > 1:
+            # Polylines are the edges and holes of one shape.
+            if len(found) > 1 and set(found) != {"polyline"}:
                 fault = f"two shapes, {found[0]} and {found[1]}"
                 self._refuse(element, fault)
         elif element.tag == "pose":
@@ -90,19 +101,26 @@ class _ModelCheck:
         elif element.tag == "origin":
             for key in ("xyz", "rpy"):
                 self._numbers(element, element.get(key, ""))
+        elif (parent, element.tag) == ("plane", "normal"):
+            numbers = self._numbers(element, text)
+            if len(numbers) != 3 or not any(numbers):
+                self._refuse(element, f"{text.strip()} is no direction")
         elif (parent, element.tag) in _OTHER_NUMBERS:
             self._numbers(element, text)
         elif element.tag == "uri":
             self._check_uri(text.strip(), parents)
 
     def _check_sizes(self, shape: Element) -> None:
-        for name, count in _SIZES[shape.tag].items():
+        for name, count in SIZES[shape.tag].items():
             # SDF has children, URDF has attributes.
             texts = [one.text or "" for one in shape.findall(name)]
             if not texts and name in shape.attrib:
                 texts = [shape.attrib[name]]
             if not texts:
-                self._refuse(shape, f"no {name}")
+                urdf = self._path.suffix.lower() == ".urdf"
+                if urdf or shape.tag.startswith("drake:"):
+                    self._refuse(shape, f"no {name}")
+                continue
             if len(texts) > 1:
                 self._refuse(shape, f"{name} is there {len(texts)} times")
             numbers = self._numbers(shape, texts[0], f"{name}: ")

@@ -16,6 +16,7 @@ from pydrake.geometry import (
     Shape,
 )
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import AbstractParameterIndex, OutputPort
 
 from cns_drake.base.errors import InputError
@@ -34,8 +35,8 @@ _CUBE_TRIANGLES = np.array(
         (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
     ]
 )  # fmt: skip
-# Sides of a cone, so that it is within 0.03 % of its radius.
-_CONE_SIDES = 128
+# Sides of a cone, so that it is within 5e-6 of its radius.
+_CONE_SIDES = 1024
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,13 @@ def check_shape(name: str, shape: Shape) -> None:
         return
     if not np.max(_dimensions(shape)) <= LARGEST_SIZE:
         raise InputError(f"geometry '{name}': larger than {LARGEST_SIZE:g} m")
+
+
+def anchored_frames(plant: MultibodyPlant) -> frozenset[FrameId]:
+    """Returns the geometry frames of a plant that can never move."""
+    bodies = plant.GetBodiesWeldedTo(plant.world_body())
+    frames = (plant.GetBodyFrameIdIfExists(body.index()) for body in bodies)
+    return frozenset(frame for frame in frames if frame is not None)
 
 
 def read_perception_geometry(

@@ -1,5 +1,7 @@
 """Semantic classes of structures, with SemanticKITTI's names and ids."""
 
+from cns_drake.scene.labels import OTHER_MOVING_ID
+
 # Name -> id of SemanticKITTI's published label table, so that tools and
 # networks for that dataset can use our labels unchanged; and the colour in
 # pictures and on the 3-D page, which differs in lightness as well as in hue.
@@ -42,7 +44,6 @@ MOVING_IDS = {
     "bus": 257,
     "truck": 258,
 }
-OTHER_MOVING_ID = 259
 
 
 def moving_id(semantic_class: str) -> int:

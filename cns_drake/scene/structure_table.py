@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
 
+import numpy as np
+
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
-from cns_drake.scene.semantics import CLASS_IDS
-
-MAX_INSTANCE = 2**16 - 1
+from cns_drake.scene.labels import MAX_INSTANCE, Labels
+from cns_drake.scene.semantics import CLASS_IDS, moving_id
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,17 @@ class StructureTable:
                 f"has room for {MAX_INSTANCE}"
             )
         return StructureTable(entries)
+
+    def labels(self, names: Sequence[str]) -> Labels:
+        """Returns those of geometries, by the names of their structures."""
+        table = self.completed(names)
+        entries = [table[name] for name in names]
+        columns = (
+            [entry.label for entry in entries],
+            [moving_id(entry.semantic_class) for entry in entries],
+            [entry.instance for entry in entries],
+        )
+        return Labels(*(np.array(column, np.uint16) for column in columns))
 
 
 def load_structure_table(path: Path) -> StructureTable:

@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
-from pydrake.geometry import FrameId, GeometryId, Role, SceneGraph
+from pydrake.geometry import (
+    Convex,
+    FrameId,
+    GeometryId,
+    Mesh,
+    Role,
+    SceneGraph,
+)
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
@@ -20,8 +27,13 @@ from cns_drake.scene.gazebo_worlds import (
     read_xml,
     simplify_world,
 )
+from cns_drake.scene.gltf_check import GLTF, check_gltf
 from cns_drake.scene.model_check import check_model
-from cns_drake.scene.perception_geometry import check_shape, structure_name
+from cns_drake.scene.perception_geometry import (
+    anchored_frames,
+    check_shape,
+    structure_name,
+)
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
 
 
@@ -87,7 +99,7 @@ def _parse_world(
     """Parses a world, and returns notes on omitted parts."""
     _check_file(path)
     root = None if path.suffix.lower() == ".urdf" else read_xml(path)
-    if root is None or not is_gazebo_world(root):
+    if root is None or not is_gazebo_world(path, root):
         _parse_models(parser, path)
         return ()
     text, notes = simplify_world(path, root, model_paths)
@@ -125,6 +137,26 @@ def _parse_fault(path: Path, *texts: str) -> InputError:
     return InputError(f"{path}: cannot be parsed: {': '.join(faults)}")
 
 
+def _gltf_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
+    """Returns what is not read of the visible glTF files.
+
+    Raises:
+        InputError: the shapes of one would be misread.
+    """
+    inspector = scene_graph.model_inspector()
+    ids = inspector.GetAllGeometryIds(Role.kPerception)
+    shapes = [inspector.GetShape(geometry_id) for geometry_id in ids]
+    sources = [one.source() for one in shapes if isinstance(one, Mesh | Convex)]
+    notes = []
+    for path in sorted({str(one.path()) for one in sources if one.is_path()}):
+        if Path(path).suffix.lower() in GLTF:
+            try:
+                notes += [f"{path}: {one}" for one in check_gltf(Path(path))]
+            except ValueError as error:
+                raise InputError(f"{path}: {error}") from error
+    return tuple(notes)
+
+
 @dataclass(frozen=True)
 class World:
     """Parsed models, ready to be wired.
@@ -153,13 +185,6 @@ class World:
     def anchored_frames(self) -> frozenset[FrameId]:
         """Returns the geometry frames that can never move."""
         return anchored_frames(self.plant)
-
-
-def anchored_frames(plant: MultibodyPlant) -> frozenset[FrameId]:
-    """Returns the geometry frames of a plant that can never move."""
-    bodies = plant.GetBodiesWeldedTo(plant.world_body())
-    frames = (plant.GetBodyFrameIdIfExists(body.index()) for body in bodies)
-    return frozenset(frame for frame in frames if frame is not None)
 
 
 def load_world(
@@ -210,6 +235,7 @@ def load_world(
     if missing:
         raise InputError(f"{sdf}: no structure {min(missing)} to leave out")
     found = _check_visible(scene_graph, sdf)
+    notes += _gltf_notes(scene_graph)
     vehicle_model = None
     if vehicle is not None:
         vehicle_model = _parse_models(parser, Path(vehicle))[0]

@@ -5,12 +5,9 @@ what it describes to a diagram and publishes it on LCM. The fields of a struct
 are those of the section of a scenario, which stays the only description.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-import dataclasses
-from enum import Enum
-from typing import Any, Literal, TypeAlias, get_args, get_origin
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 from drake import lcmt_drake_signal, lcmt_point_cloud
 import numpy as np
@@ -30,60 +27,53 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 
 from cns_drake.base.errors import describe_validation_error
+from cns_drake.scene.drake_releases import find_bus
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from cns_drake.sensors.odometry import odometry
 from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.sensors.sensor_config import Section
+from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 
 # What messages are published on.
 Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
-# Fields of a section that a struct leaves out: `X_PB` stands for the place, and
-# a layout is that of a recording.
+# Fields of a section that a struct leaves out: `X_PB` stands for the place, a
+# layout is that of a recording, and a LiDAR may turn at any rate.
 _LEFT_OUT = ("xyz", "rpy_deg", "layout")
-# Messages a second of a sensor that names no rate, as of a LiDAR's scans.
+# Messages a second of an IMU or odometry that names no rate.
 _RATE = 20
 
 
-def _struct(kind: str, section: type[Section], doc: str) -> type:
-    """Returns the struct with a section's fields, and Drake's own.
-
-    `yaml_load_typed` takes plain types alone: a choice of values becomes the
-    type of these values, and is checked when the struct is applied.
-    """
-    fields: list[tuple[str, Any, Any]] = [
-        ("name", str, kind.lower()),
-        ("X_PB", Transform, dataclasses.field(default_factory=Transform)),
-    ]
-    for name, info in section.model_fields.items():
-        if name in _LEFT_OUT:
-            continue
-        kept, default = info.annotation, info.default
-        if get_origin(kept) is Literal:
-            kept = type(get_args(kept)[0])
-        if isinstance(default, Enum):
-            kept, default = str, default.value
-        fields.append((name, kept, default))
-    fields += [("seed", int, 0), ("lcm_bus", str, "default")]
-    made = dataclasses.make_dataclass(f"{kind}Config", fields)
-    made.__module__, made.__doc__ = __name__, doc
-    return made
-
-
-LidarConfig = _struct(
-    "Lidar",
-    LidarSection,
+@dataclass
+class LidarConfig:
     """A LiDAR, as YAML describes it to Drake.
 
-    Beside the fields of a LiDAR in a scenario, but for place and layout:
+    Its fields are those of a LiDAR in a scenario, but for place and layout, and
+    some of its own. Like that of `add_lidar`, a preset is not rounded, and
+    turns at the rate of its data sheet.
 
     Attributes:
         name: names the system and the channel.
         X_PB: pose of the sensor; its `base_frame` names P, a frame of the
             plant, by default the world's.
+        preset: name of the unit, from the table of presets.
+        rate: turns per second, at most 1000; by default that of the data sheet.
+        columns: columns in a turn, in place of the preset's.
+        min_range: nearest range, in place of the preset's [m].
+        max_range: farthest range, in place of the preset's [m].
+        resolution: step of the coordinates; 0 for exact values [m].
+        range_noise: standard deviation of a Gaussian error of ranges [m].
+        dropout: probability that a return is lost.
+        faint_dropout: on top, a return of intensity I is lost with this
+            probability times (1 - I).
+        motion_distortion: whether beams are cast at their own firing times.
+        causal: whether a scan is the turn that ends at its time, for feedback.
+        returns: `ideal` or `calibrated`.
+        echoes: echoes of calibrated returns.
+        unit_seed: seed of this very unit's errors, in calibrated returns.
         seed: seed of its noise.
         lcm_bus: name of the bus that it publishes on.
 
@@ -92,27 +82,57 @@ LidarConfig = _struct(
 
         from cns_drake import LidarConfig
 
-        text = "{preset: os1-64, rate: 10}"
+        text = "{preset: os1-64, rate: 12.5}"
         config = yaml_load_typed(schema=LidarConfig, data=text)
-    """,
-)
-ImuConfig = _struct(
-    "Imu",
-    ImuSection,
+    """
+
+    name: str = "lidar"
+    X_PB: Transform = field(default_factory=Transform)
+    preset: str = "cns"
+    rate: float | None = None
+    columns: int | None = None
+    min_range: float | None = None
+    max_range: float | None = None
+    resolution: float = 0.0
+    range_noise: float = 0.0
+    dropout: float = 0.0
+    faint_dropout: float = 0.0
+    motion_distortion: bool = False
+    causal: bool = False
+    returns: str = "ideal"
+    echoes: str = "strongest"
+    unit_seed: int = 0
+    seed: int = 0
+    lcm_bus: str = "default"
+
+
+@dataclass
+class ImuConfig:
     """An IMU, as YAML describes it to Drake; see `LidarConfig`.
 
-    Without a rate, of its own or in Kalibr's file, it publishes 20 messages a
-    second.
+    The other fields are those of the IMU in a scenario. Without a rate, of its
+    own or in Kalibr's file, it publishes 20 messages a second.
 
     Example:
         from cns_drake import ImuConfig
 
         config = ImuConfig(name="imu", rate=200)
-    """,
-)
-OdometryConfig = _struct(
-    "Odometry",
-    OdometrySection,
+    """
+
+    name: str = "imu"
+    X_PB: Transform = field(default_factory=Transform)
+    rate: int | None = None
+    kalibr: str | None = None
+    accelerometer_turn_on_bias: float = 0.0
+    gyroscope_turn_on_bias: float = 0.0
+    accelerometer_range: float | None = None
+    gyroscope_range: float | None = None
+    seed: int = 0
+    lcm_bus: str = "default"
+
+
+@dataclass
+class OdometryConfig:
     """Odometry, as YAML describes it to Drake; see `LidarConfig`.
 
     Without a rate it publishes 20 messages a second.
@@ -121,12 +141,20 @@ OdometryConfig = _struct(
         from cns_drake import OdometryConfig
 
         config = OdometryConfig(name="odometry", rate=100)
-    """,
-)
+    """
+
+    name: str = "odometry"
+    X_PB: Transform = field(default_factory=Transform)
+    rate: int | None = None
+    seed: int = 0
+    lcm_bus: str = "default"
+
+
+Config: TypeAlias = LidarConfig | ImuConfig | OdometryConfig
 
 
 def ApplyLidarConfig(
-    config: Any,
+    config: LidarConfig,
     builder: DiagramBuilder,
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
@@ -136,10 +164,11 @@ def ApplyLidarConfig(
     """Adds a LiDAR to a diagram, and publishes its scans on LCM.
 
     The scans, in the world, are `lcmt_point_cloud` on the channel
-    `DRAKE_POINT_CLOUD_<name>`, one a turn; Meldis shows them.
+    `DRAKE_POINT_CLOUD_<name>`, one a turn; Meldis shows them. Their `rgb` are
+    greys, the intensities as in the port `point_cloud_W` of a `Lidar`.
 
     Args:
-        config: a `LidarConfig`.
+        config: describes the LiDAR.
         builder: holds plant and SceneGraph.
         plant: finalized; by default the system named `plant`.
         scene_graph: by default the system named `scene_graph`.
@@ -160,7 +189,7 @@ def ApplyLidarConfig(
 
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
-    section = _section(config, LidarSection)
+    section = _section(config, LidarSection, ("rate",))
     plant = plant or builder.GetSubsystemByName("plant")
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
     frame, X_PB = _place(config, plant)
@@ -172,7 +201,13 @@ def ApplyLidarConfig(
         X_PB,
         name=config.name,
         seed=config.seed,
+        period=(
+            1.0 / config.rate
+            if config.rate
+            else LIDAR_PRESETS[section.preset].pattern.period
+        ),
         motion_distortion=section.motion_distortion,
+        causal=config.causal,
     )
     _publish(
         builder,
@@ -187,7 +222,7 @@ def ApplyLidarConfig(
 
 
 def ApplyImuConfig(
-    config: Any,
+    config: ImuConfig,
     builder: DiagramBuilder,
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
@@ -231,7 +266,7 @@ def ApplyImuConfig(
 
 
 def ApplyOdometryConfig(
-    config: Any,
+    config: OdometryConfig,
     builder: DiagramBuilder,
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
@@ -266,31 +301,49 @@ def ApplyOdometryConfig(
     return sensor
 
 
-def _section(config: Any, kind: type[Section]) -> Any:
-    """Returns the checked fields of a struct, without those left out."""
+def _section(
+    config: Config, kind: type[Section], left_out: tuple[str, ...] = ()
+) -> Any:
+    """Returns the checked fields of a struct, without those left out.
+
+    Raises:
+        ValueError: a field is out of range.
+    """
+    source = f"{type(config).__name__} {config.name}"
+    rate = config.rate
+    if rate is not None and not 0.0 < rate <= HIGHEST_RATE:
+        raise ValueError(
+            f"{source}: rate: {rate:g} is not above 0 and up to {HIGHEST_RATE}"
+        )
     given = {
         name: getattr(config, name)
         for name in kind.model_fields
-        if name not in _LEFT_OUT
+        if name not in (*_LEFT_OUT, *left_out)
     }
     try:
         return kind.model_validate(given)
     except ValidationError as error:
-        source = f"{type(config).__name__} {config.name}"
         text = describe_validation_error(source, error, kind)
         raise ValueError(text) from None
 
 
-def _place(config: Any, plant: MultibodyPlant) -> tuple[Frame, RigidTransform]:
+def _place(
+    config: Config, plant: MultibodyPlant
+) -> tuple[Frame, RigidTransform]:
     """Returns the frame P that carries a sensor, and X_PB."""
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:
         frame = GetScopedFrameByName(plant, config.X_PB.base_frame)
-    return frame, config.X_PB.GetDeterministicValue()
+    X_PB = config.X_PB.GetDeterministicValue()
+    if not np.isfinite(X_PB.GetAsMatrix4()).all():
+        raise ValueError(
+            f"{type(config).__name__} {config.name}: X_PB: not finite"
+        )
+    return frame, X_PB
 
 
 def _interface(
-    config: Any,
+    config: Config,
     builder: DiagramBuilder,
     lcm_buses: LcmBuses | None,
     lcm: Interface | None,
@@ -299,7 +352,7 @@ def _interface(
     if lcm is not None:
         return lcm
     if lcm_buses is not None:
-        return lcm_buses.Find(caller, config.lcm_bus)
+        return find_bus(builder, lcm_buses, caller, config.lcm_bus)
     if config.lcm_bus != "default":
         raise RuntimeError(
             f"{caller}: lcm_bus: there is no bus '{config.lcm_bus}' without "
@@ -322,7 +375,7 @@ def _odometry_values(value: odometry.Odometry) -> np.ndarray:
 
 def _publish(
     builder: DiagramBuilder,
-    config: Any,
+    config: Config,
     kind: str,
     ports: list[OutputPort],
     to_lcm: framework.System,

@@ -131,8 +131,9 @@ def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:
     kind = "a number"
     if multiple_of > 1:
         kind = f"a multiple of {multiple_of}"
+    near = " or ".join(map(str, below + above))
     raise ValueError(
         f"rate: {rate:g} a second; it must be {kind} from"
-        f" {lowest} to {HIGHEST_RATE} that divides 1,000,000,000 ns, such as"
-        f" {' or '.join(map(str, below + above))}"
+        f" {lowest} to {HIGHEST_RATE} that divides 1,000,000,000 ns"
+        + (f", such as {near}" if near else ", and there is none")
     )

@@ -332,7 +332,7 @@ def with_traffic(world: World, plan: traffic_plan.TrafficPlan) -> World:
     """
     table = world.structures
     entries = traffic_structures(plan, table.last_instance + 1)
-    notes = world.notes
+    notes = world.notes + plan.notes
     if plan.left_out:
         notes += (
             f"traffic: {plan.left_out} left out: they would have met others "

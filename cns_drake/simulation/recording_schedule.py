@@ -2,7 +2,11 @@
 
 import math
 
-from cns_drake.recording.recorded_topics import OBJECT_TOPICS, recording_topics
+from cns_drake.recording.recorded_topics import (
+    OBJECT_TOPICS,
+    camera_topic,
+    recording_topics,
+)
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.scenarios.scenario import Scenario
@@ -22,7 +26,7 @@ def scenario_topics(scenario: Scenario) -> tuple[Topic, ...]:
         scenario.lidars,
         layouts=point_layouts(scenario),
         with_objects=not scenario.traffic.is_off,
-        further=_further_topics(scenario).values(),
+        further=(*_further_topics(scenario).values(), *_camera_rates(scenario)),
     )
 
 
@@ -30,6 +34,21 @@ def _further_topics(scenario: Scenario) -> dict[str, Topic]:
     """Returns the topic of each further sensor, by the sensor's name."""
     sensors = scenario.further_sensors.items()
     return {name: sensor.topic(name) for name, sensor in sensors}
+
+
+def _camera_rates(scenario: Scenario) -> dict[Topic, int]:
+    """Returns the images a second on each topic of a camera."""
+    return {
+        camera_topic(name, kind): camera.rate
+        for name, camera in scenario.cameras.items()
+        for kind, is_there in (
+            ("image", True),
+            ("depth", camera.depth),
+            ("label", camera.label),
+            ("camera_info", True),
+        )
+        if is_there
+    }
 
 
 def first_points_topic(scenario: Scenario) -> str:
@@ -42,7 +61,8 @@ def drive_schedule(scenario: Scenario) -> Schedule:
 
     If the scenario has a number of frames, LiDARs end with the last one. An IMU
     or odometry with its own rate continues until that scan is complete, so that
-    its samples enclose every scan.
+    its samples enclose every scan; and so does `/tf` with motion distortion,
+    which can be put right by it.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -58,6 +78,8 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         rates |= {topic.name: fastest for topic in OBJECT_TOPICS}
     for name, topic in _further_topics(scenario).items():
         rates[topic.name] = scenario.further_sensors[name].rate or fastest
+    for topic, rate in _camera_rates(scenario).items():
+        rates[topic.name] = rate
     for topic in scenario_topics(scenario):
         if not topic.latched and topic.name not in rates:
             rates[topic.name] = scenario.lidars[topic.name.split("/")[1]].rate
@@ -74,6 +96,8 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         until["/imu/data"] = complete
     if scenario.odometry.rate is not None:
         until["/odometry"] = until["/tf"] = complete
+    elif any(one.motion_distortion for one in scenario.lidars.values()):
+        until["/tf"] = complete
     # The number of the first sample at or after the end.
     return make_schedule(
         periods,

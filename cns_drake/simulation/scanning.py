@@ -35,9 +35,14 @@ def scan_world(
     return lidar.GetOutputPort("scan").Eval(context)
 
 
-def still_scene(world: World, pattern: BeamPattern) -> RayCastingScene:
-    """Returns the world's models in their initial state, to cast rays on."""
-    lidar, context = _stand(world, RigidTransform(), pattern)
+def still_scene(
+    world: World, X_WS: RigidTransform, pattern: BeamPattern
+) -> RayCastingScene:
+    """Returns the world's models in their initial state, to cast rays on.
+
+    Rays start within some kilometres of S.
+    """
+    lidar, context = _stand(world, X_WS, pattern)
     return lidar.EvalScene(context)
 
 

@@ -66,7 +66,8 @@ def add_mcap_recorder(
 
     Raises:
         InputError: the folder must not be used.
-        ValueError: a rate names no sensor, or there is no period.
+        ValueError: a rate names no sensor, there is no period, or a LiDAR is
+            causal.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -77,6 +78,12 @@ def add_mcap_recorder(
             simulator.AdvanceTo(10.0)
     """
     cameras = cameras or {}
+    for lidar in lidars:
+        if lidar.causal:
+            raise ValueError(
+                f"lidars: '{lidar.get_name()}' is causal: its scan at a time "
+                "began a turn before, and a recording stamps it with the time"
+            )
     X_BSs = {lidar.get_name(): _place_of(lidar, odometry) for lidar in lidars}
     X_BI = None
     if imu is not None and odometry is not None:

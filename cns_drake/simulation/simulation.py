@@ -23,6 +23,7 @@ from cns_drake.scenarios import provenance
 from cns_drake.scenarios.planning import shown_beside
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
+from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.config import KALIBR_FILE
 from cns_drake.sensors.lidar.config import describe_unit
@@ -198,6 +199,10 @@ def _make_bag(
                 | {
                     name: sensor_pose(sensor)
                     for name, sensor in scenario.further_sensors.items()
+                }
+                | {
+                    name: optical_pose(camera)
+                    for name, camera in scenario.cameras.items()
                 },
                 sensor_pose(scenario.imu),
             ),

@@ -2,6 +2,7 @@
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import FrameId, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
@@ -14,7 +15,7 @@ from pydrake.systems.framework import (
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.vehicle_motion import VehicleMotion
+from cns_drake.motion.vehicle_motion import VehicleMotion, VehicleSweep
 from cns_drake.pictures.drive_page import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.background_writer import BackgroundWriter
@@ -24,9 +25,12 @@ from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import World
+from cns_drake.sensors.camera.camera import add_cameras
+from cns_drake.sensors.camera.camera_scene import CameraScene
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.imu import add_described_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
+from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation import loaded_drive, recording_schedule
 from cns_drake.traffic.traffic_adding import add_traffic, connect_traffic
@@ -57,8 +61,9 @@ def make_station(
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry`, `geometry_query`; `imu_samples` of such
-    an IMU; with traffic `objects`; and the port of each further sensor under
-    its name.
+    an IMU; with traffic `objects`; the port of each further sensor under its
+    name; and of each camera `<camera>_image`, `<camera>_depth` and
+    `<camera>_label`.
 
     Args:
         scenario: the scenario to build.
@@ -145,7 +150,6 @@ def make_station(
             name=name,
             seed=scenario.seed,
             weather=scenario.weather,
-            trajectory=trajectory,
             unseen=[
                 plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)
             ],
@@ -157,6 +161,14 @@ def make_station(
         builder.Connect(
             poses.get_output_port(), lidar.GetInputPort("frame_poses")
         )
+        if config.motion_distortion:
+            sweep = builder.AddNamedSystem(
+                f"{name}_sweep",
+                VehicleSweep(trajectory, lidar.pattern.column_t_ns * 1e-9),
+            )
+            builder.Connect(
+                sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
+            )
         if moving is not None:
             connect_traffic(builder, moving, lidar, config.motion_distortion)
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
@@ -181,6 +193,21 @@ def make_station(
             seed=scenario.seed,
         )
 
+    further = {
+        name: RecordedSensor(
+            sensor.topic(name), sensor_pose(sensor), sensor.make_message
+        )
+        for name, sensor in scenario.further_sensors.items()
+    }
+    if scenario.cameras:
+        scene = _copy_for_cameras(scene_graph, world)
+        scene.connect(builder, poses.get_output_port())
+        frame = plant.GetBodyFrameIdOrThrow(base.index())
+        for name, (port, recorded) in add_cameras(
+            builder, scene, frame, scenario.cameras
+        ).items():
+            measured[name], further[name] = port, recorded
+
     if moving is not None:
         measured["objects"] = moving.GetOutputPort("objects")
     if page is not None:
@@ -193,14 +220,13 @@ def make_station(
             bag,
             X_BSs={n: sensor_pose(one) for n, one in scenario.lidars.items()},
             X_BI=sensor_pose(scenario.imu),
-            further={
-                name: RecordedSensor(
-                    sensor.topic(name), sensor_pose(sensor), sensor.make_message
-                )
-                for name, sensor in scenario.further_sensors.items()
-            },
+            further=further,
             schedule=recording_schedule.drive_schedule(scenario),
             layouts=recording_schedule.point_layouts(scenario),
+            num_rings={
+                n: make_pattern(one).num_rings
+                for n, one in scenario.lidars.items()
+            },
             imu_variances=scenario.imu.noise(scenario.seed).variances(
                 scenario.imu.sample_rate(scenario.fastest_rate)
             ),
@@ -219,6 +245,29 @@ def make_station(
     diagram = builder.Build()
     diagram.set_name(scenario.name)
     return diagram
+
+
+def _copy_for_cameras(scene_graph: SceneGraph, world: World) -> CameraScene:
+    """Returns what cameras on the vehicle see."""
+    plant, inspector = world.plant, scene_graph.model_inspector()
+    context = plant.CreateDefaultContext()
+    world_frame = inspector.world_frame_id()
+
+    def calc_X_WF(frame: FrameId) -> RigidTransform:
+        if frame == world_frame:
+            return RigidTransform()
+        return plant.GetBodyFromFrameId(frame).EvalPoseInWorld(context)
+
+    base = plant.GetBodyByName("base_link", world.vehicle)
+    bodies = plant.GetBodyIndices(world.vehicle)
+    return CameraScene(
+        scene_graph,
+        world.structures,
+        calc_X_WF,
+        anchored=world.anchored_frames() | {world_frame},
+        vehicle={plant.GetBodyFrameIdIfExists(body) for body in bodies},
+        base=plant.GetBodyFrameIdOrThrow(base.index()),
+    )
 
 
 class _FramePoses(LeafSystem):

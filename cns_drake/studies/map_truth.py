@@ -90,6 +90,9 @@ _AXES = np.array(
     ]
 )
 _REACH = 1.25 * NEAR
+# Edges and small parts lie in other directions: a spiral over half a sphere has
+# one within 15 deg of each.
+_SPIRAL = 64
 
 # Drawn in this order: what changed lies on top.
 _RGB = {
@@ -130,7 +133,9 @@ class Survey:
             with_vehicle=False,
             trajectory=self.simulated.trajectory,
         )
-        return still_scene(world, self.simulated.pattern)
+        simulated = self.simulated
+        X_WS = simulated.X_WBs[0] @ simulated.X_BS
+        return still_scene(world, X_WS, simulated.pattern)
 
 
 def open_survey(place: str | Path) -> Survey:
@@ -351,6 +356,18 @@ class _Tiles:
         return [int(tile) for tile in near if len(self.left[tile])]
 
 
+def _spiral() -> np.ndarray:
+    """Returns unit directions at even distances, (_SPIRAL, 3), z > 0.
+
+    Source: Swinbank and Purser, Fibonacci grids, QJRMS 2006.
+    """
+    number = np.arange(_SPIRAL) + 0.5
+    z = 1.0 - number / _SPIRAL
+    angle = np.pi * (1.0 + np.sqrt(5.0)) * number
+    around = np.sqrt(1.0 - z * z)
+    return np.stack([around * np.cos(angle), around * np.sin(angle), z], axis=1)
+
+
 def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
     """Returns (N,) bool: points (N, 3) in W [m] within `NEAR` of a surface."""
     result = np.zeros(len(points), bool)
@@ -367,6 +384,15 @@ def is_there(points: np.ndarray, scene: RayCastingScene) -> np.ndarray:
             # The normal of a miss is zero.
             across = along * np.abs(hits.normals_W @ axis)
             result[rows] = (hits.geometry >= 0) & (across <= NEAR)
+        left = left[~result[left]]
+    for axis in _spiral():
+        for rows in _chunks(left):
+            hits = scene.cast_rays(
+                points[rows] - NEAR * axis,
+                np.broadcast_to(axis, (len(rows), 3)),
+                2.0 * NEAR,
+            )
+            result[rows] = hits.geometry >= 0
         left = left[~result[left]]
     return result
 

@@ -6,7 +6,7 @@ places. Cities lie `CITY_DISTANCE` apart, which keeps them apart by any radius.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import itertools
 from pathlib import Path
@@ -47,6 +47,10 @@ CITY_DISTANCE = 100_000.0
 # positives, of what is no negative, and of matches in the evaluation [m].
 _POINTS = 4096
 _POSITIVE, _NON_NEGATIVE, _MATCH = 10.0, 50.0, 25.0
+# The sets that MinkLoc3Dv2's evaluation reads, by name, each of one city; and
+# the number of places that it asks for at a time.
+_LOCATIONS = ("oxford", "university", "residential", "business")
+_ASKED = 25
 # Clouds are thinned to this first, so that far walls keep points [m].
 _VOXEL = 0.3
 _GROUND = np.array(sorted(CLASS_IDS[name] for name in GROUND_CLASSES))
@@ -106,16 +110,27 @@ def export_pairs(
     output: Path,
     options: ExportOptions,
     cluster: Cluster,
+    on_note: Callable[[str], None] = lambda note: None,
 ) -> list[Path]:
     """Writes a set for a trainer; returns the files that name the pairs.
 
-    Finished drives are not simulated again. Drives held out are for the
-    evaluation alone; without any, that is of the others.
+    Finished drives are not simulated again.
+
+    Args:
+        scenarios: the drives to learn from.
+        held_out: those for the evaluation alone; without any, that is of the
+            others.
+        output: the folder of the set.
+        options: what is exported.
+        cluster: runs the work.
+        on_note: takes notes on what the set lacks.
 
     Raises:
-        InputError: two drives have one name, or one cannot be simulated; all
-            such are named.
+        InputError: there is no drive to learn from, two drives have one name,
+            or one cannot be simulated; all such are named.
     """
+    if not scenarios:
+        raise InputError("export-pairs: no drive to learn from")
     every = [*scenarios, *held_out]
     names = [one.name for one in every]
     for name in names:
@@ -158,7 +173,7 @@ def export_pairs(
         for name, city in zip(names, cities, strict=True)
     ]
     learned, tested = placed[: len(scenarios)], placed[len(scenarios) :]
-    return _write_pickles(output, learned, tested)
+    return _write_pickles(output, learned, tested or learned, on_note)
 
 
 def export_run(
@@ -244,22 +259,87 @@ class Run:
 
 
 def _write_pickles(
-    output: Path, learned: Sequence[Run], tested: Sequence[Run]
+    output: Path,
+    learned: Sequence[Run],
+    tested: Sequence[Run],
+    on_note: Callable[[str], None],
 ) -> list[Path]:
-    """Writes the pickles of PointNetVLAD, as MinkLoc3Dv2 reads them."""
-    database, queries = evaluation_sets(tested or learned)
-    contents = {
-        "training_queries_baseline2": training_tuples(learned),
-        "test_queries_baseline2": training_tuples(tested or learned),
-        "evaluation_database": database,
-        "evaluation_query": queries,
-    }
-    written = []
+    """Writes the pickles of PointNetVLAD, as MinkLoc3Dv2 reads them.
+
+    Returns:
+        Those of all drives, without those of single cities.
+    """
+    contents: dict[str, Any] = {}
+    for name, runs in (("training", learned), ("test", tested)):
+        tuples = contents[f"{name}_queries_baseline2"] = training_tuples(runs)
+        alone = sum(not len(one.positives) for one in tuples.values())
+        if alone:
+            # The sampler of MinkLoc3Dv2 passes over them.
+            on_note(
+                f"{name}: {alone} of {len(tuples)} clouds have no other within"
+                f" {_POSITIVE:g} m; nothing is learned of them"
+            )
+    every_drive = list(contents)
+    by_location = {"": tested} | _locations(tested, on_note)
+    for location, runs in by_location.items():
+        prefix = f"{location}_" if location else ""
+        names = [f"{prefix}evaluation_{one}" for one in ("database", "query")]
+        contents |= dict(zip(names, evaluation_sets(runs), strict=True))
+        every_drive += [] if location else names
     for name, values in contents.items():
-        written.append(output / f"{name}.pickle")
-        with completing(written[-1]) as part, open(part, "wb") as stream:
+        path = output / f"{name}.pickle"
+        with completing(path) as part, open(part, "wb") as stream:
             pickle.dump(values, stream, protocol=pickle.HIGHEST_PROTOCOL)
-    return written
+    return [output / f"{name}.pickle" for name in every_drive]
+
+
+def _locations(
+    runs: Sequence[Run], on_note: Callable[[str], None]
+) -> dict[str, list[Run]]:
+    """Returns the drives of each location of MinkLoc3Dv2's evaluation.
+
+    A location is a city; of fewer cities, some are there twice. The evaluation
+    divides by the number of pairs of drives, and for each of these by the
+    number of queries with a match. Cities for which that is impossible are left
+    out, with a note; without any city, there is no location.
+    """
+    cities: dict[int, list[Run]] = {}
+    for run in runs:
+        cities.setdefault(run.city, []).append(run)
+    usable = []
+    for drives in cities.values():
+        fault = _evaluation_fault(drives)
+        if fault is None:
+            usable.append(drives)
+        else:
+            on_note(f"not for MinkLoc3Dv2's evaluation: {fault}")
+    if len(usable) > len(_LOCATIONS):
+        on_note(
+            f"MinkLoc3Dv2's evaluation has the first {len(_LOCATIONS)} of"
+            f" {len(usable)} cities"
+        )
+    return {
+        location: usable[k % len(usable)]
+        for k, location in enumerate(_LOCATIONS)
+        if usable
+    }
+
+
+def _evaluation_fault(drives: Sequence[Run]) -> str | None:
+    """Returns why MinkLoc3Dv2 cannot evaluate the drives of a city, if so."""
+    names = [run.folder.removeprefix("runs/") for run in drives]
+    if len(drives) < 2:
+        return f"{names[0]} is the only drive of its city (two are needed)"
+    for name, run in zip(names, drives, strict=True):
+        if len(run.X_WS) < _ASKED:
+            return f"{name} has {len(run.X_WS)} clouds ({_ASKED} are needed)"
+    for (name, run), (other, further) in itertools.combinations(
+        zip(names, drives, strict=True), 2
+    ):
+        distances, _ = cKDTree(run.positions).query(further.positions)
+        if distances.min() > _MATCH:
+            return f"{name} and {other} are never within {_MATCH:g} m"
+    return None
 
 
 def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:

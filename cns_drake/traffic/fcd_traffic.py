@@ -25,6 +25,11 @@ from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, gait_rate
 _TIME_TOLERANCE = 2e-3
 # Half of the vehicles of a map's own trace are nearer to its lanes [m].
 _OFF_ROAD = 5.0
+# A person is in a vehicle whose front is so near [m].
+_RIDING = 0.1
+# Roads lie at two heights where the next places of lanes differ by more [m], of
+# so many, this near [m]; the cosine of the turn between a vehicle and its lane.
+_LEVELS, _CANDIDATES, _REACH, _ALIKE = 1.5, 24, 6.0, 0.7
 # Part of the name of a type -> kind; the first that fits counts.
 _KINDS_BY_WORD = (
     ("bicycle", "bicycle"),
@@ -50,6 +55,7 @@ class TracedObject:
         xy: (M, 2) of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
         slope: (M,) of the road, upwards positive [rad].
+        z: (M,) heights in the trace [m]; NaN where it has none.
     """
 
     name: str
@@ -58,13 +64,15 @@ class TracedObject:
     xy: np.ndarray
     yaw: np.ndarray
     slope: np.ndarray
+    z: np.ndarray
 
 
 @dataclass(frozen=True)
 class FcdTrace:
     """A trace of `num_steps` times: the first [s], and their distance [s].
 
-    Vehicles and persons are in the order in which they come.
+    Vehicles and persons are in the order in which they come; notes name what is
+    left out.
     """
 
     begin: float
@@ -72,6 +80,7 @@ class FcdTrace:
     num_steps: int
     vehicles: tuple[TracedObject, ...]
     persons: tuple[TracedObject, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -92,6 +101,7 @@ def read_fcd(path: Path) -> FcdTrace:
         times = np.array([step.number("time") for step in steps])
         begin, dt = _even(path, times)
         vehicles = _objects(steps, "vehicle")
+        notes = _leave_out(path, steps)
         persons = _objects(steps, "person")
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
@@ -99,7 +109,43 @@ def read_fcd(path: Path) -> FcdTrace:
         raise InputError(
             f"{path}: the trace has no vehicle and no person in any timestep"
         )
-    return FcdTrace(begin, dt, len(times), vehicles, persons)
+    return FcdTrace(begin, dt, len(times), vehicles, persons, notes)
+
+
+def _leave_out(path: Path, steps: list[Element]) -> tuple[str, ...]:
+    """Removes persons while they ride in vehicles; notes what is left out.
+
+    SUMO writes riders at the front of their vehicle, which new versions name.
+
+    Raises:
+        ValueError: one lacks a value.
+    """
+    riders, others = set(), set()
+    for step in steps:
+        fronts = {
+            (one.number("x"), one.number("y")) for one in step.all("vehicle")
+        }
+        places = np.reshape(list(fronts), (-1, 2))
+        for one in list(step.all("person")):
+            away = places - (one.number("x"), one.number("y"))
+            apart = np.hypot(*away.T).min(initial=np.inf)
+            if one.value("vehicle", "") or apart < _RIDING:
+                riders.add(one.value("id"))
+                step.remove(one)
+        others |= {
+            (one.tag, one.value("id", ""))
+            for one in step.all("*")
+            if one.tag not in ("vehicle", "person")
+        }
+    found = [(riders, "persons, while they ride in vehicles")] + [
+        ({one for one in others if one[0] == tag}, f"elements {tag}")
+        for tag in sorted({tag for tag, _ in others})
+    ]
+    return tuple(
+        f"{path}: left out: {len(names)} {what}"
+        for names, what in found
+        if names
+    )
 
 
 def _even(path: Path, times: np.ndarray) -> tuple[float, float]:
@@ -143,15 +189,16 @@ def _objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
                 )
             types.setdefault(name, one.value("type", ""))
             place = [one.number(key) for key in ("x", "y", "angle")]
-            rows.append((number, *place, one.number("slope", 0.0)))
+            z = one.number("z") if "z" in one.attrib else np.nan
+            rows.append((number, *place, one.number("slope", 0.0), z))
     objects = []
     for name, rows in found.items():
-        number, x, y, angle, slope = np.transpose(rows)
+        number, x, y, angle, slope, z = np.transpose(rows)
         # Angles are degrees from north, clockwise; y is north.
         yaw = np.unwrap(np.pi / 2 - np.radians(angle))
         at, xy = number.astype(int), np.column_stack([x, y])
         objects.append(
-            TracedObject(name, types[name], at, xy, yaw, np.radians(slope))
+            TracedObject(name, types[name], at, xy, yaw, np.radians(slope), z)
         )
     return tuple(objects)
 
@@ -187,13 +234,15 @@ def play_trace(
     lanes = np.concatenate([piece.points for piece in graph.pieces])
     _check_place(trace, path, lanes)
     kinds = [_kind(one, seed) for one in trace.vehicles]
-    heights = _Heights(lanes)
+    heights = Heights(lanes)
+    heights.zero = _zero(trace, heights)
     pairs = zip(trace.vehicles, kinds, strict=True)
     rows = [_vehicle_rows(*pair, heights) for pair in pairs]
     vehicles = _make_tracks(trace, trace.vehicles, rows)
     strips = [walkway.points for walkway in walkways]
-    heights = _Heights(np.concatenate([lanes, *strips]))
-    rows = [_person_rows(one, heights, trace.dt) for one in trace.persons]
+    ground = Heights(np.concatenate([lanes, *strips]))
+    ground.zero = heights.zero
+    rows = [_person_rows(one, ground, trace.dt) for one in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
     # Steps are short enough to notice all that cross the car's way.
@@ -207,6 +256,7 @@ def play_trace(
         vehicles.select(kept),
         walkers.select(kept_walkers),
         int((~kept).sum() + (~kept_walkers).sum()),
+        notes=trace.notes,
     )
 
 
@@ -233,13 +283,21 @@ def _extent(places: np.ndarray) -> str:
     return f"x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to {high[1]:.0f} m"
 
 
-class _Heights:
-    """Heights of the ground at places."""
+class Heights:
+    """Heights of the ground at places.
+
+    Attributes:
+        zero: height of the ground where a trace has z = 0 [m].
+    """
+
+    zero = 0.0
 
     def __init__(self, points: np.ndarray):
-        """Takes (N, 3) points on the ground [m]."""
+        """Takes (N, 3) points on the ground, along lanes [m]."""
         self._tree = cKDTree(points[:, :2])
         self._z = points[:, 2]
+        steps = np.diff(points[:, :2], axis=0, prepend=points[:1, :2])
+        self._heading = np.arctan2(steps[:, 1], steps[:, 0])
 
     def at(self, xy: np.ndarray) -> np.ndarray:
         """Returns the heights of the nearest points, weighted by distance."""
@@ -247,8 +305,60 @@ class _Heights:
         distance, near = (
             np.reshape(values, (len(xy), -1)) for values in (distance, near)
         )
+        return self._weighted(distance, near)
+
+    def along(
+        self, xy: np.ndarray, z: np.ndarray, yaw: np.ndarray | None
+    ) -> np.ndarray:
+        """Returns the heights (M,) under one that moves over places (M, 2) [m].
+
+        Where roads cross at two heights, it is on that of its height in the
+        trace; if it has none (NaN), on that on which it came, or of a lane in
+        its direction [rad].
+        """
+        found = self.at(xy)
+        count = min(_CANDIDATES, len(self._z))
+        distance, near = (
+            np.reshape(values, (len(xy), -1))
+            for values in self._tree.query(xy, k=count)
+        )
+        is_near = distance < _REACH
+        levels = np.where(is_near, self._z[near], np.nan)
+        for k in np.flatnonzero(np.ptp(self._z[near], axis=1) > _LEVELS):
+            usable = np.flatnonzero(is_near[k])
+            if not len(usable) or np.ptp(levels[k][usable]) <= _LEVELS:
+                continue
+            if yaw is not None:
+                turn = self._heading[near[k][usable]] - yaw[k]
+                alike = usable[np.abs(np.cos(turn)) > _ALIKE]
+                usable = alike if len(alike) else usable
+            moved = np.hypot(*(xy[k] - xy[k - 1])) if k else np.inf
+            goal = levels[k][usable[0]]
+            if np.isfinite(z[k]):
+                goal = z[k] + self.zero
+            elif moved < _REACH:
+                goal = found[k - 1]
+            off = np.abs(levels[k][usable] - goal)
+            usable = usable[off < off.min() + _LEVELS / 2][:4]
+            (found[k],) = self._weighted(
+                distance[k][None, usable], near[k][None, usable]
+            )
+        return found
+
+    def _weighted(self, distance: np.ndarray, near: np.ndarray) -> np.ndarray:
         weight = 1.0 / np.maximum(distance, 0.05) ** 2
         return np.sum(weight * self._z[near], axis=1) / weight.sum(axis=1)
+
+
+def _zero(trace: FcdTrace, heights: Heights) -> float:
+    """Returns the map's height where a trace has z = 0 [m]."""
+    some = [one for one in trace.vehicles if np.isfinite(one.z).all()]
+    if not some:
+        return 0.0
+    z = np.concatenate([one.z for one in some])
+    return float(
+        np.median(heights.at(np.concatenate([o.xy for o in some])) - z)
+    )
 
 
 def _kind(one: TracedObject, seed: int) -> VehicleKind:
@@ -265,22 +375,24 @@ def _kind(one: TracedObject, seed: int) -> VehicleKind:
 
 
 def _vehicle_rows(
-    one: TracedObject, kind: VehicleKind, heights: _Heights
+    one: TracedObject, kind: VehicleKind, heights: Heights
 ) -> np.ndarray:
     """Returns the (M, 5) coordinates of a vehicle; see `TrafficPlan`."""
     ahead = np.column_stack([cos(one.yaw), sin(one.yaw)])
     xy = one.xy - kind.size[0] / 2 * ahead
     # An upward slope turns about -y.
-    return np.column_stack([xy, heights.at(xy), one.yaw, -one.slope])
+    z = heights.along(xy, one.z, one.yaw)
+    return np.column_stack([xy, z, one.yaw, -one.slope])
 
 
-def _person_rows(one: TracedObject, heights: _Heights, dt: float) -> np.ndarray:
+def _person_rows(one: TracedObject, heights: Heights, dt: float) -> np.ndarray:
     """Returns the (M, 5) coordinates of a walker; see `TrafficPlan`."""
     steps = np.linalg.norm(np.diff(one.xy, axis=0), axis=1)
     turned = dt * gait_rate(steps / dt)
     start = zlib.crc32(one.name.encode()) % 1000 * 2e-3 * np.pi
     phase = start + np.concatenate([[0.0], np.cumsum(turned)])
-    return np.column_stack([one.xy, heights.at(one.xy), one.yaw, phase])
+    z = heights.along(one.xy, one.z, None)
+    return np.column_stack([one.xy, z, one.yaw, phase])
 
 
 def _make_tracks(

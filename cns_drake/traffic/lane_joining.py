@@ -164,8 +164,7 @@ def _ways(
         short = waiting.pop(0)
         for k in after[short[-1] if short else first]:
             if k in long:
-                if k != first:
-                    yield short, k
-                    found += 1
+                yield short, k
+                found += 1
             elif k not in short and len(short) < _MOST_SHORT:
                 waiting.append((*short, k))

@@ -9,8 +9,8 @@ from pydrake.geometry import FrameId, SceneGraph, SourceId
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.base.errors import InputError
+from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.structure_table import (
-    MAX_INSTANCE,
     StructureEntry,
     StructureTable,
 )

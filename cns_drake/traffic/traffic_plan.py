@@ -132,6 +132,7 @@ class TrafficPlan:
         left_out: number of wanted bodies left out because they would collide.
         positions: places of the ego car on its path at each `KNOT_PERIOD` [m],
             if it was one of the vehicles.
+        notes: for the user.
     """
 
     kinds: tuple[VehicleKind, ...]
@@ -139,6 +140,7 @@ class TrafficPlan:
     walkers: Tracks
     left_out: int = 0
     positions: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
 
 
 class _Task(NamedTuple):

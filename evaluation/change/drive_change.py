@@ -51,12 +51,14 @@ class Surveyed:
         voxels: the map on the grid of the TCR.
         positions: (N, 3) of the sensor [m]; None for a map file.
         drive: the drive, or its world frame and map; None for a map file.
+        notes: notes on how it was read.
     """
 
     name: str
     voxels: VoxelMap
     positions: np.ndarray | None = None
     drive: Placed | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,7 @@ def survey_in_one_world(
     when: When,
     track: Track = silent,
     lidar: str | None = None,
+    columns: int | None = None,
 ) -> tuple[list[Surveyed], list[AlignmentReport]]:
     """Maps drives, or reads map files, all in one world.
 
@@ -142,6 +145,8 @@ def survey_in_one_world(
         when: whether later drives are aligned with the first.
         track: reports progress.
         lidar: name of the LiDAR, for recordings with several.
+        columns: number of columns of `.bin` files; by default as their values
+            show.
 
     Returns:
         The maps, in the order of the paths, and reports on alignments.
@@ -149,7 +154,7 @@ def survey_in_one_world(
     Raises:
         InputError: if a path cannot be read, or a drive cannot be aligned.
     """
-    opened = [open_source(path, lidar) for path in paths]
+    opened = [open_source(path, lidar, columns) for path in paths]
     drives = {i: one for i, one in enumerate(opened) if isinstance(one, Drive)}
     if when == "always" and len(drives) < len(opened):
         raise InputError("--align always: a map file cannot be aligned")
@@ -171,13 +176,16 @@ def survey_in_one_world(
                 drives[first], drives[other] = alignment.first, alignment.second
                 reports.append(alignment.report)
     return [
-        _survey(drives.get(i, one), track) for i, one in enumerate(opened)
+        _survey(drives.get(i, one), track, columns)
+        for i, one in enumerate(opened)
     ], reports
 
 
 def survey_drive(drive: Drive, voxels: VoxelMap) -> Surveyed:
     """Returns a drive with its map on the grid of the TCR."""
-    return Surveyed(drive.name, voxels, drive.X_WS[:, :3, 3], drive)
+    return Surveyed(
+        drive.name, voxels, drive.X_WS[:, :3, 3], drive, drive.notes
+    )
 
 
 def compare(
@@ -230,7 +238,9 @@ def compare(
     )
 
 
-def open_source(path: Path, lidar: str | None = None) -> Drive | Path:
+def open_source(
+    path: Path, lidar: str | None = None, columns: int | None = None
+) -> Drive | Path:
     """Opens a drive; returns the path of a cloud.
 
     Raises:
@@ -239,17 +249,20 @@ def open_source(path: Path, lidar: str | None = None) -> Drive | Path:
     path = Path(path)
     if path.is_file() and is_cloud(path):
         return path
-    return open_drive(path, lidar)
+    return open_drive(path, lidar, columns)
 
 
-def _survey(source: Drive | Path, track: Track) -> Surveyed:
+def _survey(
+    source: Drive | Path, track: Track, columns: int | None = None
+) -> Surveyed:
     if isinstance(source, Drive):
         voxels = map_drive(source, VOXEL_SIZE, track)
         return survey_drive(source, voxels)
     accumulator = VoxelAccumulator(VOXEL_SIZE)
-    for points in read_blocks(source):
+    notes: list[str] = []
+    for points in read_blocks(source, columns, notes.append):
         accumulator.add(points)
-    return Surveyed(source.name, accumulator.to_map())
+    return Surveyed(source.name, accumulator.to_map(), notes=tuple(notes))
 
 
 def _same_stage_partner(

@@ -1,11 +1,14 @@
 """Single point clouds: map files, and scans with a file each."""
 
+import codecs
 from collections.abc import Callable, Iterator
 import contextlib
+import functools
 import itertools
 import math
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
+import warnings
 
 import numpy as np
 
@@ -13,12 +16,19 @@ from cns_drake.base import points as point_arrays
 from cns_drake.base.compiled import compiled
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
+from cns_drake.base.number_rows import is_number, parse_rows
 from cns_drake.base.points import check_range, store
 from cns_drake.base.poses import FARTHEST
+from evaluation.clouds.bin_columns import find_layout
 
 # Enough for rows of some tens of numbers with some tens of characters.
 _LONGEST_LINE_BYTES = 1 << 16
 _PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
+_PCD_SIZES = {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
+_UNMOVED = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+# Steps of a coordinate that blur a surface [m].
+_COARSE_STEP = 0.03
+_MARK = codecs.BOM_UTF8
 # A header takes some hundred bytes; the search for it ends here.
 _HEADER_LIMIT_BYTES = 1 << 16
 # LZF expands three bytes to at most 264. Compressed files are unpacked in
@@ -36,9 +46,10 @@ _PLY_ORDERS = {
     "binary_big_endian": ">",
     "ascii": "<",
 }
+# Takes a note for the user.
+OnNote = Callable[[str], None]
 # Reads a file; the second argument is the number of points in a block.
-_Reader = Callable[[Path, int], Iterator[np.ndarray]]
-_BIN = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
+_Reader = Callable[[Path, int, OnNote], Iterator[np.ndarray]]
 # Number of points of a map that are read at a time.
 _BLOCK = 1 << 18
 # More than a LiDAR's turn can fill [bytes].
@@ -90,7 +101,7 @@ def _text_records(
                 raise ValueError(
                     f"{start + len(texts)} instead of {count} rows of numbers"
                 )
-            values = np.loadtxt(texts, np.float64, ndmin=2)
+            values = parse_rows(texts, np.dtype(float), first=start)
             yield _to_records(values, dtype, kind)
         if not more and next(lines, None) is not None:
             raise ValueError(f"more than the {count} rows of the header")
@@ -134,12 +145,18 @@ def _to_records(values: np.ndarray, dtype: np.dtype, kind: str) -> np.ndarray:
     return records
 
 
-def _read_pcd(path: Path, block: int) -> Iterator[np.ndarray]:
+def _read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     """Reads an ascii, binary or binary_compressed PCD file (PCL, up to 0.7).
 
-    Padding (fields named `_`) gets names of its own.
+    Padding (fields named `_`) gets names of its own. Programs disagree whether
+    VIEWPOINT moves the points, so it does not, and a note says so.
     """
     header, offset = _read_pcd_header(path)
+    if _is_moved(header.get("VIEWPOINT", [])):
+        on_note(
+            f"{path}: VIEWPOINT is not applied; the points are taken as they"
+            " are written"
+        )
     dtype, count = _describe_pcd(header)
     encoding = header["DATA"][0].lower() if header["DATA"] else ""
     if encoding == "ascii":
@@ -154,12 +171,21 @@ def _read_pcd(path: Path, block: int) -> Iterator[np.ndarray]:
     raise ValueError(f"unknown PCD encoding {encoding!r}")
 
 
+def _record_type(fields: list[tuple], where: str) -> np.dtype:
+    """Returns a type of records; refuses a field that is there twice."""
+    names = [field[0] for field in fields]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{where} {name} is there twice")
+    return np.dtype(fields)
+
+
 def _read_pcd_header(path: Path) -> tuple[dict[str, list[str]], int]:
     """Returns keyword -> values, and the offset of the points [bytes]."""
     header = {}
     with open(path, "rb") as stream:
         while stream.tell() < _HEADER_LIMIT_BYTES:
-            raw = stream.readline(_HEADER_LIMIT_BYTES)
+            raw = stream.readline(_HEADER_LIMIT_BYTES).removeprefix(_MARK)
             words = raw.split(b"#")[0].decode("ascii", "replace").split()
             if words:
                 header[words[0].upper()] = words[1:]
@@ -170,35 +196,53 @@ def _read_pcd_header(path: Path) -> tuple[dict[str, list[str]], int]:
     raise ValueError("not a PCD file: no DATA line in the header")
 
 
+def _is_moved(viewpoint: list[str]) -> bool:
+    """Returns whether a viewpoint is another one than the origin's."""
+    if not all(map(is_number, viewpoint)):
+        return True
+    return bool(viewpoint) and list(map(float, viewpoint)) != _UNMOVED
+
+
 def _describe_pcd(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
     """Returns the type of a point and the number of points."""
-    try:
-        names = header["FIELDS"]
-        sizes = [int(size) for size in header["SIZE"]]
-        kinds = [_PCD_TYPES[kind.upper()] for kind in header["TYPE"]]
-        counts = [int(n) for n in header.get("COUNT", ["1"] * len(names))]
-        numbers = []
-        if "POINTS" in header:
-            numbers.append(int(header["POINTS"][0]))
-        if "WIDTH" in header or not numbers:
-            numbers.append(int(header["WIDTH"][0]) * int(header["HEIGHT"][0]))
-    except (KeyError, IndexError, ValueError) as error:
-        raise ValueError(f"PCD header: {error} is missing or wrong") from error
+
+    def of(keyword: str) -> list[int]:
+        try:
+            return [int(word) for word in header[keyword]]
+        except (KeyError, ValueError) as error:
+            raise ValueError(
+                f"PCD header: {keyword} is missing or wrong"
+            ) from error
+
+    if "FIELDS" not in header:
+        raise ValueError("PCD header: FIELDS is missing or wrong")
+    names, sizes = header["FIELDS"], of("SIZE")
+    kinds = [
+        _PCD_TYPES.get(kind.upper(), "") for kind in header.get("TYPE", [])
+    ]
+    counts = of("COUNT") if "COUNT" in header else [1] * len(names)
+    numbers = of("POINTS")[:1] if "POINTS" in header else []
+    if "WIDTH" in header or not numbers:
+        # Unorganised clouds of old writers have no height.
+        height = of("HEIGHT")[:1] if "HEIGHT" in header else [1]
+        numbers.append(math.prod([*of("WIDTH")[:1], *height]))
     if not len(names) == len(sizes) == len(kinds) == len(counts):
         raise ValueError(
             "PCD header: FIELDS, SIZE, TYPE and COUNT differ in length"
         )
-    fields = []
+    fields: list[tuple] = []
     for position, name in enumerate(names):
+        size, kind, count = sizes[position], kinds[position], counts[position]
+        if size not in _PCD_SIZES.get(kind, ()) or count < 1:
+            raise ValueError(
+                f"PCD header: {name}: no type {header['TYPE'][position]} of"
+                f" SIZE {size} and COUNT {count}"
+            )
         # PCL names all padding `_`; a NumPy type needs different names.
         unique = f"_{position}" if name == "_" else name
-        scalar = f"<{kinds[position]}{sizes[position]}"
-        shape = () if counts[position] == 1 else (counts[position],)
-        fields.append((unique, scalar, shape))
-    try:
-        dtype = np.dtype(fields)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"PCD header: {error}") from error
+        shape = () if count == 1 else (count,)
+        fields.append((unique, f"<{kind}{size}", shape))
+    dtype = _record_type(fields, "PCD header: field")
     for name in "xyz":
         if name not in names or dtype[name].kind != "f":
             raise ValueError(f"PCD header: no field {name} of type F")
@@ -300,81 +344,122 @@ def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
     return target == len(plain)
 
 
-def _read_ply(path: Path, block: int) -> Iterator[np.ndarray]:
+def _read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     """Reads the vertices of an ascii or binary PLY file.
 
-    Faces and other elements are ignored; they must follow the vertices.
+    Faces and other elements are ignored; before the vertices they may have no
+    lists in a binary file, which would hide where the vertices begin.
     """
-    encoding, dtype, count, alone, offset = _read_ply_header(path)
+    del on_note
+    encoding, elements, offset = _read_ply_header(path)
+    order = _PLY_ORDERS[encoding]
+    before = []
+    for element in elements:
+        if element.name == "vertex":
+            break
+        before.append(element)
+    else:
+        raise ValueError("PLY header: no element vertex")
+    dtype = element.dtype(order)
+    for name in "xyz":
+        if name not in (dtype.names or ()) or dtype[name].kind != "f":
+            raise ValueError(f"PLY header: no floating-point property {name}")
+    count, alone = element.number, element is elements[-1]
     if encoding == "ascii":
+        offset = _behind_lines(path, offset, sum(one.number for one in before))
         # A vertex takes at least one byte.
         _check_size(path, offset + count, exactly=False)
         more = not alone
         return _text_records(path, offset, count, block, dtype, "PLY", more)
+    offset += sum(one.number * one.dtype(order).itemsize for one in before)
     _check_size(path, offset + count * dtype.itemsize, exactly=alone)
     return _records(path, dtype, offset, count, block)
 
 
-def _read_ply_header(path: Path) -> tuple[str, np.dtype, int, bool, int]:
-    """Returns encoding, type and number of vertices, if alone, their offset."""
-    lines = []
+def _behind_lines(path: Path, offset: int, count: int) -> int:
+    """Returns the offset behind so many rows of a text [bytes]."""
     with open(path, "rb") as stream:
-        if stream.readline(8).strip() != b"ply":
+        stream.seek(offset)
+        for _ in itertools.islice(_lines(stream), count):
+            pass
+        return stream.tell()
+
+
+class _Element(NamedTuple):
+    """One element of a PLY file: (name, type) of its properties."""
+
+    name: str
+    number: int
+    properties: list[tuple[str, str]]
+
+    def dtype(self, order: str) -> np.dtype:
+        """Returns the type of a record in an order of bytes."""
+        for name, kind in self.properties:
+            if kind not in _PLY_TYPES:
+                raise ValueError(
+                    f"PLY header: {self.name}: property {name} of the type"
+                    f" {kind!r}, which is not read"
+                )
+        fields = [
+            (name, order + _PLY_TYPES[kind]) for name, kind in self.properties
+        ]
+        return _record_type(fields, f"PLY header: {self.name}: property")
+
+
+def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
+    """Returns encoding, elements and the offset of the first one [bytes]."""
+    encoding = ""
+    elements: list[_Element] = []
+    with open(path, "rb") as stream:
+        if (
+            stream.readline(_HEADER_LIMIT_BYTES).removeprefix(_MARK).strip()
+            != b"ply"
+        ):
             raise ValueError("not a PLY file")
         while stream.tell() < _HEADER_LIMIT_BYTES:
             raw = stream.readline(_HEADER_LIMIT_BYTES)
-            words = raw.decode("ascii", "replace").split()
-            if words == ["end_header"]:
-                break
+            match raw.decode("ascii", "replace").split():
+                case ["end_header"]:
+                    break
+                case ["format", encoding, *_]:
+                    pass
+                case ["element", name, count] if count.isdecimal():
+                    elements.append(_Element(name, int(count), []))
+                case ["property", "list", _, _, name] if elements:
+                    elements[-1].properties.append((name, "list"))
+                case ["property", kind, name] if elements:
+                    elements[-1].properties.append((name, kind))
+                case ["element" | "property", *_] as words:
+                    raise ValueError(
+                        f"PLY header: {' '.join(words)!r} is not understood"
+                    )
             if not raw:
                 raise ValueError("PLY header: no end_header")
-            if words:
-                lines.append(words)
         else:
             raise ValueError("PLY header: no end_header")
         offset = stream.tell()
-    encoding = next((w[1] for w in lines if w[0] == "format" and w[1:]), "")
     if encoding not in _PLY_ORDERS:
         raise ValueError(f"PLY header: unknown format {encoding!r}")
-    dtype, count = _describe_vertices(lines, _PLY_ORDERS[encoding])
-    alone = sum(words[0] == "element" for words in lines) == 1
-    return encoding, dtype, count, alone, offset
+    return encoding, elements, offset
 
 
-def _describe_vertices(
-    lines: list[list[str]], order: str
-) -> tuple[np.dtype, int]:
-    elements = [i for i, words in enumerate(lines) if words[0] == "element"]
-    if not elements or lines[elements[0]][1:2] != ["vertex"]:
-        raise ValueError("PLY header: the first element is not vertex")
-    end = elements[1] if len(elements) > 1 else len(lines)
-    try:
-        count = int(lines[elements[0]][2])
-        fields = [
-            (words[2], order + _PLY_TYPES[words[1]])
-            for words in lines[elements[0] + 1 : end]
-            if words[0] == "property"
-        ]
-    except (KeyError, IndexError, ValueError) as error:
-        raise ValueError(f"PLY header: {error} is missing or wrong") from error
-    if count < 0:
-        raise ValueError("PLY header: a negative number of vertices")
-    dtype = np.dtype(fields)
-    for name in "xyz":
-        if name not in dict(fields) or dtype[name].kind != "f":
-            raise ValueError(f"PLY header: no floating-point property {name}")
-    return dtype, count
+def no_note(note: str) -> None:
+    """Takes a note that is not wanted."""
 
 
-def read_cloud(path: Path) -> np.ndarray:
+def read_cloud(
+    path: Path, columns: int | None = None, on_note: OnNote = no_note
+) -> np.ndarray:
     """Reads one point cloud, in the format of its name's ending, into memory.
 
     `.pcd` and `.ply` in all their encodings; `.npy` holds N x 3 or N x 4
     numbers or a structured array; `.bin` is KITTI's sequence of float32
-    x y z intensity.
+    x y z intensity, or one of other columns.
 
     Args:
         path: an existing file, of a scan rather than a map.
+        columns: number of columns of a `.bin`; by default as its values show.
+        on_note: takes notes on how the file was read.
 
     Returns:
         Structured array of shape (N,) with floating-point fields `x`, `y`, `z`
@@ -391,15 +476,22 @@ def read_cloud(path: Path) -> np.ndarray:
         if size > SCAN_LIMIT_BYTES:
             raise ValueError(f"{size} bytes is too large for a scan")
     # One block holds the whole file.
-    (points,) = read_blocks(path, block=SCAN_LIMIT_BYTES)
+    (points,) = read_blocks(path, columns, on_note, block=SCAN_LIMIT_BYTES)
     return points
 
 
-def read_blocks(path: Path, block: int = _BLOCK) -> Iterator[np.ndarray]:
+def read_blocks(
+    path: Path,
+    columns: int | None = None,
+    on_note: OnNote = no_note,
+    block: int = _BLOCK,
+) -> Iterator[np.ndarray]:
     """Reads a point cloud of any size in parts; see `read_cloud`.
 
     Args:
         path: an existing file.
+        columns: see `read_cloud`.
+        on_note: likewise.
         block: number of points in a part.
 
     Yields:
@@ -411,13 +503,32 @@ def read_blocks(path: Path, block: int = _BLOCK) -> Iterator[np.ndarray]:
     """
     path = Path(path)
     reader = _find_reader(path)
+    if reader is _read_bin:
+        reader = functools.partial(_read_bin, columns=columns)
     with _faults(path):
         check_regular(path)
         read = 0
-        for points in reader(path, block):
+        coarse = 0.0
+        for points in reader(path, block, on_note):
             check_range(points, FARTHEST, first=read)
             read += len(points)
+            if not coarse and (coarse := _coarse_step(points)):
+                on_note(
+                    f"{path}: so far from the origin float32 has steps of"
+                    f" {coarse:.2g} m; write float64, or from a nearer origin"
+                )
             yield points
+
+
+def _coarse_step(points: np.ndarray) -> float:
+    """Returns the step of the farthest coordinate if it is coarse, or 0 [m]."""
+    farthest = [
+        np.abs(points[axis]).max(where=np.isfinite(points[axis]), initial=0)
+        for axis in "xyz"
+        if points.dtype[axis].str[1:] == "f4"
+    ]
+    step = float(np.spacing(max(farthest, default=np.float32(0.0))))
+    return step if step >= _COARSE_STEP else 0.0
 
 
 def is_cloud(path: Path) -> bool:
@@ -446,7 +557,8 @@ def _faults(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: {error}") from error
 
 
-def _read_npy(path: Path, block: int) -> Iterator[np.ndarray]:
+def _read_npy(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
+    del on_note
     dtype, shape, by_column, offset = _read_npy_header(path)
     count = math.prod(shape)
     _check_size(path, offset + count * dtype.itemsize, exactly=True)
@@ -473,13 +585,16 @@ def _read_npy_header(
 ) -> tuple[np.dtype, tuple[int, ...], bool, int]:
     """Returns type, shape, whether stored by columns, and the offset."""
     try:
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
+        with warnings.catch_warnings():
+            # A damaged header can overflow the size of the array.
+            warnings.simplefilter("ignore")
+            values = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:
         raise
     except Exception as error:
         # NumPy evaluates the header as Python, and can raise any error.
         raise ValueError(
-            f"not a NumPy array ({type(error).__name__}: {error})"
+            "not an array of numbers as NumPy saves it, or cut off"
         ) from error
     if not isinstance(values, np.memmap):
         values.close()
@@ -507,13 +622,19 @@ def _to_cloud(values: np.ndarray) -> np.ndarray:
     return point_arrays.from_xyz(values)
 
 
-def _read_bin(path: Path, block: int) -> Iterator[np.ndarray]:
-    size = path.stat().st_size
-    if size % _BIN.itemsize:
+def _read_bin(
+    path: Path, block: int, on_note: OnNote, columns: int | None = None
+) -> Iterator[np.ndarray]:
+    layout = find_layout([path], columns)
+    if layout.note:
+        on_note(layout.note)
+    dtype, size = layout.dtype, path.stat().st_size
+    if size % dtype.itemsize:
         raise ValueError(
-            f"{size} bytes is not a whole number of points of four float32"
+            f"{size} bytes is not a whole number of points of"
+            f" {layout.columns} float32"
         )
-    return _records(path, _BIN, 0, size // _BIN.itemsize, block)
+    return _records(path, dtype, 0, size // dtype.itemsize, block)
 
 
 _READERS: dict[str, _Reader] = {

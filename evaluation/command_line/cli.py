@@ -62,6 +62,7 @@ def tcr(
     control: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     json: options.Json = False,
 ) -> None:
     """Measure change between drives or maps.
@@ -75,11 +76,10 @@ def tcr(
             stage. It gives the TCR_sym that the routes alone cause.
     """
     from evaluation.change import drive_change as change
-    from evaluation.drives import Drive
 
     paths = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
-        paths, align, terminal.track, lidar
+        paths, align, terminal.track, lidar, columns
     )
     report = change.compare(
         surveys[0],
@@ -88,9 +88,8 @@ def tcr(
         alignment=alignments[0] if alignments else None,
     )
     for one in surveys:
-        if isinstance(one.drive, Drive):
-            for note in one.drive.notes:
-                terminal.note(note)
+        for note in one.notes:
+            terminal.note(note)
         ignored = one.voxels.num_ignored
         if ignored:
             terminal.note(
@@ -123,6 +122,7 @@ def pr(
     sensor_height: options.SensorHeight = 1.6,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
         str, typer.Option(metavar="radius|overlap:PART")
@@ -185,10 +185,15 @@ def pr(
         )
     chosen = _chosen_method(method, parameter, sensor_height)
     places, query_drive = options.aligned(
-        options.open_noted(database, query, lidar=lidar),
+        options.open_noted(database, query, lidar=lidar, columns=columns),
         align,
         across_maps=across_maps,
     )
+    for note in dict.fromkeys(
+        chosen.assumption(one.lidar_field) for one in (places, query_drive)
+    ):
+        if note is not None:
+            terminal.note(note)
     exact = None
     if exact_overlaps is not None:
         frames = overlap_truth.compared_frames(places, query_drive, protocol)
@@ -235,6 +240,7 @@ def scores(
     sensor_height: options.SensorHeight = 1.6,
     gate: Annotated[bool, typer.Option("--gate")] = False,
     radius: float = DEFAULT_PROTOCOL.radius,
+    columns: options.Columns = None,
 ) -> None:
     """Score all pairs of scans of two folders.
 
@@ -255,6 +261,8 @@ def scores(
 
     protocol = RetrievalProtocol(radius=radius, gate=gate)
     chosen = _chosen_method(method, parameter, sensor_height)
+    if (note := chosen.assumption(None)) is not None:
+        terminal.note(note)
     num_ignored = scan_folders.write_scores(
         chosen,
         database,
@@ -262,6 +270,8 @@ def scores(
         output,
         terminal.track,
         gate_radius=protocol.gate_radius,
+        columns=columns,
+        on_note=terminal.note,
     )
     if num_ignored:
         terminal.note(f"{num_ignored} points are not finite, and left out")

@@ -30,6 +30,7 @@ def localise(
     odometry_drift: Annotated[float, typer.Option(metavar="PART")] = 0.01,
     align: options.Align = "auto",
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     jobs: commands.Jobs = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     json: options.Json = False,
@@ -73,15 +74,17 @@ def localise(
         map(parse_setting, parameter or [])
     )
     estimator = estimators.make_estimator(method, settings)
-    source = open_source(place, lidar)
-    drive = queries.as_query(open_source(query, lidar))
+    source = open_source(place, lidar, columns)
+    drive = queries.as_query(open_source(query, lidar, columns), columns)
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)
     if isinstance(source, Drive):
         source, drive = options.aligned((source, drive), align)
         check_same_world(source, drive)
-    surroundings = estimators.make_map(source, settings, terminal.track)
+    surroundings = estimators.make_map(
+        source, settings, terminal.track, columns, terminal.note
+    )
     is_mapped = queries.mapped_frames(source, surroundings, drive)
     localiser = queries.Localiser(surroundings, estimator, settings)
     if output is not None:

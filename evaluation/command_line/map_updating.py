@@ -9,7 +9,12 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.commands import SessionSpacing
-from evaluation.command_line.options import Json, LidarName
+from evaluation.command_line.options import (
+    Columns,
+    Json,
+    LidarName,
+    open_noted,
+)
 
 
 class BaselineName(str, Enum):
@@ -81,6 +86,7 @@ def map_sessions(
     output: Annotated[Path, typer.Option(metavar="DIR")],
     spacing: SessionSpacing = 1.0,
     lidar: LidarName = None,
+    columns: Columns = None,
 ) -> None:
     """Make the maps of two recorded drives.
 
@@ -92,10 +98,9 @@ def map_sessions(
     """
     from cns_drake.base.drives.drive import check_same_world
     from cns_drake.base.errors import InputError
-    from evaluation.drives import open_drive
     from evaluation.map_update.sessions import SIDES, write_session
 
-    drives = [open_drive(path, lidar) for path in (a, b)]
+    drives = open_noted(a, b, lidar=lidar, columns=columns)
     check_same_world(*drives)
     if output.exists():
         raise InputError(f"{output}: exists already; give a new folder")

@@ -11,6 +11,7 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
+from evaluation.clouds.bin_columns import FEWEST_COLUMNS
 
 if TYPE_CHECKING:
     from evaluation.drives import Drive
@@ -53,6 +54,16 @@ LidarName = Annotated[
         "/NAME/points.",
     ),
 ]
+Columns = Annotated[
+    int | None,
+    typer.Option(
+        "--columns",
+        metavar="N",
+        min=FEWEST_COLUMNS,
+        help="Number of float32 of a point in .bin files, x y z first; by "
+        "default as their values show.",
+    ),
+]
 OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
@@ -62,11 +73,13 @@ OwnMethods = Annotated[
 ]
 
 
-def open_noted(*paths: Path, lidar: str | None) -> list[Drive]:
+def open_noted(
+    *paths: Path, lidar: str | None, columns: int | None = None
+) -> list[Drive]:
     """Opens drives, and shows the notes on how they were read."""
     from evaluation.drives import open_drive
 
-    drives = [open_drive(path, lidar) for path in paths]
+    drives = [open_drive(path, lidar, columns) for path in paths]
     for drive in drives:
         for note in drive.notes:
             terminal.note(note)

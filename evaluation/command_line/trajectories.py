@@ -21,6 +21,7 @@ def drives(
     second: Annotated[Path, typer.Argument(metavar="B")],
     align: options.Align = "auto",
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     json: options.Json = False,
 ) -> None:
     """Compare the ways of two drives.
@@ -32,7 +33,7 @@ def drives(
     from evaluation.drives.comparison import compare_drives
 
     pair = options.aligned(
-        options.open_noted(first, second, lidar=lidar), align
+        options.open_noted(first, second, lidar=lidar, columns=columns), align
     )
     found = compare_drives(*pair)
     options.show(found.to_json(), _drive_rows(found), json=json)
@@ -44,6 +45,7 @@ def trajectory(
     frame: Literal["lidar", "base_link"] = "lidar",
     time_offset: Annotated[float, typer.Option(metavar="S")] = 0.0,
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     json: options.Json = False,
 ) -> None:
     """Measure the errors of a trajectory.
@@ -60,7 +62,7 @@ def trajectory(
     from evaluation.alignment.trajectory_errors import trajectory_errors
     from evaluation.drives.text_tables import read_tum
 
-    (truth,) = options.open_noted(drive, lidar=lidar)
+    (truth,) = options.open_noted(drive, lidar=lidar, columns=columns)
     errors = trajectory_errors(truth, read_tum(estimate), frame, time_offset)
     if errors.num_outside:
         terminal.note(

@@ -1,6 +1,7 @@
 """Readers of recorded drives and of point clouds, one for each format."""
 
 from pathlib import Path
+from typing import Any
 
 from cns_drake.base.drives.drive import (
     Drive,
@@ -20,7 +21,9 @@ __all__ = [
 ]
 
 
-def open_drive(path: Path, lidar: str | None = None) -> Drive:
+def open_drive(
+    path: Path, lidar: str | None = None, columns: int | None = None
+) -> Drive:
     """Opens the recorded drive at `path` with the reader it needs.
 
     Args:
@@ -29,6 +32,8 @@ def open_drive(path: Path, lidar: str | None = None) -> Drive:
             odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
             chooses the LiDAR.
         lidar: which LiDAR's scans to read, of a recording with several.
+        columns: number of float32 of a point of KITTI's and MulRan's `.bin`;
+            by default as their values show.
 
     Raises:
         InputError: if nothing there can be read as a drive, or it has no
@@ -55,21 +60,21 @@ def open_drive(path: Path, lidar: str | None = None) -> Drive:
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
-    fitting = [reader for holds, reader in readers if holds(path)]
+    fitting: list[Any] = [reader for holds, reader in readers if holds(path)]
     if len(fitting) > 1:
         names = ", ".join(reader.__name__ for reader in fitting)
         raise InputError(f"{path}: files of several formats ({names})")
-    if fitting and lidar is None:
-        return fitting[0](path)
-    if fitting:
-        if fitting[0] not in (
-            mcap_drive.McapDrive,
-            helipr.HeliprDrive,
-        ):
-            raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+    if fitting and fitting[0] in (mcap_drive.McapDrive, helipr.HeliprDrive):
         return fitting[0](path, lidar)
+    if fitting and lidar is not None:
+        raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+    if fitting:
+        return fitting[0](path, columns)
     if path.is_dir() and any(path.glob("*.mcap.part")):
-        raise InputError(f"{path}: the recording was not finished")
+        raise InputError(
+            f"{path}: the recording was not finished (cns-drake repair saves"
+            " what is whole)"
+        )
     raise InputError(
         f"{path}: not a recorded drive (a folder with an .mcap file, or"
         " one, or a drive of MulRan, HeLiPR, KITTI odometry or CNS)"

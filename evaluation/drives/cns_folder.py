@@ -22,7 +22,7 @@ import yaml
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import IMU_DTYPE, read_scenario
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import read_text
 from cns_drake.base.yaml_files import parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.scan_files import FileDrive, list_stamped
@@ -53,8 +53,8 @@ class CnsFolderDrive(FileDrive):
     of the data set: 1.6 m above the vehicle.
     """
 
-    def __init__(self, path: Path):
-        """Opens a drive.
+    def __init__(self, path: Path, columns: int | None = None):
+        """Opens a drive; its clouds say themselves what columns they have.
 
         Raises:
             InputError: if there is none, or its poses cannot be used.
@@ -77,6 +77,7 @@ class CnsFolderDrive(FileDrive):
                 "map": resolved.parent.name.lower(),
                 "stage": resolved.name,
             }
+        del columns
         super().__init__(
             name=str((scenario or {}).get("name", name)),
             world_frame="map",
@@ -84,7 +85,14 @@ class CnsFolderDrive(FileDrive):
             stamps_ns=stamps_ns,
             X_WS=X_WB @ _read_mount(mount),
             scenario=scenario,
+            unit="cns",
         )
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        notes: list[str] = []
+        read_cloud(self._files[0], on_note=notes.append)
+        return tuple(notes)
 
     @cached_property
     def imu(self) -> np.ndarray | None:
@@ -119,9 +127,10 @@ def _read_mount(path: Path | None) -> np.ndarray:
     if path is None:
         return poses.make_pose(np.eye(3), np.array([0.0, 0.0, _LIDAR_HEIGHT]))
     try:
-        text = read_bytes(path).decode("utf-8")
         # OpenCV begins its files with a directive that is not YAML's.
-        lines = [x for x in text.splitlines() if not x.startswith("%")]
+        lines = [
+            x for x in read_text(path).splitlines() if not x.startswith("%")
+        ]
         X_BS = _find_pose(parse_yaml("\n".join(lines), _Loader), path)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.lidar_fields import LidarField
 
 
 class DriveView(Drive):
@@ -30,6 +31,10 @@ class DriveView(Drive):
     @property
     def scenario(self) -> Mapping | None:
         return self._drive.scenario
+
+    @property
+    def lidar_field(self) -> LidarField | None:
+        return self._drive.lidar_field
 
 
 class MovedDrive(DriveView):

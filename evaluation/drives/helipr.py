@@ -62,6 +62,7 @@ _RECORDS = {
 }
 # Records of Aeva up to this time have no intensity [ns].
 _AEVA_CHANGE_NS = 1691936557946849179
+_UNITS = {"Ouster": "os2-128", "Velodyne": "vlp-16", "Avia": "avia"}
 _NUM_RINGS = {"Ouster": 128, "Velodyne": 16}
 # Each scan has a pose, at 10 Hz.
 _LONGEST_GAP_NS = 1_000_000_000
@@ -105,6 +106,7 @@ class HeliprDrive(FileDrive):
             X_WS=X_WS,
             notes=notes,
             datum=DATUM if in_utm else None,
+            unit=_UNITS.get(lidar),
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:

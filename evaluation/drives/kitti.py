@@ -32,9 +32,10 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import index_instances, read_scenario
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import read_bytes, read_text
 from cns_drake.base.json_text import parse_json
-from evaluation.drives.scan_files import FileDrive, read_packed
+from cns_drake.base.number_rows import parse_rows
+from evaluation.drives.scan_files import BinDrive, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,
@@ -48,11 +49,13 @@ _LABELS = "labels"
 _FRAMES = "frames.txt"
 _FIRST_POSE = "first_pose.txt"
 _STRUCTURES = "structures.json"
-_RECORD = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
+# Below that of KITTI's cameras, 707 or more [pixels]; other projections in such
+# files are the identity.
+_KITTIS_FOCAL_LENGTH = 100.0
 _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 
 
-class KittiDrive(FileDrive):
+class KittiDrive(BinDrive):
     """A drive of KITTI odometry.
 
     Poses of the LiDAR are X_S0S = inverse(Tr) X_C0C Tr. W is S0, the frame
@@ -61,12 +64,14 @@ class KittiDrive(FileDrive):
     `labels` points have the fields `label` and `instance`.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, columns: int | None = None):
         """Opens a drive.
 
         Args:
             path: its folder; the poses lie in `../../poses/<name>.txt`, or
                 as `poses.txt` beside the scans.
+            columns: number of columns of a scan; by default as its values
+                show.
 
         Raises:
             InputError: if there is none, its files do not fit together, or
@@ -82,21 +87,25 @@ class KittiDrive(FileDrive):
         check_increasing(times_path, stamps_ns, "row")
         poses_path = _poses_path(path)
         X_C0C = read_poses(poses_path)
-        rows = len(stamps_ns), len(X_C0C)
+        counts = len(stamps_ns), len(X_C0C)
         notes: list[str] = []
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
         # If numbers are missing, one table may have a row for each number and
         # the other a row for each scan.
         gaps = numbers != list(range(len(files)))
-        if rows[0] != rows[1] and not gaps:
+        if counts[0] != counts[1] and not gaps:
             raise InputError(
-                f"{poses_path}: {rows[1]} rows, but {rows[0]} in {times_path}"
+                f"{poses_path}: {counts[1]} rows, but {counts[0]} in"
+                f" {times_path}"
             )
         calibration = path / "calib.txt"
-        X_CS = np.eye(4)
+        X_CS, unit = np.eye(4), None
         if calibration.exists():
-            X_CS = _read_calibration(calibration)
+            rows = _read_calibration(calibration)
+            X_CS = pose_matrices(calibration, rows["Tr"])[0]
+            if "P0" in rows and rows["P0"][0, 0] > _KITTIS_FOCAL_LENGTH:
+                unit = "hdl-64e"
         else:
             notes.append(
                 f"{calibration}: not there; the poses in {poses_path.name} are"
@@ -114,6 +123,7 @@ class KittiDrive(FileDrive):
         labels = path / _LABELS
         self._labels = labels if labels.is_dir() else None
         super().__init__(
+            columns,
             name=str((scenario or {}).get("name", name)),
             world_frame=world_frame,
             files=files,
@@ -121,6 +131,7 @@ class KittiDrive(FileDrive):
             X_WS=X_WS,
             notes=tuple(notes),
             scenario=scenario,
+            unit=unit,
         )
 
     @property
@@ -135,7 +146,7 @@ class KittiDrive(FileDrive):
         return index_instances(table, str(path))
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = read_packed(path, _RECORD)
+        stored = super()._read(path, stamp_ns)
         if self._labels is None:
             return stored
         labels_path = self._labels / f"{path.stem}.label"
@@ -144,7 +155,9 @@ class KittiDrive(FileDrive):
             raise ValueError(
                 f"{len(stored)} points, but {len(labels)} in {labels_path}"
             )
-        points = np.empty(len(stored), dtype=[*_RECORD.descr, *_LABEL.descr])
+        points = np.empty(
+            len(stored), dtype=[*stored.dtype.descr, *_LABEL.descr]
+        )
         for part in (stored, labels):
             for name in part.dtype.names or ():
                 points[name] = part[name]
@@ -234,22 +247,28 @@ def _read_first_pose(path: Path) -> np.ndarray:
     return rows[0]
 
 
-def _read_calibration(path: Path) -> np.ndarray:
-    """Returns X_CS (4, 4), the pose of the LiDAR in the camera's frame."""
-    try:
-        lines = read_bytes(path).decode("ascii").splitlines()
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a text file") from error
-    for line in lines:
+def _read_calibration(path: Path) -> dict[str, np.ndarray]:
+    """Returns the rows P0 and Tr, if they are there, (1, 12) each.
+
+    Tr is the upper 3 x 4 of X_CS, the pose of the LiDAR in the camera's frame.
+
+    Raises:
+        InputError: Tr is missing, or a row is not twelve numbers.
+    """
+    rows = {}
+    for line in read_text(path).splitlines():
         key, colon, text = line.partition(":")
-        if colon and key.strip() == "Tr":
+        key = key.strip()
+        if colon and key in ("P0", "Tr"):
             try:
-                values = np.array([[float(word) for word in text.split()]])
+                values = parse_rows([text], np.dtype(float))
             except ValueError as error:
-                raise InputError(f"{path}: Tr: {error}") from error
+                raise InputError(f"{path}: {key}: {error}") from error
             if values.shape[1] != 12:
                 raise InputError(
-                    f"{path}: Tr: {values.shape[1]} numbers instead of 12"
+                    f"{path}: {key}: {values.shape[1]} numbers instead of 12"
                 )
-            return pose_matrices(path, values)[0]
-    raise InputError(f"{path}: Tr: missing")
+            rows[key] = values
+    if "Tr" not in rows:
+        raise InputError(f"{path}: Tr: missing")
+    return rows

@@ -16,10 +16,10 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
     DATUM,
-    FileDrive,
+    BinDrive,
+    is_local,
     keep_spanned,
     list_stamped,
-    read_packed,
     to_world,
 )
 from evaluation.drives.text_tables import read_matrices
@@ -27,8 +27,8 @@ from evaluation.drives.text_tables import read_matrices
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")
 
-_STORED = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
-_WHOLE = np.dtype([*_STORED.descr, ("ring", "<u2"), ("t", "<u4")])
+# Fields that follow from the place of a point in a whole scan.
+_FOUND = [("ring", "<u2"), ("t", "<u4")]
 
 _NUM_RINGS = 64
 _NUM_COLUMNS = 1024
@@ -49,10 +49,11 @@ _X_BS = poses.make_pose(
 )
 
 
-class MulranDrive(FileDrive):
+class MulranDrive(BinDrive):
     """A drive of MulRan.
 
-    W is the UTM grid with a nearer origin, see `scan_files.to_world`.
+    W is the UTM grid with a nearer origin, see `scan_files.to_world`; for poses
+    in local coordinates it is the drive's own frame.
     The pose of a scan is interpolated at its stamp. Points without a return,
     which are stored as (0, 0, 0), are left out. A complete scan has the fields
     `ring` and `t` [ns since the stamp] beside the stored ones. A scan with too
@@ -60,11 +61,13 @@ class MulranDrive(FileDrive):
     missing.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, columns: int | None = None):
         """Opens a drive.
 
         Args:
             path: its folder, with or without a `sensor_data`.
+            columns: number of columns of a scan; by default as its values
+                show.
 
         Raises:
             InputError: if there is none, or its poses cannot be used.
@@ -78,22 +81,33 @@ class MulranDrive(FileDrive):
         trajectory = read_matrices(path / _POSES, ",")
         X_UB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
+        name = path.resolve().name
+        local = is_local(trajectory.X_WB)
+        if local:
+            notes += (
+                f"{trajectory.path}: no UTM coordinates; taken for those of a"
+                f" frame of {name} alone",
+            )
+        else:
+            X_UB = to_world(X_UB, trajectory.path)
         super().__init__(
-            name=path.resolve().name,
-            world_frame=f"mulran/{DATUM}",
+            columns,
+            name=name,
+            world_frame=f"mulran/{name if local else DATUM}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
-            X_WS=to_world(X_UB, trajectory.path) @ _X_BS,
+            X_WS=X_UB @ _X_BS,
             notes=notes,
-            datum=DATUM,
+            datum=None if local else DATUM,
+            unit="os1-64-33",
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        stored = read_packed(path, _STORED)
+        stored = super()._read(path, stamp_ns)
         if len(stored) != _NUM_RINGS * _NUM_COLUMNS:
             return stored
         # Points are stored column by column, each from ring to ring.
-        points = np.empty(len(stored), dtype=_WHOLE)
+        points = np.empty(len(stored), dtype=[*stored.dtype.descr, *_FOUND])
         for name in stored.dtype.names or ():
             points[name] = stored[name]
         number = np.arange(len(stored))

@@ -2,14 +2,18 @@
 
 import abc
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.base.points import FARTHEST_RETURN
+from cns_drake.base.points import FARTHEST_RETURN, check_range
+from evaluation.clouds.bin_columns import BinLayout, find_layout
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
@@ -22,6 +26,11 @@ ORIGIN = (350_000.0, 4_020_000.0, 0.0)
 
 # Ranges of easting and northing on the northern half of the Earth.
 _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
+
+
+def is_local(X_WB: np.ndarray) -> bool:
+    """Returns whether poses (N, 4, 4) are all too near to be in UTM metres."""
+    return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
 
 
 def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
@@ -64,6 +73,7 @@ class FileDrive(Drive):
         notes: tuple[str, ...] = (),
         datum: str | None = None,
         scenario: Mapping | None = None,
+        unit: str | None = None,
     ):
         """Describes a drive of N >= 1 scans.
 
@@ -76,6 +86,7 @@ class FileDrive(Drive):
             notes: see `Drive.notes`.
             datum: see `Drive.datum`.
             scenario: see `Drive.scenario`.
+            unit: name of the LiDAR's unit, if the data set has only one.
         """
         self.name = name
         self.world_frame = world_frame
@@ -85,6 +96,7 @@ class FileDrive(Drive):
         self._notes = notes
         self._datum = datum
         self._scenario = scenario
+        self._unit = unit
 
     def __len__(self) -> int:
         return len(self._files)
@@ -109,6 +121,10 @@ class FileDrive(Drive):
     def scenario(self) -> Mapping | None:
         return self._scenario
 
+    @property
+    def lidar_field(self) -> LidarField | None:
+        return super().lidar_field or lidar_field(self._unit)
+
     def scan(self, index: int) -> np.ndarray:
         if not 0 <= index < len(self):
             raise IndexError(f"scan {index} of {len(self)}")
@@ -128,6 +144,32 @@ class FileDrive(Drive):
             ValueError: if the file is not of its format.
             OSError: if it cannot be read.
         """
+
+
+class BinDrive(FileDrive):
+    """A drive whose scans are `.bin` files: float32 without a header."""
+
+    def __init__(self, columns: int | None, **drive: Any):
+        """Describes a drive.
+
+        Args:
+            columns: see `find_layout`.
+            drive: see `FileDrive`.
+        """
+        super().__init__(**drive)
+        self._columns = columns
+
+    @cached_property
+    def _layout(self) -> BinLayout:
+        return find_layout(self._files, self._columns)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        note = self._layout.note
+        return (*super().notes, *([note] if note else []))
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        return read_packed(path, self._layout.dtype)
 
 
 def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
@@ -211,18 +253,10 @@ def _returns(points: np.ndarray) -> np.ndarray:
     """Leaves out points without a return, which are stored at the origin.
 
     Raises:
-        ValueError: if a coordinate is not finite, or too large for a point.
+        ValueError: if a coordinate is too large for a point.
     """
+    check_range(points, FARTHEST_RETURN)
     is_return = np.zeros(len(points), dtype=bool)
     for name in "xyz":
-        # A comparison with NaN is false, and NumPy warns of some NaN.
-        with np.errstate(over="ignore", invalid="ignore"):
-            bad = ~(np.abs(points[name]) < FARTHEST_RETURN)
-        if bad.any():
-            first = int(np.flatnonzero(bad)[0])
-            raise ValueError(
-                f"{name}: point {first} of {len(points)} is at"
-                f" {points[name][first]:g} m"
-            )
         is_return |= points[name] != 0.0
     return points[is_return]

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 import io
 from pathlib import Path
-import warnings
 
 import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import read_text
+from cns_drake.base.number_rows import is_number, parse_rows
 
 _NS_PER_S = 1_000_000_000
 # Enough for hours of an IMU [bytes].
@@ -73,10 +73,7 @@ def read_numbers(
         InputError: if there is no such table, it is empty, or a row has another
             form.
     """
-    try:
-        text = read_bytes(path, _TABLE_LIMIT_BYTES).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a text file") from error
+    text = read_text(path, _TABLE_LIMIT_BYTES)
     # Only the line ends of files end a line; str.splitlines splits at more.
     lines = [
         line
@@ -87,18 +84,9 @@ def read_numbers(
         lines = lines[1:]
     if not lines:
         raise InputError(f"{path}: no row of numbers")
-    dtype = np.dtype(columns)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            return np.loadtxt(
-                lines,
-                dtype=dtype,
-                delimiter=separator,
-                ndmin=2 if dtype.names is None else 1,
-                comments=None,
-            )
-    except (ValueError, Warning) as error:
+        return parse_rows(lines, np.dtype(columns), separator)
+    except ValueError as error:
         raise InputError(f"{path}: {error}") from error
 
 
@@ -165,11 +153,7 @@ def check_finite(path: Path, values: np.ndarray) -> None:
 
 def _begins_with_number(line: str) -> bool:
     words = line.replace(",", " ").split()
-    try:
-        float(words[0])
-    except (IndexError, ValueError):
-        return False
-    return True
+    return bool(words) and is_number(words[0])
 
 
 def _is_fraction(text: str) -> bool:

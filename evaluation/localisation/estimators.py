@@ -9,7 +9,7 @@ each axis of the world. It is the usual error on surfaces that are parallel to
 two axes; on others it also resists a motion along the surface.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 import inspect
@@ -27,7 +27,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
 from evaluation.alignment.registration import Surface, make_surface
-from evaluation.clouds.cloud_files import read_blocks
+from evaluation.clouds.cloud_files import OnNote, no_note, read_blocks
 from evaluation.drives.sampling import sample_frames, within_range
 from evaluation.maps.voxel_maps import VoxelAccumulator, thin
 from evaluation.methods.method import run_module, with_named_faults
@@ -154,14 +154,33 @@ def _voxel_shift(resolution: float) -> np.ndarray:
 
 
 def make_map(
-    source: Drive | Path, settings: Settings, track: Track = silent
+    source: Drive | Path,
+    settings: Settings,
+    track: Track = silent,
+    columns: int | None = None,
+    on_note: OnNote = no_note,
 ) -> LocalisationMap:
     """Maps a drive at its true poses, or reads a cloud in W.
+
+    Args:
+        source: the drive, or the cloud's file.
+        settings: those for thinning, and for the surface.
+        track: reports progress.
+        columns: see `read_cloud`, for a cloud's file.
+        on_note: likewise.
 
     Raises:
         InputError: if it cannot be read, or has hardly a point.
     """
-    points = _centroids(source, settings.voxel, track)
+    if isinstance(source, Drive):
+        blocks = _scans(source, track)
+    else:
+        parts = read_blocks(source, columns, on_note)
+        blocks = ((part, None) for part in parts)
+    accumulator = VoxelAccumulator(settings.voxel)
+    for block, X_WS in blocks:
+        accumulator.add(block, X_WS)
+    points = accumulator.to_map().centroids_W
     if len(points) < FEWEST_POINTS:
         raise InputError(
             f"{source.name}: a map of {len(points)} points, fewer than"
@@ -170,18 +189,15 @@ def make_map(
     return map_of(points, source.name, settings)
 
 
-def _centroids(source: Drive | Path, voxel: float, track: Track) -> np.ndarray:
-    accumulator = VoxelAccumulator(voxel)
-    if isinstance(source, Drive):
-        frames = sample_frames(source.X_WS[:, :3, 3], _MAP_SPACING).tolist()
-        for frame in track(frames, f"mapping {source.name}", len(frames)):
-            scan = source.scan(frame)
-            near = within_range(clouds.xyz(scan), MAX_RANGE)
-            accumulator.add(scan[near], source.X_WS[frame])
-    else:
-        for block in read_blocks(source):
-            accumulator.add(block)
-    return accumulator.to_map().centroids_W
+def _scans(
+    drive: Drive, track: Track
+) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+    """Yields the scans that make a map, cropped, each with its X_WS."""
+    frames = sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING).tolist()
+    for frame in track(frames, f"mapping {drive.name}", len(frames)):
+        scan = drive.scan(frame)
+        near = within_range(clouds.xyz(scan), MAX_RANGE)
+        yield scan[near], drive.X_WS[frame]
 
 
 def map_of(

@@ -127,10 +127,15 @@ class Starts:
 class _OneScan(Drive):
     """A cloud as a drive of one scan, at the origin of its world."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, columns: int | None):
         self.name = path.name
         self.world_frame = "map"
-        self._scan = read_cloud(path)
+        self._notes: list[str] = []
+        self._scan = read_cloud(path, columns, self._notes.append)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(self._notes)
 
     def __len__(self) -> int:
         return 1
@@ -148,9 +153,9 @@ class _OneScan(Drive):
         return self._scan
 
 
-def as_query(source: Drive | Path) -> Drive:
+def as_query(source: Drive | Path, columns: int | None = None) -> Drive:
     """Returns the queries: a drive, or a cloud as one scan at the origin."""
-    return source if isinstance(source, Drive) else _OneScan(source)
+    return source if isinstance(source, Drive) else _OneScan(source, columns)
 
 
 def mapped_frames(

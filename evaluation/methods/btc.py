@@ -176,6 +176,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     """
 
     Config = BtcConfig
+    skips_places = True
     config: BtcConfig
     scans_per_place = 10
 

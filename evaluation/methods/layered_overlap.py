@@ -149,6 +149,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     """
 
     Config = LayeredOverlapConfig
+    skips_places = True
     config: LayeredOverlapConfig
 
     def describe(self, points: np.ndarray) -> LayeredScan:

@@ -149,6 +149,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
     """The network; the score of a pair is the cosine at the best turn."""
 
     Config = LearnedConfig
+    skips_places = True
     config: LearnedConfig
 
     def __init__(self, config: MethodConfig | None = None):

@@ -80,6 +80,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     """
 
     Config = MapClosuresConfig
+    skips_places = True
     config: MapClosuresConfig
     scans_per_place = 200
 

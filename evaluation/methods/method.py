@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
 
+from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import make_pose
 
@@ -62,6 +63,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         point_fields: further fields of points that it needs, such as intensity,
             ring, t or label.
         batch_size: number of clouds for a call of `describe_batch`.
+        skips_places: whether it scores NaN, even exhaustively, for places that
+            are no candidates; without it such a score is a fault.
         rerank_best: number of best places that a second stage, `rerank`,
             compares by their points; 0 without one.
         config: the parameters in use.
@@ -84,6 +87,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     scans_per_place: ClassVar[int] = 1
     point_fields: ClassVar[tuple[str, ...]] = ()
     batch_size: ClassVar[int] = 1
+    skips_places: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
 
     def __init__(self, config: MethodConfig | None = None):
@@ -109,6 +113,19 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         one = self.describe_place if of_places else self.describe
         return [one(cloud) for cloud in clouds]
 
+    def for_lidar(self, field: LidarField | None) -> "Method":
+        """Returns the method for scans of a LiDAR; None if it is not known.
+
+        By default it is the method itself.
+        """
+        del field
+        return self
+
+    def assumption(self, field: LidarField | None) -> str | None:
+        """Returns what the method takes for granted of a LiDAR, if anything."""
+        del field
+        return None
+
     @property
     def describes_alike(self) -> bool:
         """Whether places and queries are described in the same way."""
@@ -132,7 +149,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         Returns:
             (D,) float64, higher is more similar; NaN for a place that is no
-            candidate.
+            candidate, see `skips_places`.
         """
 
     def score_in_drive(

@@ -132,6 +132,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     """
 
     Config = RingPlusPlusConfig
+    skips_places = True
     config: RingPlusPlusConfig
 
     def describe(self, points: np.ndarray) -> Ring:

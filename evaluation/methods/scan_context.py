@@ -133,6 +133,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     """Scan Context++; the score of a pair is 1 - its distance."""
 
     Config = ScanContextConfig
+    skips_places = True
     config: ScanContextConfig
 
     def describe(self, points: np.ndarray) -> Contexts:

@@ -15,8 +15,12 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
+from cns_drake.base.drives.lidar_fields import LidarField
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
+
+# The LiDAR of the `cns` preset [S].
+_CNS = LidarField(32, -22.5, 22.5)
 
 
 class SolidConfig(MethodConfig):
@@ -34,9 +38,10 @@ class SolidConfig(MethodConfig):
         ranges: cells of equal length up to `max_range`; [P], [C] 40.
         azimuths: cells of equal angle; [P], [C] 60.
         elevations: cells of equal angle over the field of view; [P], [C]
-            the beams of the LiDAR, [S] 32.
-        lowest_deg: lower limit of the field of view [deg]; [S] -22.5.
-        highest_deg: upper limit [deg]; [S] 22.5.
+            the beams of the LiDAR. None for those of the drive's LiDAR; where
+            its unit is not known, [S] 32.
+        lowest_deg: lower limit of the field of view [deg]; likewise, [S] -22.5.
+        highest_deg: upper limit [deg]; likewise, [S] 22.5.
     """
 
     voxel_size: PositiveFloat = 1.0
@@ -44,17 +49,29 @@ class SolidConfig(MethodConfig):
     max_range: PositiveFloat = 80.0
     ranges: PositiveInt = 40
     azimuths: PositiveInt = 60
-    elevations: PositiveInt = 32
-    lowest_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = -22.5
-    highest_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 22.5
+    elevations: PositiveInt | None = None
+    lowest_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
+    highest_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
 
     @model_validator(mode="after")
     def _limits_are_in_order(self) -> SolidConfig:
         if self.min_range >= self.max_range:
             raise ValueError("min_range must be below max_range")
-        if self.lowest_deg >= self.highest_deg:
+        field = self.field()
+        if field.lowest_deg >= field.highest_deg:
             raise ValueError("lowest_deg must be below highest_deg")
         return self
+
+    def field(self, lidar: LidarField = _CNS) -> LidarField:
+        """Returns the field of view: that given, or else the LiDAR's."""
+        elevations, lowest_deg, highest_deg = lidar
+        if self.elevations is not None:
+            elevations = self.elevations
+        if self.lowest_deg is not None:
+            lowest_deg = self.lowest_deg
+        if self.highest_deg is not None:
+            highest_deg = self.highest_deg
+        return LidarField(elevations, lowest_deg, highest_deg)
 
 
 @dataclass(frozen=True)
@@ -100,10 +117,35 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     """
 
     Config = SolidConfig
+    skips_places = True
     config: SolidConfig
+
+    def for_lidar(self, field: LidarField | None) -> SolidMethod:
+        if field is None:
+            return self
+        elevations, lowest_deg, highest_deg = self.config.field(field)
+        own = {
+            "elevations": elevations,
+            "lowest_deg": lowest_deg,
+            "highest_deg": highest_deg,
+        }
+        return type(self)(self.config.model_copy(update=own))
+
+    def assumption(self, field: LidarField | None) -> str | None:
+        config = self.config
+        given = config.elevations, config.lowest_deg, config.highest_deg
+        if field is not None or None not in given:
+            return None
+        elevations, lowest_deg, highest_deg = config.field()
+        return (
+            f"solid: the LiDAR is not known; taken for one of {elevations}"
+            f" beams from {lowest_deg:g} to {highest_deg:g} deg (--set"
+            " elevations=N, lowest_deg=DEG, highest_deg=DEG)"
+        )
 
     def describe(self, points: np.ndarray) -> Solid:
         config = self.config
+        elevations, lowest_deg, highest_deg = config.field()
         x, y, z = self._prepare(points).T
         r = np.hypot(x, y)
         # Rounding can put a value on the limit.
@@ -115,18 +157,16 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         azimuth_cell = np.minimum(
             (turns * config.azimuths).astype(np.int64), config.azimuths - 1
         )
-        field_of_view = config.highest_deg - config.lowest_deg
-        height = np.rad2deg(np.arctan2(z, r)) - config.lowest_deg
+        field_of_view = highest_deg - lowest_deg
+        height = np.rad2deg(np.arctan2(z, r)) - lowest_deg
         elevation_cell = np.clip(
-            np.floor(height * (config.elevations / field_of_view)),
-            0,
-            config.elevations - 1,
+            np.floor(height * (elevations / field_of_view)), 0, elevations - 1
         ).astype(np.int64)
         over_range = _count(
-            range_cell, config.ranges, elevation_cell, config.elevations
+            range_cell, config.ranges, elevation_cell, elevations
         )
         over_azimuth = _count(
-            azimuth_cell, config.azimuths, elevation_cell, config.elevations
+            azimuth_cell, config.azimuths, elevation_cell, elevations
         )
         weights = _elevation_weights(over_range.sum(axis=0))
         return Solid(over_range @ weights, over_azimuth @ weights)

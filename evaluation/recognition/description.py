@@ -188,7 +188,7 @@ class _Describing:
             protocol.scans_before(method),
             tuple(method.point_fields),
         )
-        self._method = method
+        self._method = method.for_lidar(drive.lidar_field)
         self._protocol = protocol
         self._waiting: list[_Waiting] = []
         self._members: dict[Role, set[int]] = {}

@@ -173,6 +173,7 @@ def compare_with_gates(
             indexed,
             places.clouds,
             is_known[row],
+            where=f"{query.name}: query at frame {queries.frames[row]}",
         )
         for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
             found = ungated

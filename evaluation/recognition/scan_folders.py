@@ -9,7 +9,13 @@ from cns_drake.base import points as point_arrays
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing
 from cns_drake.base.progress import Track, silent
-from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.clouds.bin_columns import find_layout
+from evaluation.clouds.cloud_files import (
+    OnNote,
+    is_cloud,
+    no_note,
+    read_cloud,
+)
 from evaluation.drives.sampling import cropped
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -24,6 +30,8 @@ def write_scores(
     track: Track = silent,
     *,
     gate_radius: float | None = None,
+    columns: int | None = None,
+    on_note: OnNote = no_note,
 ) -> int:
     """Writes the score of every query with every place as CSV.
 
@@ -39,6 +47,9 @@ def write_scores(
         output: the file to write.
         track: reports progress.
         gate_radius: reject places by the gate, see `gate.gated` [m].
+        columns: number of columns of `.bin` files; by default as the values
+            of each folder's show.
+        on_note: takes notes on how the scans were read, one of each kind.
 
     Returns:
         The number of points left out because they are not finite.
@@ -50,10 +61,13 @@ def write_scores(
     """
     place_files = _scan_files(database)
     query_files = _scan_files(query)
+    place_columns = _columns(place_files, columns, on_note)
+    query_columns = _columns(query_files, columns, on_note)
+    on_note = _first_of_each_kind(on_note)
     num_ignored = 0
     descriptors, clouds = [], []
     for path in track(place_files, "describing places", len(place_files)):
-        cloud, ignored = _read(path, method)
+        cloud, ignored = _read(path, method, place_columns, on_note)
         descriptors.append(method.describe_place(cloud))
         if method.rerank_best:
             clouds.append(cloud)
@@ -68,7 +82,7 @@ def write_scores(
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["query", "database", "score"])
         for path in track(query_files, "querying", len(query_files)):
-            cloud, ignored = _read(path, method)
+            cloud, ignored = _read(path, method, query_columns, on_note)
             num_ignored += ignored
             queries.append(method.describe(cloud))
             values = score_places(
@@ -80,6 +94,7 @@ def write_scores(
                 is_known,
                 gate_radius=gate_radius,
                 exhaustive=True,
+                where=str(path),
             )
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
@@ -87,9 +102,37 @@ def write_scores(
     return num_ignored
 
 
-def _read(path: Path, method: Method) -> tuple[np.ndarray, int]:
+def _columns(
+    files: list[Path], columns: int | None, on_note: OnNote
+) -> int | None:
+    """Returns the number of columns of a folder's `.bin` files, if any."""
+    bins = [path for path in files if path.suffix.lower() == ".bin"]
+    if not bins:
+        return None
+    layout = find_layout(bins, columns)
+    if layout.note:
+        on_note(layout.note)
+    return layout.columns
+
+
+def _first_of_each_kind(on_note: OnNote) -> OnNote:
+    """Returns what passes on the first of notes that differ by file alone."""
+    seen: set[str] = set()
+
+    def pass_on(note: str) -> None:
+        kind = note.rpartition(": ")[2]
+        if kind not in seen:
+            seen.add(kind)
+            on_note(note)
+
+    return pass_on
+
+
+def _read(
+    path: Path, method: Method, columns: int | None, on_note: OnNote
+) -> tuple[np.ndarray, int]:
     """Returns a cropped cloud, N > 0, and the number of points not finite."""
-    scan = read_cloud(path)
+    scan = read_cloud(path, columns, on_note)
     points = point_arrays.xyz(scan)
     num_finite = int(np.isfinite(points).all(axis=1).sum())
     cloud = cropped(

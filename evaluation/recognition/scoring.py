@@ -103,6 +103,7 @@ def score_places(
     *,
     gate_radius: float | None = None,
     exhaustive: bool = False,
+    where: str = "",
 ) -> np.ndarray:
     """Returns a method's scores for the last of some queries, (D,) float64.
 
@@ -119,14 +120,25 @@ def score_places(
             would find others.
         gate_radius: radius of a match for `gated` [m]; None without a gate.
         exhaustive: see `Method.score`.
+        where: the name of the current query, for errors.
 
     Raises:
         InputError: if the method returns anything else.
     """
-    found = method.score_in_drive(
-        queries, database, exhaustive=exhaustive or not is_known.all()
-    )
-    scores = _checked(method, "score", found, len(is_known))
+
+    def ask(exhaustive: bool) -> np.ndarray:
+        found = method.score_in_drive(queries, database, exhaustive=exhaustive)
+        return _checked(method, "score", found, len(is_known))
+
+    scores = ask(exhaustive or not is_known.all())
+    if np.isnan(scores).any() and not method.skips_places:
+        missing = int(np.isnan(ask(True)).sum())
+        if missing:
+            raise InputError(
+                f"{method.name}: {where or f'query {len(queries)}'}: {missing}"
+                f" of {len(scores)} scores are NaN (skips_places = True, in the"
+                " class, allows it for places that are no candidates)"
+            )
     scores = np.where(is_known, scores, np.nan)
     if method.rerank_best:
         assert query_cloud is not None

@@ -16,6 +16,7 @@ import numpy as np
 import zstandard
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
 from cns_drake.base.progress import Track, silent
@@ -112,7 +113,9 @@ class RecordedDrive:
         """Returns LiDAR, and name, size and time of change of each file.
 
         The content of the files would be the surest identity, but reading it
-        takes as long as evaluating it.
+        takes as long as evaluating it. A recording of cns-drake has a
+        fingerprint beside it, which takes the place of the times: a copy is the
+        same recording.
         """
         try:
             path = self.path.resolve(strict=True)
@@ -120,6 +123,10 @@ class RecordedDrive:
             if path.is_dir():
                 files = sorted(p for p in path.rglob("*") if p.is_file())
             stats = [os.stat(file) for file in files]
+            print_of_inputs = path / "fingerprint.txt"
+            known = None
+            if print_of_inputs.is_file():
+                known = read_bytes(print_of_inputs).decode("utf-8", "replace")
         except OSError as error:
             raise InputError(
                 f"{self.path}: {error.strerror or error}"
@@ -130,7 +137,7 @@ class RecordedDrive:
                 path.name,
                 file.relative_to(path).as_posix(),
                 stat.st_size,
-                stat.st_mtime_ns,
+                stat.st_mtime_ns if known is None else known,
             ]
             for file, stat in zip(files, stats, strict=True)
         ]

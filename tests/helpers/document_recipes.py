@@ -404,6 +404,19 @@ RECIPES = {
         after=("scenario with a base", "start a city"),
         prints=("recordings/rough: 2 frames",),
     ),
+    "drive with a camera": Recipe(
+        ".venv/bin/cns-drake simulate riverside_01 --camera",
+        changes=(
+            ("riverside_01", "town/sequence_01.yaml"),
+            ("640x480", "64x48"),
+            ("--frames 41", "--frames 2"),
+        ),
+        after=("start a city",),
+        prints=("pictures/town_01: 2 frames",),
+    ),
+    "scenario with a camera": Recipe(
+        "base: riverside_01\ncameras", file="c.yaml"
+    ),
     "drive with options": Recipe(
         ".venv/bin/cns-drake simulate riverside_01 --ride A",
         changes=(
@@ -834,6 +847,7 @@ NOT_RUN = {
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
     "network and runs these tests; `.ci/run` takes this very line",
     "apt install": "changes the system; `.ci/run` installs the same packages",
+    ".ci/drake_ends": "installs from the network; the workflow runs it",
     "npm ci": "installs from the network; `.ci/run` does it",
     ".venv/bin/mypy && .venv/bin/lint-imports": (
         "these read this project, not an example; tests/packages runs them"

@@ -64,6 +64,8 @@ def write_recording(
     world_frame: str = "map",
     mast: str = "mast",
     compression: CompressionType = CompressionType.ZSTD,
+    without_pose: list[int] | None = None,
+    **writing,
 ) -> Path:
     """Writes a rosbag2 folder; rotations of X_WBs are about z only.
 
@@ -82,6 +84,8 @@ def write_recording(
         world_frame: of the odometry.
         mast: parent of the sensor's frame; the vehicle carries `mast`.
         compression: of the chunks.
+        without_pose: frames without a message of odometry.
+        writing: further options of the writer.
 
     Returns:
         The path of the .mcap file.
@@ -91,7 +95,9 @@ def write_recording(
     if stamps_ns is None:
         stamps_ns = [T0_NS + i * PERIOD_NS for i in range(len(scans))]
     with open(path, "wb") as stream:
-        writer = Writer(stream, chunk_size=chunk_size, compression=compression)
+        writer = Writer(
+            stream, chunk_size=chunk_size, compression=compression, **writing
+        )
         writer.start(profile="ros2", library="test")
         for name, value in (attachments or {}).items():
             writer.add_attachment(
@@ -129,12 +135,13 @@ def write_recording(
                     stamp,
                     0,
                 )
-            add(
-                "/odometry",
-                _odometry(X_WB, world_frame, stamp + odometry_shift_ns),
-                stamp,
-                i,
-            )
+            if i not in (without_pose or ()):
+                add(
+                    "/odometry",
+                    _odometry(X_WB, world_frame, stamp + odometry_shift_ns),
+                    stamp,
+                    i,
+                )
             add("/lidar/points", point_cloud(scan, stamp), stamp, i)
         writer.finish()
     return path

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
 from cns_drake.base.yaml_files import read_yaml
 
@@ -181,6 +182,27 @@ class Drive(abc.ABC):
         Keys used here: `map`, `stage`, and those of `driven_way`.
         """
         return None
+
+    @property
+    def lidar_section(self) -> Mapping:
+        """What the scenario says of the LiDAR; empty if it says nothing.
+
+        A drive whose name ends with that of a LiDAR is that LiDAR's, others
+        are of the first.
+        """
+        lidars = (self.scenario or {}).get("lidars")
+        if not isinstance(lidars, dict) or not lidars:
+            return {}
+        name = next(
+            (one for one in lidars if self.name.endswith(f"_{one}")),
+            next(iter(lidars)),
+        )
+        return lidars[name] if isinstance(lidars[name], dict) else {}
+
+    @property
+    def lidar_field(self) -> LidarField | None:
+        """Rings and field of view of the LiDAR, if its unit is known."""
+        return lidar_field(self.lidar_section.get("preset"))
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:

@@ -40,7 +40,9 @@ class McapDrive(Drive):
     Scan i is the i-th message of that topic by log time. Its pose is
     that of the `/odometry` message with exactly the same stamp, composed
     with the sensor's place on the vehicle from `/tf_static`; nothing is
-    interpolated.
+    interpolated. Scans at both ends of the recording that have no pose, or no
+    labels, are left out, with a note: a recording that was cut off and repaired
+    lacks the last ones.
 
     Contradictions are refused: two poses for one stamp, two mounts of a sensor,
     a frame that changes during the drive.
@@ -78,7 +80,7 @@ class McapDrive(Drive):
             self._message_types[_IMU_TOPIC] = ros_types.IMU
         for topic, message_type in self._message_types.items():
             self._check_topic(topic, message_type)
-        self._scans = self._file.locate(self._lidar_topic)
+        self._all_scans = self._file.locate(self._lidar_topic)
 
     def __len__(self) -> int:
         return len(self._scans)
@@ -103,6 +105,12 @@ class McapDrive(Drive):
         """Name of the LiDAR whose scans are read."""
         return _lidar_name(self._lidar_topic)
 
+    @cached_property
+    def lidar_section(self) -> Mapping:
+        lidars = (self.scenario or {}).get("lidars")
+        section = lidars.get(self.lidar_name) if isinstance(lidars, dict) else 0
+        return section if isinstance(section, dict) else {}
+
     @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         return self._first(_ODOMETRY_TOPIC).header.frame_id
@@ -110,6 +118,13 @@ class McapDrive(Drive):
     @property
     def notes(self) -> tuple[str, ...]:
         notes = []
+        missing = len(self._all_scans) - len(self)
+        if missing:
+            notes.append(
+                f"{self._path}: {_ODOMETRY_TOPIC}: no pose (or no labels) for"
+                f" {missing} of {len(self._all_scans)} scans at the ends of the"
+                " drive; they are left out"
+            )
         for topic in (self._lidar_topic, _ODOMETRY_TOPIC):
             back = self._file.step_back_ns(topic) * 1e-9
             if back > _LATEST:
@@ -117,15 +132,20 @@ class McapDrive(Drive):
                     f"{self._path}: {topic}: the clock goes back by {back:.3g}"
                     " s; messages are read in the order of their log times"
                 )
-        lidar = (self.scenario or {}).get("lidars")
-        if isinstance(lidar, dict):
-            lidar = lidar.get(self.lidar_name)
-        if isinstance(lidar, dict) and lidar.get("motion_distortion"):
-            notes.append(
-                f"{self._path}: taken while the LiDAR moved, and used as taken"
-                " (evaluation.drives.deskewing takes the motion out)"
-            )
-        return tuple(notes)
+        return (*notes, *filter(None, [self.distortion_note]))
+
+    @property
+    def distortion_note(self) -> str | None:
+        """The note on a simulated LiDAR with motion distortion, if it is one.
+
+        Whether scans of other recorders are distorted is not known.
+        """
+        if not self.lidar_section.get("motion_distortion"):
+            return None
+        return (
+            f"{self._path}: taken while the LiDAR moved, and used as taken"
+            " (evaluation.drives.deskewing takes the motion out)"
+        )
 
     @property
     def scenario(self) -> Mapping | None:
@@ -156,7 +176,9 @@ class McapDrive(Drive):
             points = point_layouts.to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
             return point_layouts.from_layout(
-                points, self._labels(index, message)
+                points,
+                self._labels(index, message),
+                lambda: self.lidar_section.get("returns") == "calibrated",
             )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
@@ -164,10 +186,7 @@ class McapDrive(Drive):
         topic = self._labels_topic
         if topic is None:
             return None
-        places = self._file.locate(topic)
-        if len(places) != len(self):
-            raise ValueError(f"{topic}: {len(places)} for {len(self)} scans")
-        message = self._message(topic, places[index])
+        message = self._message(topic, self._file.locate(topic)[index])
         if message.header.stamp != cloud.header.stamp:
             raise ValueError(
                 f"{topic}: number {index} has another stamp than the scan"
@@ -213,9 +232,46 @@ class McapDrive(Drive):
         return rows
 
     @cached_property
+    def _scans(self) -> np.ndarray:
+        """Where the scans are, without those at the ends that lack a pose."""
+        scans = self._all_scans
+        odometry = self._file.locate(_ODOMETRY_TOPIC)
+        num_labelled = len(scans)
+        if self._labels_topic is not None:
+            num_labelled = len(self._file.locate(self._labels_topic))
+        if (
+            num_labelled >= len(scans)
+            and self._is_posed(scans[0], odometry)
+            and self._is_posed(scans[-1], odometry[::-1])
+        ):
+            return scans
+        stamps_ns, rows = self._stamps_and_odometry
+        usable = np.isin(stamps_ns, rows["stamp_ns"])
+        usable[num_labelled:] = False
+        kept = np.flatnonzero(usable)
+        # Without any pose, the fault is not at the ends.
+        return scans[kept[0] : kept[-1] + 1] if len(kept) else scans
+
+    def _is_posed(self, scan: np.void, odometry: np.ndarray) -> bool:
+        """Returns whether one of the first messages has a scan's stamp."""
+        with self._faults(self._lidar_topic):
+            wanted, _ = mcap_messages.read_cloud_header(self._file.read(scan))
+        backward = odometry[0]["log_time_ns"] > odometry[-1]["log_time_ns"]
+        for place in odometry:
+            header = self._message(_ODOMETRY_TOPIC, place).header
+            later = mcap_messages.stamp_ns(header) - wanted
+            if later == 0:
+                return True
+            if (-later if backward else later) > _LATEST * 1e9:
+                return False
+        return False
+
+    @cached_property
     def _track(self) -> tuple[np.ndarray, np.ndarray]:
         """Stamps (N,) [ns] and poses (N, 4, 4) of the scans."""
         stamps_ns, odometry = self._stamps_and_odometry
+        first = np.flatnonzero(self._all_scans == self._scans[0])[0]
+        stamps_ns = stamps_ns[first : first + len(self)]
         rows = {stamp: i for i, stamp in enumerate(odometry["stamp_ns"])}
         missing = [
             index for index, stamp in enumerate(stamps_ns) if stamp not in rows
@@ -234,14 +290,14 @@ class McapDrive(Drive):
 
     @cached_property
     def _stamps_and_odometry(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stamps (N,) of the scans, and the odometry, in one pass."""
-        num_scans = len(self)
+        """Stamps of all scans, and the odometry, in one pass."""
+        num_scans = len(self._all_scans)
         places = self._file.locate(_ODOMETRY_TOPIC)
         stamps_ns = np.zeros(num_scans, np.int64)
         odometry = np.zeros(len(places), ODOMETRY_DTYPE)
         lidar_frame = self._first(self._lidar_topic).header.frame_id
         vehicle_frames = _vehicle_frames(self._first(_ODOMETRY_TOPIC))
-        together = np.concatenate([self._scans, places])
+        together = np.concatenate([self._all_scans, places])
         for position, data in self._file.visit(together):
             if position < num_scans:
                 topic, first = self._lidar_topic, lidar_frame

@@ -3,13 +3,16 @@
 The `mcap` package reads messages in time order, or all of a span of time.
 Reading a scan by its number needs the location of each message of a topic, and
 the one chunk that holds it. Both come from the index at the end of a complete
-file, so that opening a file of gigabytes reads a few kilobytes.
+file, so that opening a file of gigabytes reads a few kilobytes. All of that end
+is optional: where its numbers of messages do not confirm the index, the whole
+file is read once.
 
 The package checks only the checksums of chunks, and trusts the sizes that a
 chunk claims. Here damaged or hostile records are refused."""
 
 from collections.abc import Iterator
 import contextlib
+from dataclasses import dataclass, field
 import functools
 import io
 import os
@@ -21,8 +24,10 @@ import zlib
 import lz4.frame
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk
+from mcap.records import Attachment, Channel, Chunk, Schema, Statistics
+from mcap.summary import Summary
 import numpy as np
 import zstandard
 
@@ -40,6 +45,7 @@ SUMMARY_LIMIT_BYTES = 1 << 25
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
 # Size of a chunk's record without its data.
 _CHUNK_FIELDS_BYTES = 1 << 10
+_RECORD_LIMIT_BYTES = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
 # The last record: its header, where the summary begins, its offsets, its
 # checksum.
 _FOOTER = struct.Struct("<BQQQI")
@@ -63,6 +69,9 @@ LOCATION = np.dtype(
     ]
 )
 _ORDER = ("log_time_ns", "chunk", "offset")
+# Records that hold messages, or define what messages are.
+_HOLDING = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL)
+_REPAIR = "(cns-drake repair saves what is whole)"
 
 
 def parse_attachment(body: bytes) -> Attachment:
@@ -145,8 +154,99 @@ def uncompress(chunk: Chunk) -> bytes:
     return data
 
 
+@dataclass(frozen=True)
+class _Block:
+    """A record that holds messages: a chunk, or a message outside of chunks.
+
+    Attributes:
+        chunk_start_offset: where it begins in the file [bytes].
+        uncompressed_size: of a chunk [bytes]; None for a message.
+    """
+
+    chunk_start_offset: int
+    uncompressed_size: int | None
+
+
+@dataclass
+class _Contents:
+    """What a file holds.
+
+    Attributes:
+        schemas: by id.
+        channels: likewise.
+        blocks: in the order of the file.
+        indexes: for each block, channel id -> where its message index begins.
+        attachments: (name, where it begins) of each.
+        found: channel id -> (block, offset in it, log time [ns]) of each
+            message; None where the index has them.
+        statistics: the file's own, if any.
+    """
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    blocks: list[_Block] = field(default_factory=list)
+    indexes: list[dict[int, int]] = field(default_factory=list)
+    attachments: list[tuple[str, int]] = field(default_factory=list)
+    found: dict[int, list[tuple[int, int, int]]] | None = None
+    statistics: Statistics | None = None
+
+    @classmethod
+    def of(cls, summary: Summary) -> "_Contents":
+        """Returns the contents of a summary."""
+        chunks = sorted(
+            summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset
+        )
+        return cls(
+            summary.schemas,
+            summary.channels,
+            [
+                _Block(chunk.chunk_start_offset, chunk.uncompressed_size)
+                for chunk in chunks
+            ],
+            [chunk.message_index_offsets for chunk in chunks],
+            [(one.name, one.offset) for one in summary.attachment_indexes],
+            None,
+            summary.statistics,
+        )
+
+    def is_whole(self) -> bool:
+        """Returns whether the statistics confirm a summary."""
+        counts = self.statistics
+        used = set().union(*self.indexes)
+        return counts is not None and (
+            len(self.schemas),
+            len(self.channels),
+            len(self.blocks),
+            len(self.attachments),
+            used | counts.channel_message_counts.keys() <= self.channels.keys(),
+            sum(counts.channel_message_counts.values()),
+        ) == (
+            counts.schema_count,
+            counts.channel_count,
+            counts.chunk_count,
+            counts.attachment_count,
+            True,
+            counts.message_count,
+        )
+
+    def add(self, opcode: int, body: bytes, block: int, offset: int) -> None:
+        """Adds a schema, channel or message at an offset in a block."""
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(RecordContent(body))
+            self.schemas.setdefault(schema.id, schema)
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(RecordContent(body))
+            self.channels.setdefault(channel.id, channel)
+        elif opcode == Opcode.MESSAGE:
+            assert self.found is not None
+            number, _, log_time_ns, _ = _MESSAGE_HEADER.unpack_from(body)
+            self.found.setdefault(number, []).append(
+                (block, offset, log_time_ns)
+            )
+
+
 class McapFile:
-    """An indexed MCAP file, open for reading single messages.
+    """An MCAP file, open for reading single messages.
 
     The file is opened for each access only; two uncompressed chunks (of
     1 MiB as a rule) are kept, since messages are mostly read in order.
@@ -159,8 +259,8 @@ class McapFile:
         """Reads the index.
 
         Raises:
-            InputError: if there is no such file, or it is no complete and
-                indexed MCAP file.
+            InputError: if there is no such file, or it is no complete MCAP
+                file.
         """
         self.path = Path(path)
         check_regular(self.path)
@@ -169,16 +269,12 @@ class McapFile:
             summary = SeekingReader(
                 stream, record_size_limit=SUMMARY_LIMIT_BYTES
             ).get_summary()
-        if summary is None or not summary.chunk_indexes:
-            raise InputError(f"{self.path}: the MCAP file has no chunk index")
-        self._summary = summary
-        self._chunk_indexes = sorted(
-            summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset
-        )
+        self._contents = _Contents.of(summary or Summary())
+        if not self._contents.is_whole():
+            self._contents = self._read_through()
         self._channels: dict[str, list[Channel]] = {}
-        for _, channel in sorted(self._summary.channels.items()):
+        for _, channel in sorted(self._contents.channels.items()):
             self._channels.setdefault(channel.topic, []).append(channel)
-        self._check_channels()
         self._locations: dict[str, np.ndarray] = {}
         self._chunk = functools.lru_cache(_CHUNKS_KEPT)(self._unpack)
 
@@ -248,11 +344,11 @@ class McapFile:
             InputError: if it cannot be read, or others of this name differ.
         """
         content = None
-        for index in self._summary.attachment_indexes:
-            if index.name != name:
+        for found, offset in self._contents.attachments:
+            if found != name:
                 continue
             with self._reading() as stream:
-                stream.seek(index.offset)
+                stream.seek(offset)
                 limit = _ATTACHMENT_LIMIT_BYTES
                 body = _read_body(stream, limit, "an attachment")
                 data = parse_attachment(body).data
@@ -265,34 +361,28 @@ class McapFile:
         return content
 
     def _kind(self, channel: Channel) -> str:
-        schema = self._summary.schemas.get(channel.schema_id)
+        schema = self._contents.schemas.get(channel.schema_id)
         name = "a message without a type" if schema is None else schema.name
         return f"{name} in {channel.message_encoding}"
 
     def _read_locations(self, topic: str) -> np.ndarray:
-        parts = [np.empty(0, LOCATION)]
-        with self._reading() as stream:
-            # Many indexes at one place could claim more than the file holds.
-            left = stream.seek(0, os.SEEK_END)
-            for channel in self._channels[topic]:
-                found = 0
-                for number, chunk in enumerate(self._chunk_indexes):
-                    offset = chunk.message_index_offsets.get(channel.id)
-                    if offset is None:
-                        continue
-                    part = self._read_index(stream, offset, left)
-                    part["chunk"], part["channel_id"] = number, channel.id
-                    left -= len(part) * _INDEX_ENTRY.itemsize
-                    found += len(part)
-                    parts.append(part)
-                statistics = self._summary.statistics
-                if statistics is not None:
-                    count = statistics.channel_message_counts.get(channel.id)
-                    if count not in (None, found):
-                        raise ValueError(
-                            f"the index has {found} of {count} messages"
-                        )
-        locations = np.concatenate(parts)
+        numbers = [channel.id for channel in self._channels[topic]]
+        if self._contents.found is None:
+            locations = self._indexed(numbers)
+            counts = self._contents.statistics.channel_message_counts  # type: ignore[union-attr]  # It is whole.
+            if len(locations) != sum(counts.get(one, 0) for one in numbers):
+                # Message indexes are optional, too.
+                self._contents = self._read_through()
+        found = self._contents.found
+        if found is not None:
+            locations = np.array(
+                [
+                    (block, offset, log_time_ns, number)
+                    for number in numbers
+                    for block, offset, log_time_ns in found.get(number, ())
+                ],
+                LOCATION,
+            )
         places = np.sort(locations[["chunk", "offset"]])
         if (places[1:] == places[:-1]).any():
             raise InputError(
@@ -300,6 +390,102 @@ class McapFile:
             )
         # Messages of equal time keep the file's order.
         return locations[np.lexsort([locations[key] for key in _ORDER[::-1]])]
+
+    def _indexed(self, numbers: list[int]) -> np.ndarray:
+        """Returns where the messages of channels are, by the index."""
+        parts = [np.empty(0, LOCATION)]
+        with self._reading() as stream:
+            # Many indexes at one place could claim more than the file holds.
+            left = stream.seek(0, os.SEEK_END)
+            for number in numbers:
+                for block, offsets in enumerate(self._contents.indexes):
+                    if number not in offsets:
+                        continue
+                    part = self._read_index(stream, offsets[number], left)
+                    part["chunk"], part["channel_id"] = block, number
+                    left -= len(part) * _INDEX_ENTRY.itemsize
+                    parts.append(part)
+        return np.concatenate(parts)
+
+    def _read_through(self) -> _Contents:
+        """Finds everything in the file without any index.
+
+        Raises:
+            InputError: if it cannot be read, or lacks what its statistics
+                count.
+        """
+        told = self._contents.statistics
+        contents = _Contents(
+            dict(self._contents.schemas),
+            dict(self._contents.channels),
+            found={},
+            statistics=told,
+        )
+        assert contents.found is not None
+        with self._reading() as stream:
+            size = stream.seek(0, os.SEEK_END)
+            offset = len(MAGIC)
+            while True:
+                stream.seek(offset)
+                opcode, length = RECORD_HEADER.unpack(
+                    stream.read(RECORD_HEADER.size)
+                )
+                end = offset + RECORD_HEADER.size + length
+                if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                    break
+                if end > size:
+                    raise EOFError("a record ends behind the file")
+                if (
+                    opcode == Opcode.ATTACHMENT
+                    and length <= _ATTACHMENT_LIMIT_BYTES
+                ):
+                    stream.seek(offset)
+                    body = _read_body(
+                        stream, _ATTACHMENT_LIMIT_BYTES, "an attachment"
+                    )
+                    name = parse_attachment(body).name
+                    contents.attachments.append((name, offset))
+                elif opcode in _HOLDING:
+                    self._add_block(stream, opcode, offset, contents)
+                    # A few compressed bytes can hold any number of messages.
+                    if sum(map(len, contents.found.values())) > size:
+                        raise ValueError("more messages than bytes")
+                offset = end
+            unknown = contents.found.keys() - contents.channels.keys()
+            if unknown:
+                raise ValueError(f"channel {min(unknown)} is defined nowhere")
+            there = sum(map(len, contents.found.values()))
+            if told is not None and there != told.message_count:
+                raise ValueError(
+                    f"{there} of {told.message_count} messages are there"
+                )
+        return contents
+
+    @staticmethod
+    def _add_block(
+        stream: BinaryIO, opcode: int, offset: int, contents: _Contents
+    ) -> None:
+        """Adds what a record at an offset of the file defines and holds."""
+        stream.seek(offset)
+        body = _read_body(stream, _RECORD_LIMIT_BYTES, "a record")
+        number = len(contents.blocks)
+        if opcode != Opcode.CHUNK:
+            contents.add(opcode, body, number, 0)
+            if opcode == Opcode.MESSAGE:
+                contents.blocks.append(_Block(offset, None))
+            return
+        chunk = Chunk.read(RecordContent(body))
+        contents.blocks.append(_Block(offset, chunk.uncompressed_size))
+        records = uncompress(chunk)
+        start = 0
+        while start < len(records):
+            opcode, length = RECORD_HEADER.unpack_from(records, start)
+            begin = start + RECORD_HEADER.size
+            if begin + length > len(records):
+                raise EOFError("a message ends behind its chunk")
+            inner = records[begin : begin + length]
+            contents.add(opcode, inner, number, start)
+            start = begin + length
 
     @staticmethod
     def _read_index(stream: BinaryIO, offset: int, left: int) -> np.ndarray:
@@ -316,16 +502,18 @@ class McapFile:
 
     def _unpack(self, number: int) -> memoryview:
         """Reads and uncompresses a chunk whose checksum is right."""
-        index = self._chunk_indexes[number]
+        block = self._contents.blocks[number]
         with self._reading() as stream:
-            stream.seek(index.chunk_start_offset)
-            limit = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
-            body = _read_body(stream, limit, "a chunk")
+            stream.seek(block.chunk_start_offset)
+            body = _read_body(stream, _RECORD_LIMIT_BYTES, "a chunk")
+            if block.uncompressed_size is None:
+                header = RECORD_HEADER.pack(Opcode.MESSAGE, len(body))
+                return memoryview(header + body)
             chunk = Chunk.read(RecordContent(body))
-            if chunk.uncompressed_size != index.uncompressed_size:
+            if chunk.uncompressed_size != block.uncompressed_size:
                 raise ValueError(
                     f"a chunk of {chunk.uncompressed_size} bytes, of"
-                    f" {index.uncompressed_size} by the index"
+                    f" {block.uncompressed_size} by the index"
                 )
             return memoryview(uncompress(chunk))
 
@@ -346,23 +534,6 @@ class McapFile:
                 raise ValueError("a message is not where the index says")
         return body[_MESSAGE_HEADER.size :]
 
-    def _check_channels(self) -> None:
-        """Refuses messages of a channel that the summary does not name."""
-        used = {
-            number
-            for chunk in self._chunk_indexes
-            for number in chunk.message_index_offsets
-        }
-        statistics = self._summary.statistics
-        if statistics is not None:
-            used |= statistics.channel_message_counts.keys()
-        unknown = used - self._summary.channels.keys()
-        if unknown:
-            raise InputError(
-                f"{self.path}: messages of channel {min(unknown)}, which the "
-                "summary does not list"
-            )
-
     def _check_ends(self, stream: BinaryIO) -> None:
         """Refuses a file that is not whole, or whose summary is damaged."""
         if stream.read(len(MAGIC)) != MAGIC:
@@ -372,6 +543,7 @@ class McapFile:
         if stream.read() != MAGIC:
             raise InputError(
                 f"{self.path}: the MCAP file is cut off or was not finished"
+                f" {_REPAIR}"
             )
         end = stream.seek(max(size - len(MAGIC) - _FOOTER.size, 0))
         _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
@@ -414,5 +586,5 @@ class McapFile:
             # Some of these errors have no message.
             fault = str(error) or type(error).__name__
             raise InputError(
-                f"{self.path}: damaged MCAP file ({fault})"
+                f"{self.path}: damaged MCAP file ({fault}) {_REPAIR}"
             ) from error

@@ -5,6 +5,7 @@ uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is PointXYZIRT of Velodyne's
 ROS 2 driver; `autoware` is PointXYZIRCAEDT. These layouts have no field for
 labels and instances, which come in another message."""
 
+from collections.abc import Callable
 import itertools
 from typing import Any, Literal, get_args
 
@@ -21,8 +22,13 @@ _LABEL_FIELDS = ("label", "instance")
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
 _LONGEST_NS = 2.0**32
+# The latest time in a scan, if it is in nanoseconds: in seconds it would be
+# later than any scan ends, and before 2001.
+_NS_OF_A_SCAN = (1e6, 1e9)
 # Autoware's type of the only, and strongest, return of a beam.
 _SINGLE_STRONGEST = 1
+# The greatest intensity of calibrated returns, and of a byte.
+_FULL = 255.0
 
 
 def point_field_datatype(dtype: np.dtype) -> int:
@@ -102,7 +108,7 @@ def _check_apart(dtype: np.dtype) -> None:
 def _record_type(message: Any) -> np.dtype:
     order = ">" if message.is_bigendian else "<"
     names: list[str] = []
-    formats = []
+    formats: list[tuple] = []
     for field in message.fields:
         if field.datatype not in _DATATYPES:
             raise ValueError(
@@ -116,7 +122,14 @@ def _record_type(message: Any) -> np.dtype:
             )
         names.append(field.name)
         # Some writers leave the count of a scalar at zero.
-        formats.append((scalar, (field.count,)) if field.count > 1 else scalar)
+        shape = (field.count,) if field.count > 1 else ()
+        formats.append((scalar, shape))
+        end = field.offset + np.dtype(formats[-1]).itemsize
+        if end > message.point_step:
+            raise ValueError(
+                f"the point cloud's field {field.name} ends at byte {end} of"
+                f" points of {message.point_step}"
+            )
     return np.dtype(
         {
             "names": names,
@@ -164,14 +177,18 @@ _LAYOUTS = {
 }
 
 
-def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
+def to_layout(
+    points: np.ndarray, layout: str, num_rings: int | None = None
+) -> np.ndarray:
     """Returns points in a layout.
 
     Args:
         points: (N,) with the fields x y z intensity ring t; intensities from
-            0 to 1.
+            0 to 1, or, if one is larger, calibrated ones up to 255.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
+        num_rings: of the unit. In `velodyne`, whose driver counts rings from
+            below, they are then turned round.
 
     Returns:
         (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
@@ -183,7 +200,8 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
         return points
     x, y, z = (points[axis].astype(float) for axis in "xyz")
     distance = np.sqrt(x * x + y * y + z * z)
-    brightness = np.rint(255.0 * np.clip(points["intensity"], 0.0, 1.0))
+    full = _FULL if points["intensity"].max(initial=0.0) > 1.0 else 1.0
+    brightness = np.rint(_FULL * np.clip(points["intensity"] / full, 0.0, 1.0))
     columns = {name: points[name] for name in points.dtype.names or ()}
     columns |= {
         "reflectivity": brightness,
@@ -199,6 +217,8 @@ def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
     }
     if layout == "autoware":
         columns["intensity"] = brightness
+    if layout == "velodyne" and num_rings is not None:
+        columns["ring"] = num_rings - 1 - points["ring"].astype(int)
     dtype = _LAYOUTS[layout]
     made = np.zeros(len(points), dtype)
     for name in dtype.names or ():
@@ -216,18 +236,25 @@ def to_labels(points: np.ndarray) -> np.ndarray:
 
 
 def from_layout(
-    points: np.ndarray, labels: np.ndarray | None = None
+    points: np.ndarray,
+    labels: np.ndarray | None = None,
+    is_calibrated: Callable[[], bool] = lambda: False,
 ) -> np.ndarray:
     """Returns points with the fields of this project beside their own.
 
     Args:
         points: (N,) in any layout.
         labels: (N,) records of other fields of the same points, if any.
+        is_calibrated: asked whether a byte of intensity is one of calibrated
+            returns, which have 0 to 255 in any layout.
 
     Returns:
-        (N,). `velodyne` has `t` [ns] in place of `time` [s]; `autoware` has
-        `t` and `ring` in place of `time_stamp` and `channel`, and
-        intensities from 0 to 1. Where nothing changes, `points` itself.
+        (N,). `velodyne` has `t` [ns] in place of `time` [s]; a `t` of floats
+        becomes one of nanoseconds; `autoware` has `t` and `ring` in place of
+        `time_stamp` and `channel`, and intensities from 0 to 1 unless they are
+        calibrated. Times whose
+        unit is not certain stay as they are. Where nothing changes, `points`
+        itself.
 
     Raises:
         ValueError: if the labels are not those of as many points.
@@ -237,23 +264,48 @@ def from_layout(
     if {"time_stamp", "channel", "intensity"} <= set(names):
         columns["t"] = columns.pop("time_stamp")
         columns["ring"] = columns.pop("channel")
-        columns["intensity"] = points["intensity"] / np.float32(255.0)
-    elif "time" in names and "t" not in names:
-        t_ns = np.rint(points["time"].astype(float) * _NS_PER_S)
-        # Some drivers count backwards from the last point, or since 1970.
-        if ((t_ns >= 0.0) & (t_ns < _LONGEST_NS)).all():
-            columns["t"] = t_ns.astype(np.uint32)
-            del columns["time"]
+        full = np.float32(1.0 if is_calibrated() else _FULL)
+        columns["intensity"] = points["intensity"] / full
+    else:
+        timed = next((name for name in ("t", "time") if name in names), "t")
+        t_ns = _nanoseconds(columns.get(timed))
+        if t_ns is not None:
+            columns["t"] = t_ns
+            columns.pop("time", None)
     if labels is not None:
         if len(labels) != len(points):
             raise ValueError(f"{len(points)} points, but {len(labels)} labels")
         columns |= {name: labels[name] for name in labels.dtype.names or ()}
-    if list(columns) == list(names):
+    fields = [
+        (name, column.dtype, column.shape[1:])
+        for name, column in columns.items()
+    ]
+    if fields == [
+        (name, points[name].dtype, points[name].shape[1:]) for name in names
+    ]:
         return points
-    made = np.empty(
-        len(points),
-        [(name, column.dtype) for name, column in columns.items()],
-    )
+    made = np.empty(len(points), fields)
     for name, column in columns.items():
         made[name] = column
     return made
+
+
+def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
+    """Returns floats as nanoseconds since the stamp, if they surely are times.
+
+    Some drivers count backwards from the last point, or since 1970.
+
+    Args:
+        times: (N,) of a point's field, if there is one.
+
+    Returns:
+        (N,) uint32 [ns]; None if there is none, or its unit is not certain.
+    """
+    if times is None or times.dtype.kind != "f":
+        return None
+    t_ns = times.astype(float)
+    if not _NS_OF_A_SCAN[0] <= t_ns.max(initial=0.0) < _NS_OF_A_SCAN[1]:
+        t_ns = t_ns * _NS_PER_S
+    if not ((t_ns >= 0.0) & (t_ns < _LONGEST_NS)).all():
+        return None
+    return np.rint(t_ns).astype(np.uint32)

@@ -52,12 +52,12 @@ class City(NamedTuple):
 class Streets(NamedTuple):
     """Streets that a city is built along.
 
-    Sidewalks are `kerb_height` above the surface [m]; junctions are the area of
-    all of them. Margins are strips beside the streets that stay free, and
-    buildings stand along them; nothing is built or planted in what is
-    `reserved`, either. All areas are in W [m]. `furnish` places the streets'
-    furniture, after the buildings and before all else, and `park` parks cars in
-    them, last of all.
+    Sidewalks are `kerb_height` above the surface [m], or what `kerbs` has at a
+    place; junctions are the area of all of them. Margins are strips beside the
+    streets that stay free, and buildings stand along them; nothing is built or
+    planted in what is `reserved`, either. All areas are in W [m]. `furnish`
+    places the streets' furniture, after the buildings and before all else, and
+    `park` parks cars in them, last of all.
     """
 
     areas: street_areas.StreetAreas
@@ -69,6 +69,7 @@ class Streets(NamedTuple):
     structures: Sequence[Structure]
     furnish: Callable[[Draft], None]
     park: Callable[[Draft], None]
+    kerbs: street_areas.KerbMap | None = None
 
 
 def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
@@ -149,7 +150,8 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     if not streets.margins.is_empty:
         draft.frontage = snap(draft.streets.union(streets.margins))
     districts = share_out(plan, draft.streets, source)
-    place = streets.surface, streets.kerb_height, draft.streets, plan.bounds
+    kerb = streets.kerbs or streets.kerb_height
+    place = streets.surface, kerb, draft.streets, plan.bounds
     terraces = [pad for district in districts for pad in district.terraces]
     draft.base = make_ground(*place, terraces)
     for district in districts:

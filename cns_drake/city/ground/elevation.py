@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.polygons import snap
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.roads.street_areas import SurfaceHeights
+from cns_drake.roads import street_areas
 
 # Distance of the nodes between which the field is interpolated [m].
 _NODES = 2.0
@@ -70,8 +70,8 @@ class SlopingGround:
 
     def __init__(
         self,
-        surface: SurfaceHeights,
-        kerb_height: float,
+        surface: street_areas.SurfaceHeights,
+        kerb_height: float | street_areas.KerbMap,
         streets: BaseGeometry,
         bounds: tuple[float, float, float, float],
         pads: Sequence[Pad] = (),
@@ -108,8 +108,11 @@ class SlopingGround:
         return z
 
     def _sidewalk(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        heights = self._surface.heights(np.column_stack([x, y]))
-        return heights + self._kerb_height
+        xy = np.column_stack([x, y])
+        kerb = self._kerb_height
+        return self._surface.heights(xy) + (
+            kerb(xy) if callable(kerb) else kerb
+        )
 
     def _drawn(
         self, x: np.ndarray, y: np.ndarray, field: np.ndarray
@@ -178,8 +181,8 @@ Ground = LevelGround | SlopingGround
 
 
 def make_ground(
-    surface: SurfaceHeights,
-    kerb_height: float,
+    surface: street_areas.SurfaceHeights,
+    kerb_height: float | street_areas.KerbMap,
     streets: BaseGeometry,
     bounds: tuple[float, float, float, float],
     pads: Sequence[Pad] = (),
@@ -188,6 +191,8 @@ def make_ground(
 
     The arguments are those of `SlopingGround`.
     """
+    if callable(kerb_height):
+        return SlopingGround(surface, kerb_height, streets, bounds, pads)
     if surface.is_level and all(pad.height == kerb_height for pad in pads):
         return LevelGround(kerb_height)
     return SlopingGround(surface, kerb_height, streets, bounds, pads)

@@ -118,7 +118,7 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
 def street_surfaces(
     areas: street_areas.StreetAreas,
     surface: street_areas.SurfaceHeights,
-    kerb: float,
+    kerb: float | street_areas.KerbMap,
     coverings: Sequence[Covering],
     kerbless: BaseGeometry | None = None,
 ) -> list[Structure]:
@@ -156,15 +156,19 @@ def kerb_area(paved: BaseGeometry) -> MultiPolygon:
 
 
 def _heights(
-    surface: street_areas.SurfaceHeights, kerb: float
+    surface: street_areas.SurfaceHeights, kerb: float | street_areas.KerbMap
 ) -> tuple[HeightMap | float, HeightMap | float]:
     """Returns the heights of the roads and of the sidewalks beside them."""
-    if surface.is_level:
-        return 0.0, kerb
 
     def road(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return surface.heights(np.column_stack([x, y]))
 
+    if callable(kerb):
+        return 0.0 if surface.is_level else road, (
+            lambda x, y: road(x, y) + kerb(np.column_stack([x, y]))
+        )
+    if surface.is_level:
+        return 0.0, kerb
     return road, lambda x, y: road(x, y) + kerb
 
 

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from cns_drake.base.angles import wrapped
 from cns_drake.imports.drives import search
 from cns_drake.imports.drives.search import Obstacle, WaypointDrive
-from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
+from cns_drake.imports.opendrive.lanes import DRIVEN, KerbHeights, LaneBand
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import Walkway, resampled
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
@@ -18,6 +18,8 @@ from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
 # heading differs by less than this [m, rad].
 _NEAR = 0.6
 _ASTRAY = np.radians(20.0)
+# A lane of this length may be a ring that follows itself [m].
+_SHORTEST_RING = 10.0
 # Least width at the ends of a lane for a car [m].
 _LEAST_WIDTH = 1.8
 _LEAST_LENGTH = 0.05
@@ -47,12 +49,13 @@ class BandGraph(search.WayGraph):
         ]
         # The key that a drive may use once: a road, or a lane of a junction.
         self._roads = np.array([band.road.name for band in self.bands])
-        before, after = self._link()
+        before, after = self._link(lengths)
         # The second lane of a pair follows the first.
         self.followers = list(zip(before.tolist(), after.tolist(), strict=True))
-        super().__init__(np.array(lengths), before, after)
+        others = before != after
+        super().__init__(np.array(lengths), before[others], after[others])
 
-    def _link(self) -> tuple[np.ndarray, np.ndarray]:
+    def _link(self, lengths: list[float]) -> tuple[np.ndarray, np.ndarray]:
         lines = self.lines
         starts = np.array([line[0] for line in lines]).reshape(-1, 3)
         ends = np.array([line[-1] for line in lines]).reshape(-1, 3)
@@ -64,7 +67,8 @@ class BandGraph(search.WayGraph):
             for k, some in enumerate(near):
                 for m in sorted(some):
                     turn = wrapped(first[m] - last[k])
-                    if m != k and abs(turn) < _ASTRAY:
+                    is_other = m != k or lengths[k] > _SHORTEST_RING
+                    if is_other and abs(turn) < _ASTRAY:
                         pairs.append((k, m))
         before, after = np.array(pairs, dtype=int).reshape(-1, 2).T
         return before, after
@@ -129,6 +133,7 @@ def _is_driven(band: LaneBand) -> bool:
 def _driven_line(band: LaneBand) -> np.ndarray:
     """Returns the middle of a lane (N, 3) in the direction of its traffic."""
     along = (band.lane.number < 0) != band.road.keeps_left
+    along ^= band.lane.is_reversed
     line = band.middle if along else band.middle[::-1]
     steps = np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1)
     kept = np.concatenate([[True], steps > 1e-3])
@@ -162,11 +167,10 @@ def _forwards(line: np.ndarray) -> np.ndarray:
     return np.array(kept)
 
 
-def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:
-    """Returns the text of a file of lanes; None if no vehicle can drive on.
-
-    A kerb is the height of sidewalks above the road [m].
-    """
+def lanes_for_traffic(
+    bands: Sequence[LaneBand], kerbs: KerbHeights
+) -> str | None:
+    """Returns the text of a file of lanes; None if no vehicle can drive on."""
     graph = BandGraph(bands)
     lanes = [
         DirectedLane(
@@ -180,10 +184,10 @@ def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:
     if not joined.pieces:
         return None
     walks = [band for band in bands if band.lane.kind in _SIDEWALKS]
-    return lane_text(joined, _walkways(walks, kerb))
+    return lane_text(joined, _walkways(walks, kerbs))
 
 
-def _walkways(bands: Sequence[LaneBand], kerb: float) -> list[Walkway]:
+def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
     """Returns a strip for each sidewalk, on which walkers turn round."""
     found: list[Walkway] = []
     for band in bands:
@@ -192,6 +196,9 @@ def _walkways(bands: Sequence[LaneBand], kerb: float) -> list[Walkway]:
         if half < _LEAST_HALF_WIDTH or steps.sum() < _SHORTEST:
             continue
         first = 2 * len(found)
-        points = resampled(band.middle + np.array([0.0, 0.0, kerb]))
+        kerb = kerbs(band.middle[:, :2])
+        points = resampled(
+            np.column_stack([band.middle[:, :2], band.middle[:, 2] + kerb])
+        )
         found.append(Walkway(points, half, first, first + 1))
     return found

@@ -47,13 +47,17 @@ _LEAST_WIDTH = 0.1
 _NEIGHBOURS = 8
 # Distance of the places of a lane [m].
 _PLACE_SPACING = 0.5
+# A kerb this near to a sidewalk has its height [m].
+_BESIDE = 1.0
 # Nearer places count more; this distance bounds their weight [m].
 _CORE = 0.05
 # Places at a time.
 _BLOCK = 200_000
 _LEVEL = 1e-9
 # What a band has at each place along the road.
-_ARRAYS = ("inner", "outer", "middle", "heading", "roll", "grade", "s")
+_ARRAYS = (
+    "inner", "outer", "middle", "heading", "roll", "grade", "rise", "s",
+)  # fmt: skip
 
 
 def lane_class(kind: str) -> str | None:
@@ -63,11 +67,11 @@ def lane_class(kind: str) -> str | None:
 
 
 def is_raised(kind: str, height: float) -> bool:
-    """Returns whether a lane is a kerb above the road.
+    """Returns whether a lane is a kerb above the road, not part of it.
 
     Its inner edge stands at a height above the road in the file [m].
     """
-    return kind in _RAISED or height >= _LEAST_KERB
+    return kind in _RAISED or (height >= _LEAST_KERB and kind not in DRIVEN)
 
 
 @dataclass(frozen=True)
@@ -80,9 +84,12 @@ class LaneBand:
         kind: type of the lane; "enclosed" for a lane of type none with others
             farther outside, as on a road that is closed to traffic.
         inner, outer: (N, 3) places on its edges, in the order of the road; two
-            are the same at a step in its width [m].
+            are the same at a step in its width [m]. Those of a lane above a
+            kerb are at the height of the road.
         middle: (N, 3) between them.
-        heading, roll, grade: (N,) the road's there [rad, rad, 1].
+        heading, roll, grade: (N,) the road's there, the roll 0 for a level lane
+            [rad, rad, 1].
+        rise: (N, 2) heights of its edges above the road; NaN if unknown [m].
         s: (N,) along the road [m].
     """
 
@@ -96,6 +103,7 @@ class LaneBand:
     heading: np.ndarray
     roll: np.ndarray
     grade: np.ndarray
+    rise: np.ndarray
     s: np.ndarray
 
     @property
@@ -119,6 +127,8 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
         middle_line = road.points(s, inside, offset)
         for side in (1, -1):
             t, inner = offset, middle_line
+            # Beyond a level lane all edges are lower or higher.
+            beside_level = False
             numbers = sorted(
                 (n for n in section.lanes if n * side > 0), key=abs
             )
@@ -133,22 +143,57 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                     beyond = offset + side * np.maximum(
                         border, side * (t - offset)
                     )
-                outer = road.points(s, inside, beyond)
+                is_level = lane.is_level and bool(road.superelevation)
+                own_roll = np.zeros(len(s)) if is_level else roll
+                beside_level |= is_level
+                if beside_level:
+                    outer = inner + _across(heading, own_roll, beyond - t)
+                else:
+                    outer = road.points(s, inside, beyond)
                 _check_place(road, number, outer)
-                yield LaneBand(
-                    road=road,
-                    section=k,
-                    lane=lane,
-                    kind=_kind(road, section, lane),
-                    inner=inner,
-                    outer=outer,
-                    middle=(inner + outer) / 2.0,
-                    heading=heading,
-                    roll=roll,
-                    grade=grade,
-                    s=s,
+                yield _band(
+                    LaneBand(
+                        road=road,
+                        section=k,
+                        lane=lane,
+                        kind=_kind(road, section, lane),
+                        inner=inner,
+                        outer=outer,
+                        middle=(inner + outer) / 2.0,
+                        heading=heading,
+                        roll=own_roll,
+                        grade=grade,
+                        rise=_rise(lane, s, inside),
+                        s=s,
+                    )
                 )
                 t, inner = beyond, outer
+
+
+def _across(
+    heading: np.ndarray, roll: np.ndarray, width: np.ndarray
+) -> np.ndarray:
+    """Returns the (N, 3) steps to the left over widths (N,) [m]."""
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    flat = left * (width * np.cos(roll))[:, None]
+    return np.column_stack([flat, width * np.sin(roll)])
+
+
+def _rise(lane: Lane, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    if not lane.inner_height:
+        return np.full((len(s), 2), np.nan)
+    both = lane.inner_height, lane.outer_height
+    return np.stack([one.at(s, inside) for one in both], axis=1)
+
+
+def _band(band: LaneBand) -> LaneBand:
+    """Returns a lane that is part of the road at its own height."""
+    if not band.lane.inner_height or is_raised(band.kind, band.lane.height):
+        return band
+    up = np.array([0.0, 0.0, 1.0])
+    inner = band.inner + band.rise[:, :1] * up
+    outer = band.outer + band.rise[:, 1:] * up
+    return replace(band, inner=inner, outer=outer, middle=(inner + outer) / 2.0)
 
 
 def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
@@ -187,7 +232,7 @@ def _stations(
         road.lane_offset,
     ]
     for lane in section.lanes.values():
-        cubics += [lane.width, lane.border]
+        cubics += [lane.width, lane.border, lane.inner_height]
     joints = np.concatenate(
         [
             [section.start, section.end],
@@ -328,9 +373,50 @@ class RoadHeights:
         return (z * weight).sum(axis=1) / weight.sum(axis=1)
 
 
+class KerbHeights:
+    """The heights of imported sidewalks above the road, by place."""
+
+    def __init__(self, bands: Sequence[LaneBand], usual: float):
+        """Takes the lanes on the ground, and the usual height [m].
+
+        Kerbs without a height, or away from sidewalks, have the usual one.
+        """
+        self._usual = usual
+        rows = [np.zeros((0, 6))]
+        for band in bands:
+            if is_raised(band.kind, band.lane.height):
+                rise = np.nan_to_num(band.rise, nan=usual)
+                edges = [band.inner[:, :2], band.outer[:, :2], rise]
+                own = _dense(band, np.column_stack(edges))
+                wide = np.linalg.norm(own[:, :2] - own[:, 2:4], axis=1)
+                rows.append(own[wide > _LEAST_WIDTH])
+        places = np.concatenate(rows)
+        self._inner, self._outer, self._rise = np.split(places, 3, axis=1)
+        self._tree = cKDTree((self._inner + self._outer) / 2.0)
+        self.differ = bool((np.abs(self._rise - usual) > _SAG).any())
+
+    def __call__(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the (N,) heights at (N, 2) places [m]."""
+        distance, k = self._tree.query(xy)
+        across = self._outer[k] - self._inner[k]
+        width2 = (across**2).sum(axis=1)
+        part = ((xy - self._inner[k]) * across).sum(axis=1) / width2
+        low, high = self._rise[k].T
+        own = low + np.clip(part, 0.0, 1.0) * (high - low)
+        near = distance < np.sqrt(width2) / 2.0 + _BESIDE
+        return np.where(near, own, self._usual)
+
+
 def _places(band: LaneBand) -> np.ndarray:
     """Returns (N, 6) places in the middle, heading, roll and grade there."""
-    rows = np.column_stack([band.middle, band.heading, band.roll, band.grade])
+    return _dense(
+        band,
+        np.column_stack([band.middle, band.heading, band.roll, band.grade]),
+    )
+
+
+def _dense(band: LaneBand, rows: np.ndarray) -> np.ndarray:
+    """Returns values (N, K) at a lane's stations, and between them."""
     # Both sides of a joint stay: the stretch between them has no length.
     steps = np.diff(band.s)
     counts = np.maximum(np.ceil(steps / _PLACE_SPACING).astype(int), 1)

@@ -232,6 +232,10 @@ class Cubics:
         )
 
 
+# A function without a value anywhere.
+NOWHERE = Cubics()
+
+
 @dataclass(frozen=True)
 class MarkLine:
     """One line of a mark whose measures the file has.
@@ -272,8 +276,10 @@ class Lane:
 
     Numbers count from the middle outwards, positive on the left. A lane has a
     width over the distance along the road, or a border: the distance of its
-    outer edge from the middle. Its inner edge stands at the height above the
-    road [m]; marks are on its outer border, one after the other.
+    outer edge from the middle. Its edges stand at heights above the road, where
+    the file has any; `height` is the greatest one of its inner edge [m]. It may
+    be level across where the road is banked, and its traffic may be reversed.
+    Marks are on its outer border, one after the other.
     """
 
     number: int
@@ -282,6 +288,10 @@ class Lane:
     border: Cubics
     height: float
     marks: tuple[RoadMark, ...] = ()
+    inner_height: Cubics = NOWHERE
+    outer_height: Cubics = NOWHERE
+    is_level: bool = False
+    is_reversed: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ lanes and junctions. A link to something that is not in the file is still
 reported as a fault."""
 
 from collections.abc import Iterable, Iterator, Mapping
+import contextlib
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.things import read_things
 from cns_drake.imports.options import ImportFaults
@@ -36,6 +38,8 @@ _ROUNDING = 0.01
 _WIDEST = 100.0
 _SHARPEST = 100.0
 _SHORTEST = 1e-5
+# No kerb is higher [m].
+_HIGHEST_LANE = 1.0
 # Banked test tracks have up to 49 deg [rad].
 _MOST_BANKED = math.radians(50.0)
 # Longest part of a name that is used in other names.
@@ -125,6 +129,33 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
                     )
 
 
+_KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
+
+
+def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
+    """Counts what would change a road map and is not read.
+
+    The name is that of the road or junction around an element.
+    """
+    known = _KNOWN["elements"].get(element.tag)
+    for key, usual in _KNOWN["attributes"].get(element.tag, {}).items():
+        value = element.attrib.get(key)
+        with contextlib.suppress(TypeError, ValueError):
+            value = f"{float(value or ''):g}"
+        if value is not None and value not in usual:
+            faults.add(f"{key} of {element.tag}, not read", name)
+    for child in element.all("*"):
+        own = name
+        if child.tag in ("road", "junction"):
+            own = child.attrib.get("id", "")
+        if not child.attrib and not len(child):
+            continue
+        if known is not None and child.tag not in known:
+            faults.add(f"{child.tag} of {element.tag}, not read", own)
+        elif child.tag != "userData":
+            count_unread(child, faults, own)
+
+
 def _linked(road: Element, end: str) -> tuple[str, str | None]:
     """Returns kind and id of the link at an end of a road, if any."""
     link = road.first("link", end)
@@ -152,6 +183,10 @@ def _dangling_lanes(
         for end, at in zip(_ENDS, (k - 1, k + 1), strict=True):
             if 0 <= at < len(own):
                 beside = [own[at]]
+                # One side of the road may go on through others.
+                while _is_single_sided(own[at]) and 0 < at < len(own) - 1:
+                    at += 1 if end == "successor" else -1
+                    beside.append(own[at])
             else:
                 kind, linked = _linked(road, end)
                 if kind != "road" or linked is None or linked not in roads:
@@ -198,6 +233,7 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     if not roads:
         raise InputError(f"{path}: the file has no roads")
     count_dangling_links(top, faults)
+    count_unread(top, faults, "the file")
     if together > _LONGEST_TOGETHER:
         raise InputError(
             f"{path}: {together / 1000:.0f} km of roads; at most "
@@ -388,6 +424,11 @@ def _cubics(
     )
 
 
+def _steps(rows: Iterable[tuple[float, float]]) -> road_model.Cubics:
+    """Returns values that hold from their starts on."""
+    return road_model.Cubics([(*row, 0.0, 0.0, 0.0) for row in rows])
+
+
 def _sections(
     road: Element, length: float, name: str, faults: ImportFaults
 ) -> list[road_model.LaneSection]:
@@ -396,6 +437,7 @@ def _sections(
     starts = [one.number("s") for one in elements]
     ends = [*starts[1:], length][: len(starts)]
     found = []
+    before: dict[int, road_model.Lane] = {}
     for one, start, end in zip(elements, starts, ends, strict=True):
         start, end = max(start, 0.0), min(end, length)
         if end - start < _SHORTEST:
@@ -417,8 +459,17 @@ def _sections(
             for element in one.all("center", "lane")
             for mark in read_marks(element, start, name, faults)
         ]
+        if _is_single_sided(one):
+            # The lanes of the other side go on.
+            sides = {number > 0 for number in lanes}
+            lanes |= {k: v for k, v in before.items() if (k > 0) not in sides}
+        before = lanes
         found.append(road_model.LaneSection(start, end, lanes, tuple(middle)))
     return found
+
+
+def _is_single_sided(section: Element) -> bool:
+    return section.value("singleSide", "false").lower() in ("true", "1")
 
 
 def _lane(
@@ -429,15 +480,34 @@ def _lane(
         raise ValueError(
             f"line {element.line}: lane: id: {number} is not a valid id"
         )
-    heights = element.first("height")
+    heights = sorted(
+        (
+            one.number("sOffset", 0.0) + start,
+            one.number("inner", 0.0),
+            one.number("outer", one.number("inner", 0.0)),
+        )
+        for one in element.all("height")
+    )
+    if any(
+        abs(value) > _HIGHEST_LANE for _, *both in heights for value in both
+    ):
+        faults.add("lane more than 1 m above its road, laid on it", name)
+        heights = []
+    direction = element.value("direction", "standard")
     lane = road_model.Lane(
         number=int(number),
         kind=element.value("type", "none"),
         width=_cubics(element.all("width"), "sOffset", start),
         border=_cubics(element.all("border"), "sOffset", start),
-        height=0.0 if heights is None else heights.number("inner", 0.0),
+        height=max((inner for _, inner, _ in heights), default=0.0),
         marks=tuple(read_marks(element, start, name, faults)),
+        inner_height=_steps((s, inner) for s, inner, _ in heights),
+        outer_height=_steps((s, outer) for s, _, outer in heights),
+        is_level=element.value("level", "false").lower() in ("true", "1"),
+        is_reversed=direction == "reversed",
     )
+    if direction not in ("standard", "reversed"):
+        faults.add(f"lane with traffic in direction {direction}", name)
     for one in (*element.all("width"), *element.all("border")):
         if abs(one.number("a", 0.0)) > _WIDEST:
             raise ValueError(

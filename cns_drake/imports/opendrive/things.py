@@ -55,6 +55,8 @@ def read_things(
         )
     for k, one in enumerate(road.all("objects", "object")):
         thing = _object(one, f"object_{name}_{k}")
+        for _ in list(one.all("outlines", "outline"))[1:]:
+            faults.add("further outline of an object, not read", thing.name)
         repeats = list(one.all("repeat"))
         if not repeats:
             yield thing

@@ -27,8 +27,10 @@ from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.opendrive import imported_streets, lane_drives
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lanes import (
+    KerbHeights,
     LaneBand,
     RoadHeights,
+    is_raised,
     lane_bands,
     split_levels,
 )
@@ -118,6 +120,9 @@ def _build(
     except ValueError as error:
         raise InputError(f"{source}: {error}") from error
     ground, raised = split_levels(bands)
+    for band in raised:
+        if band.lane.inner_height and is_raised(band.kind, band.lane.height):
+            faults.add("kerb on a bridge, level with its road", band.road.name)
     ends = imported_streets.bridge_ends(raised)
     streets = ImportedStreets(ground, ends)
     if streets.carriageway().is_empty:
@@ -139,6 +144,7 @@ def _build(
     ]
     decks = list(imported_streets.bridge_decks(raised))
     kerb = _kerb(ground)
+    kerbs = KerbHeights(ground, kerb)
     surface = RoadHeights(ground)
     marks: list[Structure] = []
     if dressed:
@@ -156,6 +162,7 @@ def _build(
             areas=streets,
             surface=surface,
             kerb_height=kerb,
+            kerbs=kerbs if kerbs.differ else None,
             junctions=streets.junctions,
             margins=streets.margins,
             reserved=shapely.union_all(
@@ -166,7 +173,11 @@ def _build(
             ),
             structures=(
                 *street_surfaces(
-                    streets, surface, kerb, streets.coverings, ends
+                    streets,
+                    surface,
+                    kerbs if kerbs.differ else kerb,
+                    streets.coverings,
+                    ends,
                 ),
                 *decks,
                 *things,
@@ -180,6 +191,9 @@ def _build(
     )
     imported = {one.name for one in (*decks, *things, *marks)}
     generated = [one for one in city.structures if one.name not in imported]
+    lanes_of_traffic = lane_drives.lanes_for_traffic(bands, kerbs)
+    if lanes_of_traffic is None:
+        faults.add("no lanes for traffic: none leads on for ever", source.name)
     stages = starter_stages(City(tuple(generated), city.cars))
     return Town(
         roads,
@@ -188,7 +202,7 @@ def _build(
         Stages.model_validate(stages),
         streets,
         lane_drives.find_lane_drives(bands),
-        lane_drives.lanes_for_traffic(bands, kerb),
+        lanes_of_traffic,
         _kinds(roads, things, decks, marks, generated),
         faults,
     )

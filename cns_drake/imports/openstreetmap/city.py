@@ -39,12 +39,18 @@ from cns_drake.imports.openstreetmap.reading import (
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     heights,
+    is_inside,
     length,
     tag_value,
     why_absent,
 )
 from cns_drake.imports.options import ImportFaults
 
+# From north, clockwise.
+_COMPASS = (
+    "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE",
+    "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW",
+)  # fmt: skip
 # What carries a lamp that is a thing of its own.
 _POSTS = ("pole", "straight_mast", "bent_mast", "mast")
 _TREE_DISTANCE = 8.0  # [m]
@@ -82,7 +88,7 @@ def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
     kinds = features.kinds
     for name, tags, place in features.nodes:
         kind = object_of(tags)
-        if kind is not None:
+        if kind is not None and not is_inside(tags):
             x, y = local(np.array([place]))[0].tolist()
             direction = _direction(tags)
             yield Thing(name, kinds[name], kind, (x, y), direction)
@@ -103,6 +109,8 @@ def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
 def _direction(tags: reading.Tags) -> float | None:
     """Returns the heading of a thing, if its tags have one [rad]."""
     text = tags.get("direction", "")
+    if text.upper() in _COMPASS:
+        text = str(22.5 * _COMPASS.index(text.upper()))
     if not re.fullmatch(r"\d{1,3}(\.\d+)?", text):
         return None
     return float(np.radians(90.0 - float(text)))
@@ -240,6 +248,13 @@ def _count_unused(
         one.name for one in features.areas if reading.is_building(one.tags)
     }
     used |= also
+    tagged = {one.name: one.tags for one in features.ways}
+    tagged |= {one.name: one.tags for one in features.areas}
+    tagged |= {name: tags for name, tags, _ in features.trees}
+    for name, tags in tagged.items():
+        for key, usual in TABLES["unread"].items():
+            if tags.get(key, "") not in ("", *usual):
+                features.faults.add(f"tag {key}, not read", name)
     for name, kind in features.kinds.items():
         is_relation_of_parts = kind == "relation of type building"
         if name not in used and not is_relation_of_parts:
@@ -268,6 +283,8 @@ def _barriers(
 
 def _trees(features: reading.OsmFeatures, local: Local) -> Iterator[Imported]:
     for name, tags, place in features.trees:
+        if is_inside(tags):
+            continue
         x, y = local(np.array([place]))[0].tolist()
         needles = tags.get("leaf_type") == "needleleaved"
         model = tree(

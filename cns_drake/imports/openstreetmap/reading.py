@@ -1,9 +1,11 @@
 """Reads the parts of an OpenStreetMap file that make a city."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+import contextlib
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
+import tempfile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
 from cns_drake.city.geometry.polygons import hull_of
+from cns_drake.imports.openstreetmap.sorting import number_in_file, sorted_file
 from cns_drake.imports.openstreetmap.tags import TABLES
 from cns_drake.imports.options import ImportFaults
 
@@ -115,22 +118,28 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
     check_regular(path)
     wanted: dict[str, None] = {}
     flat: set[str] = set()
-    try:
-        reader = osmium.FileProcessor(str(path)).with_locations().with_areas()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        _reader_errors(path),
+    ):
+        source = sorted_file(path, Path(folder), features.faults)
+        reader = osmium.FileProcessor(str(source)).with_locations().with_areas()
         for one in reader:
             tags = {tag.k: tag.v for tag in one.tags}
+            own = number_in_file(one.id)
             if tags and not isinstance(one, osmium.osm.Area):
                 letter = _LETTERS[type(one).__name__]
-                features.kinds[f"{letter}{one.id}"] = thing_kind(tags)
+                features.kinds[f"{letter}{own}"] = thing_kind(tags)
             if isinstance(one, osmium.osm.Area):
+                own = number_in_file(one.orig_id())
                 polygons = _polygons(one)
-                name = f"{'w' if one.from_way() else 'r'}{one.orig_id()}"
+                name = f"{'w' if one.from_way() else 'r'}{own}"
                 if polygons and is_building(tags) and _is_flat(polygons):
                     flat.add(name)
                 elif polygons:
                     features.areas.append(OsmArea(name, tags, polygons))
             elif isinstance(one, osmium.osm.Way) and tags:
-                name = f"w{one.id}"
+                name = f"w{own}"
                 if is_building(tags):
                     wanted[name] = None
                 nodes = [n for n in one.nodes if n.location.valid()]
@@ -144,9 +153,9 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                     features.ways.append(OsmWay(name, tags, line, numbers))
             elif isinstance(one, osmium.osm.Relation):
                 if tags.get("type") == "multipolygon" and is_building(tags):
-                    wanted[f"r{one.id}"] = None
+                    wanted[f"r{own}"] = None
                     features.outers |= {
-                        f"w{member.ref}": f"r{one.id}"
+                        f"w{number_in_file(member.ref)}": f"r{own}"
                         for member in one.members
                         if member.type == "w" and member.role != "inner"
                     }
@@ -155,16 +164,12 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 if not is_tree and tags.get("highway") == "crossing":
                     features.crossings.append((one.id, tags))
                 elif tags:
-                    node = (f"n{one.id}", tags, (one.lon, one.lat))
+                    node = (
+                        f"n{own}",
+                        tags,
+                        (one.lon, one.lat),
+                    )
                     (features.trees if is_tree else features.nodes).append(node)
-    except (
-        RuntimeError,
-        ValueError,
-        OverflowError,
-        osmium.InvalidLocationError,
-    ) as error:
-        first = str(error).splitlines()[0] if str(error) else "unreadable"
-        raise InputError(f"{path}: {first}") from error
     closed = {name for name, _, _ in features.areas}
     shapeless = [name for name in wanted if name not in closed]
     if shapeless:
@@ -178,6 +183,24 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
         fault = "without area" if name in flat else _OPEN
         features.faults.add(f"building {fault}, left out", name)
     return features
+
+
+@contextlib.contextmanager
+def _reader_errors(path: Path) -> Iterator[None]:
+    """Raises what osmium says of a file as an InputError."""
+    import osmium
+
+    try:
+        yield
+    except (
+        RuntimeError,
+        ValueError,
+        OverflowError,
+        OSError,
+        osmium.InvalidLocationError,
+    ) as error:
+        first = str(error).splitlines()[0] if str(error) else "unreadable"
+        raise InputError(f"{path}: {first}") from error
 
 
 def _polygons(area: Any) -> list[Polygon]:

@@ -189,6 +189,16 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
     return None
 
 
+def is_inside(tags: Mapping[str, str]) -> bool:
+    """Returns whether a small thing is in a building or underground."""
+    below = [tags.get(key, "").startswith("-") for key in ("layer", "level")]
+    return (
+        any(below)
+        or tags.get("indoor", "no") != "no"
+        or tags.get("location") in ("indoor", "underground", "underwater")
+    )
+
+
 def street_width(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> float | None:

@@ -1,7 +1,9 @@
 """Adding a LiDAR to a diagram."""
 
+from __future__ import annotations
+
 from collections.abc import Collection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 import warnings
 
 from pydrake import geometry
@@ -10,10 +12,10 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.vehicle_motion import VehicleSweep
-from cns_drake.scene.perception_geometry import geometry_revision_port
-from cns_drake.scene.world import anchored_frames
+from cns_drake.scene.perception_geometry import (
+    anchored_frames,
+    geometry_revision_port,
+)
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.config import (
     LidarSection,
@@ -25,7 +27,10 @@ from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.measurement import MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+if TYPE_CHECKING:
+    # Slow to import, and ideal returns do without.
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 _VIEW_COLOR = Rgba(0.9, 0.2, 0.1, 1.0)
 _CLEAR = WeatherConfig()
@@ -55,10 +60,11 @@ def add_lidar(
         scene_graph: the SceneGraph to scan.
         body: P, a body or a frame fixed on one, of a finalized plant that is
             registered with `scene_graph`; or a frame that any other source has
-            registered there.
+            registered there. A frame on a body stays where its model has it,
+            also if a context moves it, as for Drake's cameras.
         X_PS: pose of the sensor S in P.
         pattern: the beams, or the name of a preset, which then turns at the
-            rate of its data sheet.
+            rate of its data sheet. Nothing is rounded.
         name: name of the system.
         unseen: frames and geometries that the LiDAR does not see; by default
             its body and all bodies welded to it, without the world.
@@ -73,11 +79,12 @@ def add_lidar(
             `Lidar` replaces these three.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
-        options: further arguments of `Lidar`.
+        options: further arguments of `Lidar`, such as `causal`.
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`
-        and `X_WS`.
+        and `X_WS`, and the methods `EvalGeometryIds`, `EvalInstances` and
+        `CastRays` of a Context.
 
     Raises:
         KeyError: there is no preset of that name.
@@ -111,31 +118,34 @@ def add_lidar(
         )
     if not isinstance(body, FrameId):
         body, X_PS = body_and_pose(body, X_PS)
-    if isinstance(pattern, str):
-        if returns == "calibrated":
-            returns = CalibratedReturns.of_preset(
-                pattern, seed=seed, sensor_name=name
-            )
-        pattern = make_beam_pattern(pattern)
-        if isinstance(returns, CalibratedReturns):
-            pattern = returns.sheet.aimed(pattern)
-    elif not isinstance(pattern, BeamPattern):
+    preset = pattern if isinstance(pattern, str) else None
+    if preset is not None:
+        pattern = make_beam_pattern(preset)
+    if not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
             "preset"
         )
-    if isinstance(returns, CalibratedReturns):
+    if returns != "ideal":
+        from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+        if returns == "calibrated" and preset is not None:
+            returns = CalibratedReturns.of_preset(
+                preset, seed=seed, sensor_name=name
+            )
+        if not isinstance(returns, CalibratedReturns):
+            raise ValueError(
+                f"returns: {returns!r}: give 'ideal', 'calibrated' with the "
+                "name of a preset as pattern, or CalibratedReturns"
+            )
+        if preset is not None:
+            pattern = returns.sheet.aimed(pattern)
         if range_noise or dropout:
             raise ValueError(
                 "range_noise, dropout: calibrated returns have their own; "
                 "leave these out"
             )
         options["returns"] = returns
-    elif returns != "ideal":
-        raise ValueError(
-            f"returns: {returns!r}: give 'ideal', 'calibrated' with the name "
-            "of a preset as pattern, or CalibratedReturns"
-        )
     elif range_noise or dropout or seed:
         if "measurement" in options:
             raise ValueError(
@@ -211,21 +221,29 @@ def add_described_lidar(
     name: str = "lidar",
     seed: int = 0,
     weather: WeatherConfig = _CLEAR,
-    trajectory: Trajectory | None = None,
+    period: float | None = None,
     **options: Any,
 ) -> Lidar:
     """Adds the LiDAR that a description describes to a diagram.
 
-    The body P carries it, or a frame on one does. With motion distortion and a
-    prescribed trajectory of the body, a system `<name>_sweep` gives its poses.
+    Args:
+        config: the description.
+        builder: holds `scene_graph`.
+        scene_graph: the SceneGraph to scan.
+        body: P, or a frame on it.
+        X_PS: pose of the sensor in P.
+        name: name of the system.
+        seed: seed of noise and returns.
+        weather: of calibrated returns.
+        period: duration of a turn [s]; by default by the description's rate.
+        options: further arguments of `add_lidar`.
     """
-    pattern = make_pattern(config)
-    lidar = add_lidar(
+    return add_lidar(
         builder,
         scene_graph,
         body,
         X_PS,
-        pattern,
+        make_pattern(config, period),
         name=name,
         measurement=MeasurementModel(
             resolution=config.resolution,
@@ -238,15 +256,6 @@ def add_described_lidar(
         returns=make_returns(config, weather, name, seed) or "ideal",
         **options,
     )
-    if config.motion_distortion and trajectory is not None:
-        sweep = builder.AddNamedSystem(
-            f"{name}_sweep",
-            VehicleSweep(trajectory, pattern.column_t_ns * 1e-9),
-        )
-        builder.Connect(
-            sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
-        )
-    return lidar
 
 
 def add_lidar_view(
@@ -282,9 +291,7 @@ def add_lidar_view(
     )
     view.set_default_rgba(color)
     view.set_point_size(point_size)
-    builder.Connect(
-        lidar.GetOutputPort("point_cloud_W"), view.cloud_input_port()
-    )
+    builder.Connect(lidar.GetOutputPort("positions_W"), view.cloud_input_port())
     return view
 
 

@@ -10,8 +10,11 @@ from pydantic import Field, PlainSerializer, field_validator, model_validator
 from cns_drake.base.drives.point_layouts import LayoutName
 from cns_drake.base.errors import validated
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.lidar.patterns import BeamPattern
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
+from cns_drake.sensors.lidar.presets import (
+    LIDAR_PRESETS,
+    UnitPattern,
+    make_beam_pattern,
+)
 from cns_drake.sensors.sensor_config import (
     Mount,
     Section,
@@ -63,7 +66,8 @@ class LidarSection(Mount):
             the strongest and the last.
         unit_seed: seed of this very unit's errors of range, angles and gain of
             each laser, in calibrated returns; drives with one unit share it.
-        rate: turns per second.
+        rate: turns per second, a divisor of the fastest LiDAR's. A unit whose
+            lasers fire at a fixed rate has more columns in a slower turn.
         layout: the fields of a point in the recording.
     """
 
@@ -84,7 +88,7 @@ class LidarSection(Mount):
         field_off_by_default(Echoes.STRONGEST)
     )
     unit_seed: int = field_off_by_default(0, ge=0)
-    rate: Literal[5, 10, 20] = field_off_by_default(20)
+    rate: int = field_off_by_default(20, ge=1, le=100)
     layout: LayoutName = field_off_by_default("cns")
 
     @field_validator("preset")
@@ -149,14 +153,16 @@ def make_lidar_config(preset: str) -> LidarSection:
     return validated(LidarSection, {"preset": preset}, "--lidar")
 
 
-def make_pattern(config: LidarSection) -> BeamPattern:
-    """Returns the beams of one turn.
+def make_pattern(
+    config: LidarSection, period: float | None = None
+) -> UnitPattern:
+    """Returns the beams of one turn, of another period [s] if it is given.
 
     Calibrated returns have the elevations of a real unit, if they are known.
     """
     pattern = make_beam_pattern(
         config.preset,
-        1.0 / config.rate,
+        period or 1.0 / config.rate,
         num_columns=config.columns,
         min_range=config.min_range,
         max_range=config.max_range,

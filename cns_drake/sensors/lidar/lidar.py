@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import lru_cache
 from operator import is_
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -17,7 +18,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.perception import PointCloud
+from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.framework import (
     Context,
     InputPort,
@@ -30,19 +31,45 @@ from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
+from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
 )
-from cns_drake.scene.semantics import CLASS_IDS, moving_id
-from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
-from cns_drake.sensors.returns.calibrated import CalibratedReturns
-from cns_drake.sensors.returns.materials import Materials, find_materials
 
-# The class of points without a structure.
-SCATTERED_LABEL = CLASS_IDS["outlier"]
+if TYPE_CHECKING:
+    # Slow to import, and ideal returns do without.
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
+    from cns_drake.sensors.returns.materials import Materials
+
+# The class of points without a structure: SemanticKITTI's outlier.
+SCATTERED_LABEL = 1
+_WITHOUT_GREY = Fields(BaseField.kXYZs)
+_WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
+
+
+class Structures(Protocol):
+    """What gives labels and instance ids to geometries."""
+
+    def labels(self, names: Sequence[str]) -> Labels:
+        """Returns those of geometries, by the names of their structures."""
+
+
+class RayHits(NamedTuple):
+    """What N rays meet first.
+
+    Attributes:
+        ranges: (N,) float32 distances [m], inf for a miss.
+        geometry_ids: N `GeometryId`, None for a miss.
+        normals_W: (N, 3) float32 unit normals in the world that face the
+            origins of the rays, zero for a miss.
+    """
+
+    ranges: np.ndarray
+    geometry_ids: list[GeometryId | None]
+    normals_W: np.ndarray
 
 
 class Lidar(LeafSystem):
@@ -62,6 +89,7 @@ class Lidar(LeafSystem):
         - scan
         - point_cloud_S
         - point_cloud_W
+        - positions_W
         - X_WS
 
     Frames: W is the world, P the parent frame, S the sensor frame (x
@@ -69,22 +97,30 @@ class Lidar(LeafSystem):
     one record per return in firing order; beams whose nearest surface is
     closer than the minimum range or farther than the maximum range return
     nothing. `point_cloud_S` holds the same positions as a Drake point cloud,
-    `point_cloud_W` those in the world, and `X_WS` is the pose of S at the
-    time of the output.
+    whose colours are greys: 255 for an intensity of 1 (calibrated returns: for
+    one of 255). `point_cloud_W` has them in the world, `positions_W` without
+    colours, and `X_WS` is the pose of S at the time of the output.
 
-    The turn starts at the time of the output. All its beams are cast from
-    the pose of S at that time, by the pose of P in the SceneGraph (a deskewed
-    scan). With the port `sweep`, poses come from there instead (a `Sweep` of
-    P): one for the whole turn; or with motion distortion one for each column,
-    at its own firing time. Its points are then expressed in S at that time, as
-    a real unit reports them: X_WS(time + t) takes them to their places in the
-    world. Other moving geometry stays, for the turn, at its place at the start.
+    The turn starts at the time of the output; that of a causal LiDAR ends then,
+    so that a controller may use the scan at once. All its beams are cast from
+    the pose of S at the time of the output, by the pose of P in the SceneGraph
+    (a deskewed scan). With the port `sweep`, poses come from there instead (a
+    `Sweep` of P): one for the whole turn; or with motion distortion one for
+    each column, at its own firing time. Its points are then expressed in S at
+    that time, as a real unit reports them: X_WS(start of the turn + t) takes
+    them to their places in the world. Other moving geometry stays, for the
+    turn, at its place at the time of the output.
 
     With `moving_bodies` and the port `body_spatial_velocities` (a list over a
     plant's bodies of V_WB, expressed in the world, as a MultibodyPlant gives
-    it), P and all other bodies of that plant keep their velocities for the
-    turn: each beam is cast at its own firing time, from the place of S then, on
-    the geometry at its place then. Points are expressed in S at that time, too.
+    it), P and all other bodies of that plant keep the velocities that they have
+    at the time of the output for the turn: each beam is cast at its own firing
+    time, from the place of S then, on the geometry at its place then. Points
+    are expressed in S at that time, too.
+
+    `instance` of a point numbers its structure: a model, or the part of a name
+    before a slash. `EvalInstances` maps it to geometries, `EvalGeometryIds`
+    gives the very geometry of each point.
 
     `moving_instances` (abstract, the instance ids of structures) lists the
     moving structures: their points have the label of the moving class.
@@ -121,9 +157,10 @@ class Lidar(LeafSystem):
         moving_bodies: Mapping[FrameId, int] | None = None,
         role: Role = Role.kPerception,
         unseen: Collection[FrameId | GeometryId] | None = None,
-        structures: StructureTable | None = None,
+        structures: Structures | None = None,
         anchored_frames: Collection[FrameId] = (),
         num_threads: int = 1,
+        causal: bool = False,
     ):
         """Constructs the LiDAR.
 
@@ -139,15 +176,19 @@ class Lidar(LeafSystem):
             role: role of the geometry that it sees.
             unseen: frames and geometries that it does not see; by default
                 P, unless that is the world's frame.
-            structures: gives labels and instance ids to returns.
+            structures: gives labels and instance ids to returns; by default
+                structures have no class, and ids in alphabetical order.
             anchored_frames: frames that never move, besides the world's; their
                 geometry is cheaper to cast on. If one moves after all, all
                 static geometry is built anew.
             num_threads: number of threads that share its rays; the measurement
                 does not depend on it.
+            causal: whether a scan is the turn that ends at the time of the
+                output; by default that which starts then.
 
         Raises:
             TypeError: the role is no role of geometry.
+            ValueError: limits or period of the pattern are impossible.
         """
         super().__init__()
         if not isinstance(role, Role) or role == Role.kUnassigned:
@@ -156,17 +197,19 @@ class Lidar(LeafSystem):
                 "Role.kPerception, Role.kIllustration or Role.kProximity of "
                 "pydrake.geometry"
             )
+        pattern.check()
         self.parent_frame_id = parent_frame_id
         self.X_PS = X_PS
         self.pattern = pattern
+        self.causal = bool(causal)
         self._measurement = measurement
         self._returns = returns
         self.role = role
         self.unseen = None if unseen is None else frozenset(unseen)
-        self.structures = structures or StructureTable(())
+        self.structures = structures
         self.anchored_frames = frozenset(anchored_frames)
         self.num_threads = num_threads
-        self._first = self._latest = _Turn(0, pattern.beams(0), returns)
+        self._first = _ready(pattern.beams(0), returns)
         # When each column fires, as a part of a turn.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
@@ -200,22 +243,42 @@ class Lidar(LeafSystem):
         changes = (
             measurement.is_random or returns is not None or not pattern.repeats
         )
-        self._scan = self.DeclareAbstractOutputPort(
-            "scan",
-            alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
-            calc=self._calc_scan,
+        self._measured = self.DeclareCacheEntry(
+            description="scan, with the geometry of each point",
+            value_producer=ValueProducer(
+                allocate=lambda: Value(object()), calc=self._calc_measured
+            ),
             prerequisites_of_calc=(
                 inputs | ({self.time_ticket()} if changes else set())
             ),
         )
-        scan = {self.cache_entry_ticket(self._scan.cache_entry().cache_index())}
-        for name, calc, prerequisites in (
-            ("point_cloud_S", self._calc_point_cloud_S, scan),
-            ("point_cloud_W", self._calc_point_cloud_W, scan | inputs),
+        scan = {self.cache_entry_ticket(self._measured.cache_index())}
+        self.DeclareAbstractOutputPort(
+            "scan",
+            alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
+            calc=lambda context, output: output.set_value(
+                self._measured.Eval(context).scan
+            ),
+            prerequisites_of_calc=scan,
+        )
+        for name, calc, prerequisites, fields in (
+            ("point_cloud_S", self._calc_point_cloud_S, scan, _WITH_GREY),
+            (
+                "point_cloud_W",
+                self._calc_positions_W,
+                scan | inputs,
+                _WITH_GREY,
+            ),
+            (
+                "positions_W",
+                self._calc_positions_W,
+                scan | inputs,
+                _WITHOUT_GREY,
+            ),
         ):
             self.DeclareAbstractOutputPort(
                 name,
-                alloc=lambda: Value(PointCloud()),
+                alloc=lambda fields=fields: Value(PointCloud(0, fields)),
                 calc=calc,
                 prerequisites_of_calc=prerequisites,
             )
@@ -231,6 +294,85 @@ class Lidar(LeafSystem):
         scene = self._eval_seen(context).scene
         assert scene is not None
         return scene
+
+    def EvalGeometryIds(self, context: Context) -> list[GeometryId | None]:
+        """Returns the geometry of each point of `scan` in a Context.
+
+        It is None for a point without a surface, such as rain. A SceneGraph's
+        inspector gives the frame of a geometry, and a plant its body.
+        """
+        _, met, geometries = self._measured.Eval(context)
+        return _ids_of(geometries, met)
+
+    def EvalInstances(
+        self, context: Context
+    ) -> dict[int, tuple[GeometryId, ...]]:
+        """Returns the visible geometries of each instance, by its id.
+
+        Example:
+            gids = lidar.EvalInstances(lidar_context)[scan["instance"][0]]
+            frame_id = scene_graph.model_inspector().GetFrameId(gids[0])
+            body = plant.GetBodyFromFrameId(frame_id)
+            print(plant.GetModelInstanceName(body.model_instance()))
+        """
+        seen = self._eval_seen(context)
+        found: dict[int, tuple[GeometryId, ...]] = {}
+        for instance, one in zip(
+            seen.instance.tolist(), seen.built, strict=True
+        ):
+            found[instance] = (*found.get(instance, ()), one.geometry_id)
+        return found
+
+    def CastRays(
+        self,
+        context: Context,
+        p_WR: np.ndarray,
+        d_W: np.ndarray,
+        max_range: float | np.ndarray = np.inf,
+    ) -> RayHits:
+        """Casts N rays on what the LiDAR sees in a Context.
+
+        Neither its pattern nor its noise matters. Ranges are true to 1e-4 m for
+        rays that start within 1 km of the LiDAR.
+
+        Args:
+            context: of the LiDAR.
+            p_WR: (N, 3) origins in the world, or (3,) if they share one [m].
+            d_W: (N, 3) unit directions in the world.
+            max_range: how far to look [m], one for all or (N,).
+
+        Raises:
+            ValueError: shapes do not match, a direction has another length than
+                1, or a number is not finite (ranges may be infinite).
+        """
+        p_W, d_W = np.asarray(p_WR, float), np.asarray(d_W, float)
+        ranges = np.asarray(max_range, float)
+        if (
+            d_W.shape[1:] != (3,)
+            or p_W.shape not in ((3,), d_W.shape)
+            or ranges.shape not in ((), d_W.shape[:1])
+        ):
+            raise ValueError(
+                f"p_WR {p_W.shape}, d_W {d_W.shape}, max_range {ranges.shape}: "
+                "give (N, 3) or (3,), (N, 3), and a number or (N,)"
+            )
+        length = np.linalg.norm(d_W, axis=1)
+        if not (np.abs(length - 1.0) <= 1e-6).all():
+            raise ValueError("d_W: a direction does not have the length 1")
+        if not (np.isfinite(p_W).all() and (ranges >= 0.0).all()):
+            raise ValueError("p_WR, max_range: not finite, or negative")
+        seen = self._eval_seen(context)
+        assert seen.scene is not None
+        hits = seen.scene.cast_rays(
+            p_W,
+            d_W,
+            ranges,
+            times=np.array([float(self.causal)]),
+            with_normals=True,
+        )
+        return RayHits(
+            hits.ranges, _ids_of(seen.built, hits.geometry), hits.normals_W
+        )
 
     def _eval_seen(self, context: Context) -> SeenGeometry:
         seen = self._seen.Eval(context)
@@ -249,6 +391,7 @@ class Lidar(LeafSystem):
             self._calc_motions(context),
             known,
             ball,
+            self._calc_pose(context).translation(),
         )
 
     def _known_poses(self, context: Context) -> moving_groups.KnownPoses:
@@ -272,15 +415,19 @@ class Lidar(LeafSystem):
             return {}
         V_WBs = self._velocities.Eval(context)
         duration = self.pattern.period
+        start = -duration if self.causal else 0.0
         motions = {
             frame_id: Motion(
-                V_WBs[body].rotational(), V_WBs[body].translational(), duration
+                V_WBs[body].rotational(),
+                V_WBs[body].translational(),
+                duration,
+                start,
             )
             for frame_id, body in self._moving_bodies.items()
         }
         return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
-    def _calc_scan(self, context: Context, output: AbstractValue) -> None:
+    def _calc_measured(self, context: Context, output: AbstractValue) -> None:
         seen = self._eval_seen(context)
         frame, turn = self._turn_at(context.get_time())
         p_WSset, R_WSset = self._calc_poses(context)
@@ -301,7 +448,7 @@ class Lidar(LeafSystem):
         assemble_points(
             scan, turn.table, returns, met, labels, seen.instance, step
         )
-        output.set_value(scan)
+        output.set_value(_Measured(scan, met, seen.built))
 
     def _measure(
         self,
@@ -318,7 +465,7 @@ class Lidar(LeafSystem):
             assert turn.calibrated is not None
             reported = self._returns.measure(
                 seen.scene,
-                seen.materials(is_wet=self._returns.is_wet),
+                seen.materials(self._returns),
                 self.pattern,
                 turn.calibrated,
                 p_WSset,
@@ -343,16 +490,26 @@ class Lidar(LeafSystem):
         return hits.geometry.take(turn.table.place.take(returns.beams)), returns
 
     def _turn_at(self, time: float) -> tuple[int, _Turn]:
-        """Returns number and beams of the turn that starts at a time [s]."""
-        frame = round(time / self.pattern.period)
+        """Returns number and beams of the turn of a time [s]."""
+        frame = round(time / self.pattern.period) - self.causal
         if self.pattern.repeats:
             return frame, self._first
-        # Two threads may ask for different turns.
-        turn = self._latest
-        if turn.frame != frame:
-            beams = self.pattern.beams(frame)
-            turn = self._latest = _Turn(frame, beams, self._returns)
-        return frame, turn
+        return frame, _ready(self.pattern.beams(frame), self._returns)
+
+    def _calc_pose(self, context: Context) -> RigidTransform:
+        """Returns the pose of S at the time of the output."""
+        return self._calc_carrier_pose(context) @ self.X_PS
+
+    def _calc_carrier_pose(self, context: Context) -> RigidTransform:
+        """Returns the pose of P at the time of the output."""
+        sweep = _value(self._sweep, context)
+        if sweep is not None and len(sweep.p_WPset) == 1:
+            R_WP = RotationMatrix(sweep.R_WPset[0])
+            return RigidTransform(R_WP, sweep.p_WPset[0])
+        query_object = self._geometry_query.Eval(context)
+        return self._known_poses(context).find(
+            self.parent_frame_id, query_object.GetPoseInWorld
+        )
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
         """Returns positions and orientations of S: one, or each column's."""
@@ -360,10 +517,7 @@ class Lidar(LeafSystem):
         if sweep is not None:
             sweep = sweep.of_frame(self.X_PS)
             return sweep.p_WPset, sweep.R_WPset
-        query_object = self._geometry_query.Eval(context)
-        X_WP = self._known_poses(context).find(
-            self.parent_frame_id, query_object.GetPoseInWorld
-        )
+        X_WP = self._calc_carrier_pose(context)
         X_WS = X_WP @ self.X_PS
         motion = self._calc_motions(context).get(self.parent_frame_id)
         if motion is not None:
@@ -379,27 +533,36 @@ class Lidar(LeafSystem):
         return np.array([p_WS]), np.array([R_WS])
 
     def _calc_X_WS(self, context: Context, output: AbstractValue) -> None:
-        p_WSset, R_WSset = self._calc_poses(context)
-        output.set_value(RigidTransform(RotationMatrix(R_WSset[0]), p_WSset[0]))
+        output.set_value(self._calc_pose(context))
 
     def _calc_point_cloud_S(
         self, context: Context, output: AbstractValue
     ) -> None:
-        scan = self._scan.Eval(context)
+        scan = self._measured.Eval(context).scan
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
-        _fill(output.get_mutable_value(), p_SRset)
+        self._fill(output.get_mutable_value(), p_SRset, scan["intensity"])
 
-    def _calc_point_cloud_W(
+    def _calc_positions_W(
         self, context: Context, output: AbstractValue
     ) -> None:
-        scan = self._scan.Eval(context)
+        scan = self._measured.Eval(context).scan
         p_WSset, R_WSset = self._calc_poses(context)
         # The pose of S when each point was measured: one, or each column's.
         columns = self._first.beams.column_t_ns
         pose = np.searchsorted(columns, scan["t"]) % len(p_WSset)
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
         p_SRset_W = np.einsum("nij,nj->ni", R_WSset[pose], p_SRset)
-        _fill(output.get_mutable_value(), (p_WSset[pose] + p_SRset_W).T)
+        p_WRset = (p_WSset[pose] + p_SRset_W).T
+        self._fill(output.get_mutable_value(), p_WRset, scan["intensity"])
+
+    def _fill(
+        self, cloud: PointCloud, p_FRset: np.ndarray, intensity: np.ndarray
+    ) -> None:
+        cloud.resize(p_FRset.shape[1])
+        cloud.mutable_xyzs()[:] = p_FRset
+        if cloud.has_rgbs():
+            bright = intensity if self._returns else 255.0 * intensity
+            cloud.mutable_rgbs()[:] = np.rint(np.clip(bright, 0.0, 255.0))
 
 
 def _value(port: InputPort, context: Context, default: Any = None) -> Any:
@@ -407,9 +570,26 @@ def _value(port: InputPort, context: Context, default: Any = None) -> Any:
     return port.Eval(context) if port.HasValue(context) else default
 
 
-def _fill(point_cloud: PointCloud, p_FRset: np.ndarray) -> None:
-    point_cloud.resize(p_FRset.shape[1])
-    point_cloud.mutable_xyzs()[:] = p_FRset
+def _ids_of(
+    geometries: Sequence[PerceptionGeometry], met: np.ndarray
+) -> list[GeometryId | None]:
+    """Returns ids by (N,) indices; None where these are negative."""
+    ids: list[GeometryId | None] = [one.geometry_id for one in geometries]
+    ids.append(None)
+    return [ids[k] for k in np.maximum(met, -1).tolist()]
+
+
+class _Measured(NamedTuple):
+    """A scan, the (N,) geometry of each point, and the geometries."""
+
+    scan: np.ndarray
+    met: np.ndarray
+    geometries: tuple[PerceptionGeometry, ...]
+
+    def __deepcopy__(self, memo: dict) -> _Measured:
+        # A Context is cloned with it. It never changes, and ids cannot be
+        # copied.
+        return self
 
 
 class SeenGeometry:
@@ -421,6 +601,7 @@ class SeenGeometry:
     Attributes:
         scene: casts rays, None before the first update; its geometry indices
             select from:
+        built: the geometries.
         label: (num_geometries,) uint16 class of each geometry.
         moving_label: (num_geometries,) uint16 its class while it moves.
         instance: (num_geometries,) uint16 structure of each geometry.
@@ -431,7 +612,7 @@ class SeenGeometry:
         self._reader = GeometryReader(lidar.role)
         self._geometries: tuple[PerceptionGeometry, ...] = ()
         self._revision: int | None = None
-        self._built: tuple[PerceptionGeometry, ...] = ()
+        self.built: tuple[PerceptionGeometry, ...] = ()
         self._X_WAs: dict[FrameId, RigidTransform] = {}
         self.scene: RayCastingScene | None = None
         self._materials: Materials | None = None
@@ -446,12 +627,18 @@ class SeenGeometry:
         motions: Mapping[FrameId, Motion],
         known: moving_groups.KnownPoses,
         seen: moving_groups.Ball,
+        p_WS: np.ndarray,
     ) -> None:
         """Moves moving geometry, and builds changed geometry anew.
 
-        Without a revision (`geometry_revision_port`), all geometries are
-        compared. Known poses of frames replace calls of the query object. Beams
-        can meet geometry only in the ball `seen`.
+        Args:
+            query_object: has geometry and poses.
+            revision: of `geometry_revision_port`; without it all geometries are
+                compared.
+            motions: of frames that move during the turn.
+            known: poses that replace calls of the query object.
+            seen: the ball in which beams can meet geometry.
+            p_WS: the place of the sensor [m].
 
         Raises:
             InputError: see `GeometryReader.read`.
@@ -463,8 +650,10 @@ class SeenGeometry:
 
         if self.scene is None or revision is None or revision != self._revision:
             self._read(inspector)
-        if self.scene is None or not self._is_built(calc_X_WF):
-            self._build(inspector.world_frame_id(), calc_X_WF)
+        if self.scene is None or not (
+            self._is_built(calc_X_WF) and self.scene.serves(p_WS)
+        ):
+            self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
         assert self.scene is not None
         self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
         self._revision = revision
@@ -475,11 +664,11 @@ class SeenGeometry:
         moves[moving] = True
         return np.where(moves[self.instance], self.moving_label, self.label)
 
-    def materials(self, *, is_wet: bool) -> Materials:
-        """Returns the materials of `scene`; wet at each call, or at none."""
+    def materials(self, returns: CalibratedReturns) -> Materials:
+        """Returns the materials of `scene`."""
         if self._materials is None:
-            self._materials = find_materials(
-                self._built, self._table, is_wet=is_wet
+            self._materials = returns.materials(
+                self.built, self._lidar.structures
             )
         return self._materials
 
@@ -498,9 +687,9 @@ class SeenGeometry:
 
     def _is_built(self, calc_X_WF: Callable[[FrameId], RigidTransform]) -> bool:
         """Returns whether the scene is up to date."""
-        if self._built is not self._geometries and (
-            len(self._built) != len(self._geometries)
-            or not all(map(is_, self._built, self._geometries))
+        if self.built is not self._geometries and (
+            len(self.built) != len(self._geometries)
+            or not all(map(is_, self.built, self._geometries))
         ):
             return False
         return all(
@@ -509,16 +698,18 @@ class SeenGeometry:
         )
 
     def _build(
-        self, world: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
+        self,
+        world: FrameId,
+        calc_X_WF: Callable[[FrameId], RigidTransform],
+        p_WS: np.ndarray,
     ) -> None:
         names = [geometry.structure for geometry in self._geometries]
-        table = self._lidar.structures.completed(names)
-        self._table, self._materials = table, None
-        self.label = np.array([table[n].label for n in names], np.uint16)
-        self.moving_label = np.array(
-            [moving_id(table[n].semantic_class) for n in names], np.uint16
+        structures, self._materials = self._lidar.structures, None
+        self.label, self.moving_label, self.instance = (
+            number_structures(names)
+            if structures is None
+            else structures.labels(names)
         )
-        self.instance = np.array([table[n].instance for n in names], np.uint16)
         anchored = self._lidar.anchored_frames | {world}
         # Copies: Drake's references go on changing.
         self._X_WAs = {
@@ -532,8 +723,9 @@ class SeenGeometry:
             calc_X_WF,
             num_threads=self._lidar.num_threads,
             previous=self.scene,
+            p_WS=p_WS,
         )
-        self._built = self._geometries
+        self.built = self._geometries
 
 
 class BeamTable(NamedTuple):
@@ -556,17 +748,14 @@ class BeamTable(NamedTuple):
 
 
 class _Turn:
-    """The beams of a turn of a number, ready for casting and assembling.
+    """The beams of a turn, ready for casting and assembling.
 
     `d_Sset_cast` has (N, 3) directions in the order of casting, `table` what
     beams add to points, and `calibrated` the same for calibrated returns, None
     for ideal ones. `beams` are in firing order.
     """
 
-    def __init__(
-        self, frame: int, beams: Beams, returns: CalibratedReturns | None
-    ):
-        self.frame = frame
+    def __init__(self, beams: Beams, returns: CalibratedReturns | None):
         self.beams = beams
         self.d_Sset_cast = beams.d_Sset[beams.packet_order]
         d_Sset, p_Sset = beams.d_Sset, np.zeros((0, 3))
@@ -581,6 +770,15 @@ class _Turn:
             beams.t_ns,
             np.argsort(beams.packet_order),
         )
+
+
+@lru_cache(maxsize=4)
+def _ready(beams: Beams, returns: CalibratedReturns | None) -> _Turn:
+    """Returns a turn, the same for all LiDARs that are alike.
+
+    Drake's bindings may keep a dropped Diagram, and with it its LiDARs.
+    """
+    return _Turn(beams, returns)
 
 
 @compiled

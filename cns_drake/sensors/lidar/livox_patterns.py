@@ -7,6 +7,8 @@ Directions depend only on the time, so that a frame is always the same.
 
 from abc import abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
+from functools import lru_cache
+import math
 
 import numpy as np
 
@@ -43,6 +45,20 @@ class _TimedPattern(BeamPattern):
     # Firing times follow from the duration of a frame.
     num_columns = None
 
+    def __post_init__(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: one of them is impossible.
+        """
+        self.check()
+        if not 0.0 < self.points_per_second < math.inf:
+            raise ValueError(
+                f"points_per_second: {self.points_per_second:g} is no rate"
+            )
+        if self.num_lines < 1:
+            raise ValueError(f"num_lines: {self.num_lines} is no number")
+
     @property
     def num_rings(self) -> int:
         return self.num_lines
@@ -54,20 +70,29 @@ class _TimedPattern(BeamPattern):
         return max(round(points / self.num_lines), 1)
 
     def beams(self, frame: int) -> Beams:
-        firing = np.arange(self.num_firings)
-        step = self.period / self.num_firings
-        # A float can hold the number of any frame.
-        first = float(frame * self.num_firings)
-        d_Sset = self._directions((first + firing) * step)
-        return make_beams(
-            d_Sset.reshape(-1, 3),
-            np.tile(np.arange(self.num_lines), self.num_firings),
-            np.repeat(np.round(firing * step * 1e9), self.num_lines),
-        )
+        return _fire(self, frame)
 
     @abstractmethod
-    def _directions(self, times: np.ndarray) -> np.ndarray:
+    def directions(self, times: np.ndarray) -> np.ndarray:
         """Returns the (num_firings, num_lines, 3) directions at times [s]."""
+
+
+@lru_cache(maxsize=4)
+def _fire(pattern: _TimedPattern, frame: int) -> Beams:
+    """Returns the beams of a frame, the same for all patterns that are equal.
+
+    Drake's bindings may keep a dropped Diagram, and with it its patterns.
+    """
+    firing = np.arange(pattern.num_firings)
+    step = pattern.period / pattern.num_firings
+    # A float can hold the number of any frame.
+    first = float(frame * pattern.num_firings)
+    d_Sset = pattern.directions((first + firing) * step)
+    return make_beams(
+        d_Sset.reshape(-1, 3),
+        np.tile(np.arange(pattern.num_lines), pattern.num_firings),
+        np.repeat(np.round(firing * step * 1e9), pattern.num_lines),
+    )
 
 
 @dataclass(frozen=True)
@@ -95,7 +120,15 @@ class RosettePattern(_TimedPattern):
     fov_deg: float
     height_deg: float = field(default=0.0, kw_only=True)
 
-    def _directions(self, times: np.ndarray) -> np.ndarray:
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (0.0 < self.fov_deg <= 360.0 and 0.0 <= self.height_deg < 180.0):
+            raise ValueError(
+                f"fov_deg {self.fov_deg:g}, height_deg {self.height_deg:g}: "
+                "beyond 0 to 360 deg, or 0 to 180 deg"
+            )
+
+    def directions(self, times: np.ndarray) -> np.ndarray:
         first, second = (2.0 * np.pi * hz * times for hz in _PRISMS_HZ)
         bend = np.deg2rad(self.fov_deg) / 4.0
         left = bend * (np.cos(first) + np.cos(second))
@@ -140,7 +173,16 @@ class NoddingPattern(_TimedPattern):
 
     elevations_deg: tuple[float, float]
 
-    def _directions(self, times: np.ndarray) -> np.ndarray:
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        low, high = self.elevations_deg
+        if not -90.0 <= low < high <= 90.0:
+            raise ValueError(
+                f"elevations_deg: {low:g}, {high:g}: not from the lowest to "
+                "the highest, within -90 to 90 deg"
+            )
+
+    def directions(self, times: np.ndarray) -> np.ndarray:
         azimuth = (np.pi - 2.0 * np.pi * _TURNS_HZ * times)[:, None]
         phase = _NODS_HZ * times % 1.0
         height = 1.0 - np.abs(2.0 * phase - 1.0)  # 0 up to 1, and down.

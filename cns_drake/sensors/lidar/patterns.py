@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from cns_drake.base.elementary import cos, sin
 
 # One return, in the sensor frame. Fields have C alignment, for readers that map
-# structs onto the bytes.
+# structs onto the bytes. NumPy's copies leave the two bytes after `ring`
+# undefined.
 POINT_DTYPE = np.dtype(
     [
         ("x", "<f4"),
@@ -30,6 +33,8 @@ POINT_DTYPE = np.dtype(
 
 # Height of the bands in which beams without an order of their own are cast.
 _BAND_RAD = 0.03
+# What the fields `ring` and `t` of a point can hold.
+_MOST_RING, _LATEST_NS = 2**16 - 1, 2**32 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +51,9 @@ class Beams:
         packet_order: (N,) beams in the order of casting: neighbours point
             nearly the same way and meet the same geometry, which makes packets
             of rays fast.
+
+    Raises:
+        ValueError: a ring or a firing time does not fit into a point.
     """
 
     d_Sset: np.ndarray
@@ -53,6 +61,21 @@ class Beams:
     column: np.ndarray
     column_t_ns: np.ndarray
     packet_order: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Checks rings and times, and gives them their types."""
+        for name, kind, most, what in (
+            ("ring", np.uint16, _MOST_RING, "a ring"),
+            ("column_t_ns", np.uint32, _LATEST_NS, "a firing time [ns]"),
+        ):
+            given = np.asarray(getattr(self, name))
+            fits = (given >= 0) & (given <= most) & (given == np.floor(given))
+            if not fits.all():
+                raise ValueError(
+                    f"{what}: {given[~fits][0]:.10g} is not a whole number "
+                    f"from 0 to {most}, which a point has room for"
+                )
+            object.__setattr__(self, name, given.astype(kind))
 
     @cached_property
     def t_ns(self) -> np.ndarray:
@@ -81,11 +104,7 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
     bands = np.floor(elevation / _BAND_RAD)
     column_t_ns, column = np.unique(t_ns, return_inverse=True)
     return Beams(
-        d_Sset,
-        ring.astype(np.uint16),
-        column,
-        column_t_ns.astype(np.uint32),
-        np.lexsort((azimuth, bands)),
+        d_Sset, ring, column, column_t_ns, np.lexsort((azimuth, bands))
     )
 
 
@@ -120,6 +139,20 @@ class BeamPattern(ABC):
         Args:
             frame: its number.
         """
+
+    def check(self) -> None:
+        """Checks the limits of ranges, and the period.
+
+        Raises:
+            ValueError: one of them is impossible.
+        """
+        if not 0.0 <= self.min_range < self.max_range:
+            raise ValueError(
+                f"min_range {self.min_range:g}, max_range {self.max_range:g}: "
+                "ranges are from 0 on, and the first is below the second"
+            )
+        if not 0.0 < self.period < math.inf:
+            raise ValueError(f"period: {self.period:g} s is no duration")
 
     @property
     def num_beams(self) -> int:
@@ -220,6 +253,9 @@ class SpinningPattern(BeamPattern):
         period: duration of one turn [s].
         azimuths_rad: first and last azimuth, None for the whole turn [rad].
 
+    Raises:
+        ValueError: a value is impossible, or elevations ascend.
+
     Example:
         from cns_drake import SpinningPattern
 
@@ -234,13 +270,32 @@ class SpinningPattern(BeamPattern):
     period: float
     azimuths_rad: tuple[float, float] | None = None
 
+    def __post_init__(self) -> None:
+        self.check()
+        if not (self.num_columns >= 1 and self.num_columns % 1 == 0):
+            raise ValueError(f"num_columns: {self.num_columns} is no number")
+        elevations = np.asarray(self.elevations_rad, float)
+        # Equal patterns are found by their hash, which an array has not.
+        object.__setattr__(self, "elevations_rad", tuple(elevations.tolist()))
+        if not (
+            elevations.size
+            and (np.abs(elevations) <= math.pi / 2.0).all()
+            and (np.diff(elevations) <= 0.0).all()
+        ):
+            raise ValueError(
+                "elevations_rad: they must descend, from pi/2 at most to "
+                "-pi/2 at least, and there must be one"
+            )
+        if not np.isfinite(self.azimuths_rad or (0.0, 0.0)).all():
+            raise ValueError(f"azimuths_rad: {self.azimuths_rad} is no part")
+
     @property
     def num_rings(self) -> int:
         """The number of rings, one for each laser."""
         return len(self.elevations_rad)
 
     def beams(self, frame: int) -> Beams:
-        return self._beams
+        return _spin(self)
 
     @property
     def num_beams(self) -> int:
@@ -250,39 +305,45 @@ class SpinningPattern(BeamPattern):
     @property
     def d_Sset(self) -> np.ndarray:
         """(num_beams, 3) float64 unit directions, expressed in S."""
-        return self._beams.d_Sset
+        return _spin(self).d_Sset
 
-    @cached_property
-    def _beams(self) -> Beams:
-        columns, rings = np.arange(self.num_columns), np.arange(self.num_rings)
-        azimuth = np.pi - 2.0 * np.pi * columns / self.num_columns
-        column_ns = self.period * 1e9 / self.num_columns
-        if self.azimuths_rad is not None:
-            first, last = self.azimuths_rad
-            azimuth = np.linspace(first, last, self.num_columns)
-            part = abs(last - first) / (2.0 * np.pi)
-            column_ns = part * self.period * 1e9 / max(self.num_columns - 1, 1)
-        azimuth = azimuth[:, None]
-        elevation = np.asarray(self.elevations_rad)[None, :]
-        d_Sset = np.stack(
-            np.broadcast_arrays(
-                cos(elevation) * cos(azimuth),
-                cos(elevation) * sin(azimuth),
-                sin(elevation),
-            ),
-            axis=-1,
-        ).reshape(-1, 3)
-        d_Sset.flags.writeable = False
-        beams = np.arange(self.num_beams)
-        return Beams(
-            d_Sset,
-            ring=np.tile(rings.astype(np.uint16), self.num_columns),
-            column=np.repeat(columns, self.num_rings),
-            column_t_ns=np.round(columns * column_ns).astype(np.uint32),
-            # Ring by ring, which is faster than in the order of firing, by 1.6
-            # in Metropolis.
-            packet_order=beams.reshape(self.num_columns, -1).T.ravel(),
-        )
+
+@lru_cache(maxsize=8)
+def _spin(pattern: SpinningPattern) -> Beams:
+    """Returns the beams of a pattern, the same for all that are equal.
+
+    Drake's bindings may keep a dropped Diagram, and with it its patterns.
+    """
+    num_columns, num_rings = int(pattern.num_columns), pattern.num_rings
+    columns, rings = np.arange(num_columns), np.arange(num_rings)
+    azimuth = np.pi - 2.0 * np.pi * columns / num_columns
+    column_ns = pattern.period * 1e9 / num_columns
+    if pattern.azimuths_rad is not None:
+        first, last = pattern.azimuths_rad
+        azimuth = np.linspace(first, last, num_columns)
+        part = abs(last - first) / (2.0 * np.pi)
+        column_ns = part * pattern.period * 1e9 / max(num_columns - 1, 1)
+    azimuth = azimuth[:, None]
+    elevation = np.asarray(pattern.elevations_rad)[None, :]
+    d_Sset = np.stack(
+        np.broadcast_arrays(
+            cos(elevation) * cos(azimuth),
+            cos(elevation) * sin(azimuth),
+            sin(elevation),
+        ),
+        axis=-1,
+    ).reshape(-1, 3)
+    d_Sset.flags.writeable = False
+    beams = np.arange(pattern.num_beams)
+    return Beams(
+        d_Sset,
+        ring=np.tile(rings, num_columns),
+        column=np.repeat(columns, num_rings),
+        column_t_ns=np.round(columns * column_ns),
+        # Ring by ring, which is faster than in the order of firing, by 1.6 in
+        # Metropolis.
+        packet_order=beams.reshape(num_columns, -1).T.ravel(),
+    )
 
 
 class DirectionPattern(BeamPattern):
@@ -321,9 +382,18 @@ class DirectionPattern(BeamPattern):
 
         Raises:
             ValueError: there is no beam, a direction is zero or not a number, a
-                time is not within the turn, or the numbers of beams differ.
+                time is not within the turn or beyond 4.29 s, a ring is beyond
+                65535, a limit is impossible, or the numbers of beams differ.
         """
-        d_Sset = np.array(directions, dtype=float).reshape(-1, 3)
+        self.min_range, self.max_range = min_range, max_range
+        self.period = period
+        self.check()
+        d_Sset = np.array(directions, dtype=float)
+        if d_Sset.size and d_Sset.shape[-1] != 3:
+            raise ValueError(
+                f"directions: their shape {d_Sset.shape} does not end in 3"
+            )
+        d_Sset = d_Sset.reshape(-1, 3)
         num_beams = len(d_Sset)
         t = np.zeros(num_beams) if times is None else np.array(times, float)
         ring = np.zeros(num_beams) if rings is None else np.array(rings)
@@ -337,8 +407,6 @@ class DirectionPattern(BeamPattern):
             raise ValueError("a direction is zero or not a number")
         if not ((t >= 0.0) & (t < period)).all():
             raise ValueError(f"a time is not within the turn of {period} s")
-        self.min_range, self.max_range = min_range, max_range
-        self.period = period
         order = np.argsort(t, kind="stable")
         t_ns = np.round(t[order] * 1e9)
         self._beams = make_beams((d_Sset / length)[order], ring[order], t_ns)
@@ -397,25 +465,34 @@ def make_flash_pattern(
     )
 
 
-# Numbers of cells in elevation and in azimuth; a cell has a width of 1 deg.
-_ROWS, _COLUMNS = 180, 360
+# Width of a cell in elevation and in azimuth [deg], and numbers of cells.
+_CELL_DEG = 0.25
+_ROWS, _COLUMNS = round(180 / _CELL_DEG), round(360 / _CELL_DEG)
+# What lies between two beams is covered if they are at most twice this apart.
+_REACH_CELLS = 12
 
 
 class BeamCoverage:
     """The directions that the beams of a turn cover.
 
-    A beam covers its cell of 1 deg by 1 deg in elevation and azimuth, and the
-    eight cells around it.
+    These are cells of 0.25 deg with a beam, those beside them, since points are
+    where their beams were up to rounding, and all between beams that are up to
+    6 deg apart: a morphological closing.
     """
 
     def __init__(self, d_Sset: np.ndarray):
-        """Covers the cells about beams (N, 3), unit directions in S."""
-        hit = np.zeros((_ROWS, _COLUMNS), bool)
-        hit[_cells(d_Sset)] = True
-        beside = hit | np.roll(hit, 1, axis=1) | np.roll(hit, -1, axis=1)
-        self._is_covered = beside.copy()
-        self._is_covered[1:] |= beside[:-1]
-        self._is_covered[:-1] |= beside[1:]
+        """Covers the cells of beams (N, 3), unit directions in S."""
+        covered = np.zeros((_ROWS, _COLUMNS), np.uint8)
+        covered[_cells(d_Sset)] = 1
+        grown = 2 * _REACH_CELLS + 1
+        for grow, size, beyond in (
+            (maximum_filter1d, grown, 0),
+            # Two cells less: those beside the beams stay.
+            (minimum_filter1d, grown - 2, 1),
+        ):
+            covered = grow(covered, size, axis=0, mode="constant", cval=beyond)
+            covered = grow(covered, size, axis=1, mode="wrap")
+        self._is_covered = covered.astype(bool)
 
     def covers(self, d_Sset: np.ndarray) -> np.ndarray:
         """Returns which directions (N, 3) in S are covered, (N,) bool."""
@@ -428,5 +505,5 @@ def _cells(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     elevation_deg = np.degrees(np.arcsin(np.clip(z, -1.0, 1.0))) + 90.0
     azimuth_deg = np.degrees(np.arctan2(y, x)) + 180.0
     # The direction straight up is rounded to the upper limit.
-    rows = np.minimum(elevation_deg.astype(np.int64), _ROWS - 1)
-    return rows, azimuth_deg.astype(np.int64) % _COLUMNS
+    rows = np.minimum((elevation_deg / _CELL_DEG).astype(np.int64), _ROWS - 1)
+    return rows, (azimuth_deg / _CELL_DEG).astype(np.int64) % _COLUMNS

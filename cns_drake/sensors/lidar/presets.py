@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.sensors.lidar import livox_patterns
-from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
+from cns_drake.sensors.lidar.patterns import SpinningPattern
+
+UnitPattern: TypeAlias = (
+    SpinningPattern
+    | livox_patterns.RosettePattern
+    | livox_patterns.NoddingPattern
+)
 
 
 class LidarPreset(NamedTuple):
     """The beams of a unit, and the source of their numbers."""
 
-    pattern: (
-        SpinningPattern
-        | livox_patterns.RosettePattern
-        | livox_patterns.NoddingPattern
-    )
+    pattern: UnitPattern
     source: str
 
     @classmethod
@@ -51,11 +53,11 @@ class LidarPreset(NamedTuple):
         return cls(pattern, source)
 
 
+_UNITS = parse_yaml(Path(__file__).with_name("presets.yaml").read_bytes())
+# Units with more columns in a slower turn.
+_STEADY = {n for n, unit in _UNITS.items() if unit.pop("fires_steadily", False)}
 LIDAR_PRESETS: dict[str, LidarPreset] = {
-    name: LidarPreset.of(**fields)
-    for name, fields in parse_yaml(
-        Path(__file__).with_name("presets.yaml").read_bytes()
-    ).items()
+    name: LidarPreset.of(**unit) for name, unit in _UNITS.items()
 }
 
 
@@ -66,19 +68,21 @@ def make_beam_pattern(
     num_columns: int | None = None,
     min_range: float | None = None,
     max_range: float | None = None,
-) -> BeamPattern:
+) -> UnitPattern:
     """Returns the pattern of a preset, with other values if given.
 
     Args:
         preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
-        period: duration of a turn [s].
-        num_columns: columns in a turn.
+        period: duration of a turn [s]; by default that of the data sheet.
+        num_columns: columns in a turn; by default those of the data sheet, of a
+            unit that fires steadily as many as fit into the period.
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
 
     Raises:
         KeyError: there is no preset of that name.
-        ValueError: the preset has no columns to choose.
+        ValueError: the preset has no columns to choose, or a value is
+            impossible.
 
     Example:
         from cns_drake import LIDAR_PRESETS, make_beam_pattern
@@ -92,6 +96,8 @@ def make_beam_pattern(
     base = LIDAR_PRESETS[preset].pattern
     if num_columns is not None and base.num_columns is None:
         raise ValueError(f"the preset '{preset}' has no columns")
+    if base.num_columns and preset in _STEADY and period and not num_columns:
+        num_columns = max(round(base.num_columns * period / base.period), 1)
     changes: dict[str, Any] = {
         "period": period,
         "num_columns": num_columns,

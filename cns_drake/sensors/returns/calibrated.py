@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -10,12 +11,14 @@ import numpy as np
 from cns_drake.base.elementary import cos, sin
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, RayHits
 from cns_drake.ray_casting.rays import rotate
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides
 from cns_drake.sensors.returns.light import BeamHits, Shots, join, texture
-from cns_drake.sensors.returns.materials import Materials
+from cns_drake.sensors.returns.materials import Materials, find_materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
@@ -87,10 +90,19 @@ class CalibratedReturns:
             unit_seed,
         )
 
-    @property
-    def is_wet(self) -> bool:
-        """Whether water lies on the ground."""
-        return self.weather.rain > 0.0
+    def materials(
+        self,
+        geometries: Sequence[PerceptionGeometry],
+        structures: object,
+    ) -> Materials:
+        """Returns the materials of geometries; rain wets the ground.
+
+        Structures have classes if they are a `StructureTable`.
+        """
+        if not isinstance(structures, StructureTable):
+            structures = StructureTable(())
+        is_wet = self.weather.rain > 0.0
+        return find_materials(geometries, structures, is_wet=is_wet)
 
     def reach(self, max_range: float) -> float:
         """Returns the range of rays [m].

@@ -80,13 +80,17 @@ def find_materials(
 ) -> Materials:
     """Returns the materials of geometries.
 
+    Structures that a table lacks have no class.
+
     The perception property ("lidar", "reflectivity") wins over the column
     `reflectivity` of a table of structures, and that over class and colour.
     Surfaces of a given reflectivity are even and reflect after Lambert.
     """
+    names = [geometry.structure for geometry in geometries]
+    table = structures.completed(names)
     rows = [
-        _material(geometry, structures[geometry.structure], is_wet)
-        for geometry in geometries
+        _material(geometry, table[name], is_wet)
+        for geometry, name in zip(geometries, names, strict=True)
     ]
     empty: list[tuple] = [()] * len(Materials._fields)
     kinds, *others = zip(*rows, strict=True) if rows else empty

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.sensors.lidar.patterns import BeamPattern, SpinningPattern
 from cns_drake.sensors.returns import link_budget
 
+_Pattern = TypeVar("_Pattern", bound=BeamPattern)
 # Speed of light [m/s].
 _LIGHT = 299_792_458.0
 
@@ -137,7 +138,7 @@ class UnitSheet:
         """Distance below which two echoes are one [m]."""
         return _LIGHT * self.pulse_ns * 1e-9 / 2.0
 
-    def aimed(self, pattern: BeamPattern) -> BeamPattern:
+    def aimed(self, pattern: _Pattern) -> _Pattern:
         """Returns a pattern with the elevations of the unit, if known.
 
         A pattern of another number of rings is left.

@@ -88,7 +88,7 @@ def test_options_have_units():
         unit
         for words in COMMANDS
         for each in find(*words).params
-        for unit in re.findall(r"\[[a-z].*?\]", each.help or "")
+        for unit in re.findall(r"\[[a-z, ]+\]", each.help or "")
     }
     assert units == {"[m]", "[m, rad]", "[deg]", "[s]"}
 

@@ -416,3 +416,183 @@ def test_a_bridge_stands_above_the_ground(tmp_path):
     assert space.clearance_at(np.array([[0.0, 0.0]])) > 2.5
     alone = ground_of([found["deck"]], below_bridges=True)
     np.testing.assert_allclose(alone.height(xy[:1]), 7.0)
+
+
+TOKYO, RIGA, MADRID = "EPSG:6677", "EPSG:3059", "EPSG:25830"
+
+
+@pytest.mark.parametrize(
+    ("system", "place", "is_east_first"),
+    [
+        # Both orders lie in the area; the first one is that of the system.
+        (TOKYO, (-35000.0, -7000.0), False),
+        (TOKYO, (-7000.0, -35000.0), True),
+        (RIGA, (312000.0, 507000.0), False),
+        (RIGA, (507000.0, 312000.0), True),
+        # East first by definition, and written north first.
+        (MADRID, (440000.0, 4474000.0), True),
+        (MADRID, (4474000.0, 440000.0), False),
+    ],
+)
+@pytest.mark.parametrize("kind", ["Solid", "MultiSurface"])
+def test_no_order_of_axes_mirrors_a_city(
+    tmp_path, system, place, is_east_first, kind
+):
+    """A house of 6 m by 4 m, and a mark 30 m east and 15 m north of it."""
+    city = CityWriter(origin=(*place, 0.0))
+    city.metadata = {"referenceSystem": system}
+    vertex = city.vertex
+    if not is_east_first:
+        city.vertex = lambda x, y, z: vertex(y, x, z)
+    city.box("house", 0, 0, (6, 4, 3))
+    city.box("mark", 30, 15, (1, 1, 1))
+    for one in city.objects.values():
+        (geometry,) = one["geometry"]
+        if kind == "MultiSurface":
+            (geometry["boundaries"],) = geometry["boundaries"]
+            (values,) = geometry["semantics"]["values"]
+            geometry["semantics"]["values"] = values
+        geometry["type"] = kind
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    corners = {
+        name: np.concatenate([f[0] for g in one.geometries for f in g.faces])
+        for name, one in read.objects.items()
+    }
+    house, mark = corners["house"], corners["mark"]
+    np.testing.assert_allclose(np.ptp(house, axis=0), [6, 4, 3], atol=1e-6)
+    away = mark.min(axis=0) - house.min(axis=0)
+    np.testing.assert_allclose(away, [30, 15, 0], atol=1e-6)
+    rows = str(read.faults.rows())
+    as_defined = is_east_first == (system == MADRID)
+    assert ("; read as" in rows) == (not as_defined)
+    assert "beyond the area" not in rows
+
+
+def test_an_order_that_no_face_shows_is_named(tmp_path):
+    city = CityWriter(origin=(-35000.0, -7000.0, 0.0))
+    city.metadata = {"referenceSystem": TOKYO}
+    faces = city.box_faces(0, 0, 0, (6, 4, 3))
+    city.add(
+        "house",
+        "Building",
+        {"type": "MultiSurface", "lod": "2", "boundaries": faces},
+    )
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    kinds = {kind for kind, _, _ in read.faults.rows()}
+    assert "order of axes that no face shows, taken as defined" in kinds
+
+
+def test_a_file_without_a_system_says_so(tmp_path):
+    city = CityWriter()
+    city.metadata = {}
+    for k in range(2):
+        city.box(f"a{k}", 9 * k, 0, (2, 2, 2))
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    kind = "no reference system; metres east, north and up assumed"
+    assert [row[0] for row in read.faults.rows()] == [kind]
+    vertex = city.vertex
+    city.vertex = lambda x, y, z: vertex(y, x, z)
+    for k in range(2):
+        city.box(f"a{k}", 9 * k, 0, (2, 2, 2))
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    assert any("may be mirrored" in row[0] for row in read.faults.rows())
+
+
+def solid(city, lod, *box):
+    faces = city.box_faces(*box)
+    return {"type": "Solid", "lod": lod, "boundaries": [faces]}
+
+
+@pytest.mark.parametrize(
+    ("whole", "parts", "expected", "count"),
+    [
+        # A block around its parts, which are better.
+        (("1", 0, 0, 0, (20, 10, 9)), ["2.2", "2.2"], 1100.0, 1),
+        (("2", 0, 0, 0, (20, 10, 9)), ["2.2", "2.2"], 1100.0, 1),
+        # Parts that are worse than the whole.
+        (("2.2", 0, 0, 0, (20, 10, 9)), ["1", "1"], 1800.0, 2),
+        # Both are there at equal levels, or beside each other.
+        (("2.2", 0, 0, 0, (20, 10, 9)), ["2.2", "2.2"], 2900.0, 0),
+        (("1", 0, 30, 0, (20, 10, 9)), ["2.2", "2.2"], 2900.0, 0),
+        (("2.2", 0, 30, 0, (20, 10, 9)), ["1", "2.2"], 2900.0, 0),
+        # A chimney of an older level.
+        (("2.2", 0, 0, 0, (20, 30, 9)), ["2.0"], 5800.0, 0),
+    ],
+)
+@pytest.mark.parametrize("link", ["parents", "children"])
+def test_a_building_and_its_parts_of_different_levels(
+    tmp_path, whole, parts, expected, count, link
+):
+    """The parts are 400 and 700 m3, beside each other."""
+    city = CityWriter()
+    names = [f"p{k}" for k in range(len(parts))]
+    more = {"children": names} if link == "children" else {}
+    city.add("house", "Building", solid(city, whole[0], *whole[1:]), **more)
+    for k, (name, lod) in enumerate(zip(names, parts, strict=True)):
+        one = solid(city, lod, 10 * k, 0, 0, (10, 10, 4 + 3 * k))
+        more = {"parents": ["house"]} if link == "parents" else {}
+        city.add(name, "BuildingPart", one, **more)
+    read, found = structures(city.write(tmp_path / "city.json"))
+    assert volume(found["house"]) == pytest.approx(expected)
+    counts = {kind: number for kind, number, _ in read.faults.rows()}
+    kind = "geometry with a better one inside, left out"
+    assert counts.get(kind, 0) == count
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (set_in("transform", "rotate", [0, 0, 1]), "transform.rotate is not"),
+        (set_in("transform", "scale", [1, 0, 1]), "transform.scale: not above"),
+        (set_in("transform", "scale", [1, -1, 1]), "transform.scale: not"),
+        (set_in("transform", [1, 1, 1]), "transform: not an object"),
+    ],
+)
+def test_transforms_that_are_not_read(tmp_path, change, fault):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2))
+    document = city.document()
+    change(document)
+    path = tmp_path / "city.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=fault):
+        read_cityjson(path)
+
+
+def test_members_of_objects_that_are_not_read_are_counted(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2), translation=[9, 9, 9], address=[{}])
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    assert read.faults.rows() == [
+        ("translation of an object, not read", 1, "a")
+    ]
+
+
+def test_lines_of_two_systems_are_refused(tmp_path):
+    lines = []
+    for system in ("EPSG:7415", "EPSG:28992"):
+        city = CityWriter()
+        city.metadata = {"referenceSystem": system}
+        city.box("a", 0, 0, (2, 2, 2))
+        lines.append(json.dumps(city.document()))
+    path = tmp_path / "city.jsonl"
+    path.write_text("\n".join(lines))
+    with pytest.raises(InputError, match="line 2: metadata"):
+        read_cityjson(path)
+    path.write_text("\n".join(lines[:1] * 2))
+    read = read_cityjson(path)
+    kind = "object that is there twice, its last taken"
+    assert read.faults.rows() == [(kind, 1, "a")]
+
+
+def test_faces_that_only_close_a_solid_are_not_seen(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2))
+    (geometry,) = city.objects["a"]["geometry"]
+    for one in geometry["semantics"]["surfaces"]:
+        if one["type"] == "RoofSurface":
+            one["type"] = "ClosureSurface"
+    read, found = structures(city.write(tmp_path / "city.json"))
+    assert area(found["a"]) == pytest.approx(20.0)
+    kind = "face that only closes a solid, left out"
+    assert read.faults.rows() == [(kind, 1, "a")]

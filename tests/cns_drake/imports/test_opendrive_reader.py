@@ -12,6 +12,7 @@ from helpers.small_opendrive import (
     straight,
     write_roads,
 )
+import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
@@ -320,3 +321,136 @@ def test_a_piece_without_length_is_left_out(tmp_path):
     roads, faults = faults_of(path)
     assert faults == {"geometry without length, left out": 1}
     assert [piece.s for piece in roads.roads[0].pieces] == [0.0, 25.0]
+
+
+def one_side(text):
+    return text.replace("<laneSection", '<laneSection singleSide="true"')
+
+
+def widths_at(path, s):
+    """Number of a lane -> its width and kind at a place along the road."""
+    roads, faults = faults_of(path)
+    found = {}
+    for band in lane_bands(roads.roads[0]):
+        if band.s[0] <= s <= band.s[-1]:
+            width = float(np.interp(s, band.s, band.width))
+            found[band.lane.number] = round(width, 3), band.kind
+    return found, faults
+
+
+def test_a_section_of_one_side_leaves_the_other_as_it_was(tmp_path):
+    """The left lane grows by 0.02 m/m from the start of the road."""
+    growing = (0.0, 3.0, 0.02)
+    right = lane(-1, "driving", 3.5), lane(-2, "parking", 2.0)
+    left = lane(1, "driving", 5.0, more=lane_link("predecessor", 1))
+    sections = [
+        section(0, lane(1, "driving", growing), lane(-1, "driving", 3.5)),
+        one_side(section(20, *right)),
+        one_side(section(30, left)),
+        section(40, lane(1, "driving", 3.0)),
+    ]
+    path = write_roads(tmp_path / "a.xodr", road("1", 50.0, [LINE], sections))
+    first = {1: (3.2, "driving"), -1: (3.5, "driving")}
+    parking = {-1: (3.5, "driving"), -2: (2.0, "parking")}
+    assert widths_at(path, 10) == (first, {})
+    assert widths_at(path, 25)[0] == {1: (3.5, "driving"), **parking}
+    assert widths_at(path, 35)[0] == {1: (5.0, "driving"), **parking}
+    assert widths_at(path, 45)[0] == {1: (3.0, "driving")}
+
+
+UNREAD = {
+    '<height sOffset="0" inner="3" outer="3"/>': (
+        "lane more than 1 m above its road, laid on it"
+    ),
+    '<speed sOffset="0" max="5"/>': "speed of lane, not read",
+    '<access sOffset="0" rule="deny"/>': "access of lane, not read",
+    '<folding a="1"/>': "folding of lane, not read",
+    '<roadMark sOffset="0" type="solid"><sway ds="1"/></roadMark>': (
+        "sway of roadMark, not read"
+    ),
+}
+
+
+@pytest.mark.parametrize("more", UNREAD)
+def test_elements_of_lanes_that_are_not_read_are_counted(tmp_path, more):
+    lanes = (
+        lane(1, "driving", 3.5),
+        lane(-1, "driving", 3.5, more="<userData><x/></userData>" + more),
+    )
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, lanes=lanes)
+    )
+    assert faults_of(path)[1] == {UNREAD[more]: 1}
+
+
+@pytest.mark.parametrize(
+    ("attribute", "fault"),
+    [
+        ('level="true"', None),
+        ('direction="reversed"', None),
+        ('direction="both"', "lane with traffic in direction both"),
+        ('dynamicLaneType="true"', "dynamicLaneType of lane, not read"),
+        ('dynamicLaneType="false"', None),
+        ('roadWorks="true"', "roadWorks of lane, not read"),
+    ],
+)
+def test_attributes_of_lanes(tmp_path, attribute, fault):
+    text = lane(-1, "driving", 3.5).replace("<lane", f"<lane {attribute}")
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, lanes=(text,))
+    )
+    assert faults_of(path)[1] == ({} if fault is None else {fault: 1})
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        (
+            '<objects><object s="1" t="9" pitch="0.3" roll="0.0"/></objects>',
+            "pitch of object, not read",
+        ),
+        (
+            '<objects><object s="1" t="9"><outlines><outline/><outline/>'
+            "</outlines></object></objects>",
+            "further outline of an object, not read",
+        ),
+        (
+            '<objects><object s="1" t="9"><outline><cornerLocal u="0" v="0" '
+            'z="2.0"/></outline></object></objects>',
+            "z of cornerLocal, not read",
+        ),
+        (
+            '<signals><signal s="1" t="9"><positionInertial x="1" y="2"/>'
+            "</signal></signals>",
+            "positionInertial of signal, not read",
+        ),
+        ('<surface><CRG file="a.crg"/></surface>', "surface of road, not read"),
+        (
+            '<surface/><railroad><switch name="a"/></railroad>',
+            "railroad of road, not read",
+        ),
+        ('<include file="b.xodr"/>', "include of road, not read"),
+    ],
+)
+def test_other_parts_of_roads_that_are_not_read_are_counted(
+    tmp_path, more, fault
+):
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, more=more)
+    )
+    assert faults_of(path)[1].get(fault) == 1
+
+
+def test_what_stands_above_the_roads_in_a_file_is_counted(tmp_path):
+    fall = '<crossfall side="left" s="0" a="0.02" b="0" c="0" d="0"/>'
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 50, 0, lateral=fall),
+        '<junction id="7" type="virtual"/>',
+        header='<offset x="9" y="8" z="0" hdg="0"/>',
+    )
+    assert faults_of(path)[1] == {
+        "crossfall of lateralProfile, not read": 1,
+        "type of junction, not read": 1,
+        "offset of header, not read": 1,
+    }

@@ -21,19 +21,29 @@ from typer.testing import CliRunner
 import yaml
 
 from cns_drake.base.errors import InputError
+from cns_drake.city.geometry.structures import ground_triangles
+from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
 from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
     lane_polygon,
 )
-from cns_drake.imports.opendrive.lane_drives import find_lane_drives
-from cns_drake.imports.opendrive.lanes import RoadHeights, lane_bands
+from cns_drake.imports.opendrive.lane_drives import (
+    find_lane_drives,
+    lanes_for_traffic,
+)
+from cns_drake.imports.opendrive.lanes import (
+    KerbHeights,
+    RoadHeights,
+    lane_bands,
+)
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.options import ImportFaults
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.traffic.lane_file import read_lanes
 from evaluation.drives import open_drive
 
 ARM = 12.0
@@ -363,3 +373,102 @@ def test_lanes_without_area(tmp_path):
     path = write_roads(tmp_path / "a.xodr", road("1", 50.0, [line], [own]))
     with pytest.raises(InputError, match="no lane in it has an area"):
         build_town(path, 0)
+
+
+def height(start, inner, outer):
+    return f'<height sOffset="{start}" inner="{inner}" outer="{outer}"/>'
+
+
+def upper_side(built, *names):
+    """A function of x, y: the height of the highest structure there."""
+    structures = [s for s in built.city.structures if s.name in names]
+    sides = UpperSides(ground_triangles(structures))
+    return lambda x, y: float(sides.heights(np.array([[x, y]]))[0])
+
+
+def test_lanes_have_the_heights_of_the_file(tmp_path):
+    """A dropped kerb from 50 m on, a sidewalk that rises, a raised lane."""
+    rising, dropped = height(0, 0.1, 0.3), height(0, 0.15, 0.15)
+    dropped += height(50, 0.0, 0.0)
+    lanes = (
+        lane(2, "sidewalk", 2.0, more=rising), lane(1, "driving", 3.5),
+        lane(-1, "driving", 3.5),
+        lane(-2, "driving", 3.5, more=height(0, 0.2, 0.2)),
+        lane(-3, "sidewalk", 2.0, more=dropped),
+    )  # fmt: skip
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 120, 0, lanes=lanes)
+    )
+    built = build_town(path, 0)
+    top = upper_side(built, "sidewalks", "kerbs", "carriageway")
+    for x in (20.3, 90.7):
+        assert top(x, 1.75) == pytest.approx(0.0, abs=0.005)
+        assert top(x, -5.25) == pytest.approx(0.2, abs=0.005)
+        for y in (3.6, 4.5, 5.4):
+            expected = 0.1 + 0.1 * (y - 3.5)
+            assert top(x, y) == pytest.approx(expected, abs=0.01)
+    for y in (-7.3, -8.0, -8.9):
+        # Beside the raised lane the road leads on at its height.
+        assert top(90.7, y) - top(20.3, y) == pytest.approx(-0.15, abs=0.005)
+    # The ground beside meets the sidewalk.
+    ground = upper_side(built, *(s.name for s in built.city.structures))
+    assert ground(20.3, 5.6) == pytest.approx(0.3, abs=0.02)
+
+
+@pytest.mark.parametrize("roll", [0.1, -0.08])
+def test_a_level_lane_is_not_banked(tmp_path, roll):
+    lanes = (
+        lane(2, "sidewalk", 2.0).replace("<lane", '<lane level="true"'),
+        lane(1, "driving", 3.5), lane(-1, "driving", 3.5),
+        lane(-2, "sidewalk", 2.0),
+    )  # fmt: skip
+    banked = cubic("superelevation", 0, roll, 0, 0, 0, "s")
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 120, 0, lanes=lanes, lateral=banked),
+    )
+    by_number = {band.lane.number: band for band in bands_of(path)}
+    level, other = by_number[2], by_number[-2]
+    edge = 3.5 * np.array([np.cos(roll), np.sin(roll)])
+    np.testing.assert_allclose(level.inner[:, 1:], [edge] * len(level.s))
+    np.testing.assert_allclose(
+        level.outer[:, 1:], [[edge[0] + 2.0, edge[1]]] * len(level.s)
+    )
+    np.testing.assert_allclose(
+        other.outer[:, 2] - other.inner[:, 2], -2.0 * np.sin(roll)
+    )
+    top = upper_side(build_town(path, 0), "sidewalks", "kerbs")
+    rise = top(60.3, 5.3) - top(60.3, 3.7)
+    assert rise == pytest.approx(0.0, abs=0.01)
+    fall = top(60.3, -5.3) - top(60.3, -3.7)
+    assert fall == pytest.approx(-1.6 * np.tan(roll), abs=0.01)
+
+
+def test_a_reversed_lane_leads_the_other_way(tmp_path):
+    one = lane(1, "driving", 3.5).replace("<lane", '<lane direction="reversed"')
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, lanes=(one,))
+    )
+    (drive,) = find_lane_drives(bands_of(path))
+    assert (drive.path[-1] - drive.path[0])[0] > 100.0
+
+
+@pytest.mark.parametrize("pieces", [1, 2])
+def test_a_ring_road_without_a_junction_has_traffic(tmp_path, pieces):
+    radius = 60.0
+    length = 2.0 * math.pi * radius / pieces
+    lanes = section(0.0, lane(1, "driving", 3.5), lane(-1, "driving", 3.5))
+    roads = []
+    for k in range(pieces):
+        start = 2.0 * math.pi * k / pieces
+        x, y = radius * math.sin(start), -radius * math.cos(start)
+        arc = f'<arc curvature="{1 / radius!r}"/>'
+        piece = geometry(0.0, x, y, start, length, arc)
+        roads.append(road(str(k), length, [piece], [lanes]))
+    path = write_roads(tmp_path / "ring.xodr", *roads)
+    bands = bands_of(path)
+    text = lanes_for_traffic(bands, KerbHeights(bands, 0.1))
+    lanes_file = tmp_path / "lanes.json"
+    lanes_file.write_text(text)
+    whole = sum(p.length for p in read_lanes(lanes_file).graph.pieces)
+    assert whole == pytest.approx(2 * 2 * math.pi * radius, rel=5e-3)

@@ -101,6 +101,27 @@ def test_points_come_back(points, layout):
     )
 
 
+@pytest.mark.parametrize("layout", ["cns", *FIELDS])
+def test_calibrated_intensities_come_back(points, layout):
+    points["intensity"] = np.arange(500) % 256
+    read = from_layout(
+        to_points(sent(to_layout(points, layout))),
+        is_calibrated=lambda: True,
+    )
+    np.testing.assert_array_equal(read["intensity"], points["intensity"])
+    if layout == "ouster":
+        np.testing.assert_array_equal(read["reflectivity"], points["intensity"])
+
+
+def test_velodynes_driver_counts_rings_from_below(points):
+    for layout, from_below in (("velodyne", True), ("ouster", False)):
+        ring = to_layout(points, layout, 128)["ring"].astype(int)
+        expected = points["ring"].astype(int)
+        if from_below:
+            expected = 127 - expected
+        np.testing.assert_array_equal(ring, expected)
+
+
 def test_derived_fields(points):
     p = np.stack([points[axis].astype(float) for axis in "xyz"], axis=1)
     distance = np.linalg.norm(p, axis=1)

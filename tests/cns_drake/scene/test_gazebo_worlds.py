@@ -7,6 +7,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.scene.surfaces import tessellate
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.simulation.scanning import scan_world
@@ -62,6 +63,29 @@ def write(tmp_path, *elements):
         f'<sdf version="1.6"><world name="default">{body}</world></sdf>'
     )
     return path
+
+
+def link(geometry=BOX, extra="", pose="", name="l"):
+    visual = f"<visual name='v'>{pose}{geometry}{extra}</visual>"
+    return f"<link name='{name}'>{visual}</link>"
+
+
+def boxes(world):
+    """Structure -> least and greatest coordinates of its surfaces (2, 3)."""
+    plant, found = world.plant, {}
+    context = plant.CreateDefaultContext()
+    inspector = world.scene_graph.model_inspector()
+    for one in read_perception_geometry(inspector):
+        body = plant.GetBodyFromFrameId(one.frame_id)
+        X_WG = plant.EvalBodyPoseInWorld(context, body) @ one.X_FG
+        p_WVset = X_WG.multiply(tessellate(one.surface).p_GVset.T).T
+        found[one.structure] = [p_WVset.min(axis=0), p_WVset.max(axis=0)]
+    return found
+
+
+def place(world, name):
+    """The middle of a structure, rounded to millimetres."""
+    return np.mean(boxes(world)[name], axis=0).round(3).tolist()
 
 
 def ranges(world):
@@ -200,3 +224,205 @@ def test_names_that_sdf_does_not_allow(tmp_path):
     )
     names = {entry.name for entry in load_world(path).structures}
     assert names == {"a_b", "model_x"}
+
+
+@pytest.mark.parametrize("suffix", [".world", ".sdf"])
+@pytest.mark.parametrize(
+    ("normal", "sides"),
+    [
+        ("0 0 1", (2.0, 3.0, 0.0)),
+        ("0 0 -2", (2.0, 3.0, 0.0)),
+        ("1 0 0", (0.0, 3.0, 2.0)),
+        ("0 -1 0", (2.0, 0.0, 3.0)),
+    ],
+)
+def test_a_plane_ends_at_its_size(tmp_path, normal, sides, suffix):
+    plane = f"<plane><normal>{normal}</normal><size>2 3</size></plane>"
+    tilted = link(
+        f"<geometry>{plane}</geometry>", pose="<pose>1 0 0 0 0 0</pose>"
+    )
+    path = write(tmp_path, f"<model name='m'><pose>4 5 6 0 0 0</pose>{tilted}")
+    text = path.read_text().replace("</world>", "</model></world>")
+    path = path.with_suffix(suffix)
+    path.write_text(text)
+    world = load_world(path)
+    low, high = boxes(world)["m"]
+    np.testing.assert_allclose(high - low, sides, atol=2e-4)
+    np.testing.assert_allclose((low + high) / 2, [5, 5, 6], atol=1e-4)
+    # Its surface is where the file has it.
+    face = np.where(np.array(normal.split(), float) > 0, high, low)
+    across = np.array(normal.split(), float) != 0
+    np.testing.assert_allclose(face[across], np.array([5, 5, 6])[across])
+    assert any("1 planes end at their size" in note for note in world.notes)
+
+
+PLACES = {
+    "frame of the world": (
+        "<frame name='yard'><pose>10 0 0 0 0 1.5707963267948966</pose></frame>"
+        "<model name='m'><pose relative_to='yard'>2 0 1 0 0 0</pose>{link}"
+        "</model>",
+        [10.0, 2.0, 1.0],
+    ),
+    "pose without numbers": (
+        "<model name='m'><frame name='f'><pose>3 2 1 0 0 0</pose></frame>"
+        "<link name='l'><pose relative_to='f'/>{visual}</link></model>",
+        [3.0, 2.0, 1.0],
+    ),
+    "visual without numbers": (
+        "<model name='m'><frame name='f'><pose>3 2 1 0 0 0</pose></frame>"
+        "<link name='l'><visual name='v'><pose relative_to='f'/>{box}</visual>"
+        "</link></model>",
+        [3.0, 2.0, 1.0],
+    ),
+    "joint": (
+        "<model name='m'><link name='base'/><joint name='j' type='fixed'>"
+        "<pose relative_to='base'>7 0 0 0 0 0</pose><parent>base</parent>"
+        "<child>l</child></joint><link name='arm'>"
+        "<pose relative_to='j'>0 0 3 0 0 0</pose>{visual}</link>"
+        "<link name='l'/></model>",
+        [7.0, 0.0, 3.0],
+    ),
+    "joint at its child": (
+        "<model name='m'><link name='l'><pose>0 4 0 0 0 0</pose></link>"
+        "<joint name='j' type='fixed'><pose>1 0 0 0 0 0</pose>"
+        "<parent>world</parent><child>l</child></joint><link name='arm'>"
+        "<pose relative_to='j'/>{visual}</link></model>",
+        [1.0, 4.0, 0.0],
+    ),
+    "placement frame": (
+        "<model name='m' placement_frame='f'><pose>5 0 0 0 0 0</pose>"
+        "<frame name='f'><pose>0 0 -1 0 0 0</pose></frame>{link}</model>",
+        [5.0, 0.0, 1.0],
+    ),
+    "placement frame of an include": (
+        "<include><uri>model://post</uri><name>m</name>"
+        "<placement_frame>tip</placement_frame><pose>9 0 1 0 0 0</pose>"
+        "</include>",
+        [6.0, 0.0, 1.0],
+    ),
+    "merged include": (
+        "<model name='m'><pose>4 0 1 0 0 0</pose><link name='base'/>"
+        "<include merge='true'><uri>model://post</uri>"
+        "<pose>2 0 0 0 0 0</pose></include><link name='x'>"
+        "<pose relative_to='post_link'>3 0 0 0 0 0</pose>{visual}</link>"
+        "</model>",
+        [9.0, 0.0, 1.0],
+    ),
+    "frame of a merged include": (
+        "<model name='m'><include merge='true'><uri>model://post</uri>"
+        "<pose>0 0 0 0 0 3.141592653589793</pose></include><link name='x'>"
+        "<pose relative_to='tip'/>{visual}</link></model>",
+        [-3.0, 0.0, 0.0],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", PLACES)
+def test_places_by_frames(tmp_path, models, case):
+    body, expected = PLACES[case]
+    (models / "post").mkdir()
+    inner = link(name="post_link")
+    (models / "post" / "model.sdf").write_text(
+        f"<sdf version='1.9'><model name='post'>{inner}<frame name='tip'>"
+        "<pose relative_to='__model__'>3 0 0 0 0 0</pose></frame></model></sdf>"
+    )
+    visual = f"<visual name='v'>{BOX}</visual>"
+    text = body.format(box=BOX, visual=visual, link=link())
+    path = write(tmp_path, "<scene/>", text)
+    path.write_text(path.read_text().replace("1.6", "1.9"))
+    world = load_world(path, model_paths=[models])
+    found = place(world, "m")
+    if case.startswith("frame of a merged"):
+        found = np.add(boxes(world)["m"][0], [0.5, 0.5, 1.0])
+    np.testing.assert_allclose(found, expected, atol=1e-3)
+    assert world.notes == ()
+
+
+def test_a_merged_include_with_a_placement_frame_is_refused(tmp_path, models):
+    path = write(
+        tmp_path,
+        "<model name='m'><include merge='true'><uri>model://crate</uri>"
+        "<placement_frame>link</placement_frame></include></model>",
+    )
+    with pytest.raises(InputError, match="include of crate: a placement_frame"):
+        load_world(path, model_paths=[models])
+
+
+NOTED = {
+    "<transparency>1</transparency>": "1 invisible visuals ignored",
+    "<transparency>0.3</transparency>": "1 transparent visuals taken as solid",
+    "<visibility_flags>0x0</visibility_flags>": "1 invisible visuals ignored",
+    "<visibility_flags>3</visibility_flags>": "1 visibility flags ignored",
+    "<meta><layer>1</layer></meta>": "1 elements <meta> in <visual> ignored",
+    "<material><diffuse>1 1 1 0</diffuse></material>": (
+        "1 transparent colours taken as solid"
+    ),
+    "<scale>2 2 2</scale>": "1 elements <scale> in <visual> ignored",
+}
+
+
+@pytest.mark.parametrize("element", NOTED)
+def test_what_would_hide_or_change_a_visual_is_named(tmp_path, element):
+    other = f"<model name='other'>{link()}</model>"
+    path = write(
+        tmp_path, f"<model name='m'>{link(extra=element)}</model>", other
+    )
+    world = load_world(path)
+    assert [note.split(": ")[1] for note in world.notes] == [NOTED[element]]
+    assert ("m" in boxes(world)) == ("invisible" not in NOTED[element])
+
+
+def test_saved_places_and_old_frames_are_named(tmp_path):
+    path = write(
+        tmp_path,
+        f"<model name='m'><pose frame='x'>5 0 1 0 0 0</pose>{link()}</model>"
+        "<state world_name='default'><model name='m'>"
+        "<pose>8 3 1 0 0 0</pose></model><deletions><name>m</name></deletions>"
+        "</state>",
+    )
+    world = load_world(path)
+    assert place(world, "m") == [5.0, 0.0, 1.0]
+    assert [note.split(": ")[1] for note in world.notes] == [
+        "1 frames of poses in SDF before 1.7 ignored",
+        "1 saved deletions (state) ignored",
+        "1 saved places of models (state) ignored",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("body", "notes"),
+    [
+        ("<!-- run: gz sim --headless -->\n{model}", []),
+        ("{model}", []),
+        (
+            "{model}<model name='s'><link name='l'><visual name='v'><geometry>"
+            "<sphere/></geometry></visual></link></model>",
+            ["1 shapes without a size (sphere) made as large as SDF's default"],
+        ),
+        (
+            "{model}<model name='p'><link name='l'><visual name='v'><geometry>"
+            "<polyline/><polyline/></geometry></visual></link></model>",
+            ["1 visuals of type polyline ignored"],
+        ),
+        (
+            "{model}<joint name='j' type='revolute'><parent>world</parent>"
+            "<child>m</child></joint>",
+            [],
+        ),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".world", ".sdf"])
+def test_valid_worlds_are_read(tmp_path, body, notes, suffix):
+    model = f"<model name='m'><pose>5 0 1 0 0 0</pose>{link()}</model>"
+    path = write(tmp_path, body.format(model=model))
+    path = path.rename(path.with_suffix(suffix))
+    world = load_world(path)
+    assert place(world, "m") == [5.0, 0.0, 1.0]
+    assert [note.split(": ")[1] for note in world.notes] == notes
+
+
+def test_a_fault_has_its_line_below_a_comment(tmp_path):
+    path = write(tmp_path, "<!-- a\n--\nb -->\n<model name='m'><pose>x</pose>")
+    path.write_text(path.read_text().replace("</world>", "</model></world>"))
+    with pytest.raises(InputError, match="line 4: pose: x is no number"):
+        load_world(path)

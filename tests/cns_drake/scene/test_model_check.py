@@ -82,7 +82,10 @@ def test_sizes_are_read_as_they_are(tmp_path, shape, value):
 @pytest.mark.parametrize(
     ("geometry", "fault"),
     [
-        ("<sphere/>", "sphere: no radius"),
+        ("<drake:capsule/>", "drake:capsule: no radius"),
+        ("<polyline/><box><size>1 1 1</size></box>", "two shapes, polyline"),
+        ("<plane><size>1 0</size></plane>", "1 0 is not a valid size"),
+        ("<plane><normal>0 0 0</normal></plane>", "0 0 0 is no direction"),
         ("<sphere><radius>1</radius><radius>2</radius></sphere>", "2 times"),
         ("<box><size>1 2</size></box>", "size: 2 numbers, not 3"),
         (

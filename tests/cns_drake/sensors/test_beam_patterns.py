@@ -7,7 +7,12 @@ from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 import pytest
 
+from cns_drake.sensors.lidar.livox_patterns import (
+    NoddingPattern,
+    RosettePattern,
+)
 from cns_drake.sensors.lidar.patterns import (
+    BeamPattern,
     DirectionPattern,
     SpinningPattern,
     make_flash_pattern,
@@ -208,6 +213,11 @@ def test_beams_in_any_directions():
         ([[0, 0, 0]], {}, "zero"),
         ([[np.nan, 0, 0]], {}, "zero or not a number"),
         ([[1, 0, 0]], {"times": [0.1]}, "not within the turn of 0.1 s"),
+        ([[1, 0, 0]], {"rings": [65536]}, "a ring: 65536 is not a whole"),
+        ([[1, 0, 0]], {"rings": [-1]}, "a ring: -1 is not"),
+        ([[1, 0, 0]], {"rings": [0.5]}, "a ring: 0.5 is not"),
+        ([[1, 0]], {}, r"directions: their shape \(1, 2\)"),
+        ([[1, 0, 0, 0, 1, 0]], {}, "does not end in 3"),
     ],
 )
 def test_patterns_that_are_none(directions, options, fault):
@@ -215,6 +225,130 @@ def test_patterns_that_are_none(directions, options, fault):
         DirectionPattern(
             directions, min_range=0.1, max_range=9.0, period=0.1, **options
         )
+
+
+@pytest.mark.parametrize(
+    ("limits", "fault"),
+    [
+        ((5.0, 5.0, 0.1), "min_range 5, max_range 5"),
+        ((-0.1, 5.0, 0.1), "min_range -0.1"),
+        ((np.nan, 5.0, 0.1), "min_range nan"),
+        ((0.0, np.nan, 0.1), "max_range nan"),
+        ((0.0, 5.0, 0.0), "period: 0 s"),
+        ((0.0, 5.0, -1.0), "period: -1 s"),
+        ((0.0, 5.0, np.inf), "period: inf s"),
+    ],
+)
+def test_impossible_limits(limits, fault):
+    """Every kind of pattern refuses them, a kind of one's own included."""
+    low, high, period = limits
+    given = {"min_range": low, "max_range": high, "period": period}
+
+    class Own(BeamPattern):
+        min_range, max_range = low, high
+
+        def beams(self, frame):
+            return make_beam_pattern("vlp-16").beams(0)
+
+    own = Own()
+    own.period = period
+    for make in (
+        lambda: SpinningPattern((0.0,), 4, low, high, period),
+        lambda: DirectionPattern([[1, 0, 0]], **given),
+        lambda: NoddingPattern((0.0, 9.0), points_per_second=1e4, **given),
+        lambda: RosettePattern(70.0, points_per_second=1e4, **given),
+        lambda: make_flash_pattern(2, 2, (9.0, 9.0), **given),
+        lambda: Stage().finish(pattern=own),
+    ):
+        with pytest.raises(ValueError, match=fault):
+            make()
+    # Nothing is nearer than the sensor, nor farther than an endless range.
+    SpinningPattern((0.0,), 4, 0.0, np.inf, 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("elevations", "columns", "azimuths", "fault"),
+    [
+        ((-0.1, 0.1), 4, None, "elevations_rad: they must descend"),
+        ((), 4, None, "there must be one"),
+        ((np.nan,), 4, None, "elevations_rad"),
+        ((1.6,), 4, None, "elevations_rad"),
+        ((0.0,), 0, None, "num_columns: 0"),
+        ((0.0,), 2.5, None, "num_columns: 2.5"),
+        ((0.0,), 4, (0.0, np.inf), "azimuths_rad"),
+    ],
+)
+def test_turns_that_are_none(elevations, columns, azimuths, fault):
+    with pytest.raises(ValueError, match=fault):
+        SpinningPattern(elevations, columns, 0.1, 9.0, 0.1, azimuths)
+
+
+def test_patterns_that_never_repeat_have_limits_of_their_own():
+    common = {"min_range": 0.1, "max_range": 9.0, "period": 0.1}
+    for make, fault in (
+        (lambda: NoddingPattern((9, 0), points_per_second=9, **common), "elev"),
+        (lambda: RosettePattern(0, points_per_second=9, **common), "fov_deg 0"),
+        (
+            lambda: RosettePattern(9, points_per_second=0, **common),
+            "points_",
+        ),
+        (
+            lambda: RosettePattern(
+                9, points_per_second=9, num_lines=0, **common
+            ),
+            "num_lines: 0",
+        ),
+    ):
+        with pytest.raises(ValueError, match=fault):
+            make()
+
+
+def test_the_latest_time_that_a_point_can_have():
+    """A turn may last longer; 2^32 ns are 4.294967296 s."""
+    last = (2**32 - 1) * 1e-9
+    options = {"min_range": 0.1, "max_range": 9.0, "period": 60.0}
+    pattern = DirectionPattern([[1, 0, 0]] * 2, times=[0.0, last], **options)
+    assert pattern.beams(0).t_ns.tolist() == [0, 2**32 - 1]
+    with pytest.raises(ValueError, match=r"a firing time .* 4294967296"):
+        DirectionPattern([[1, 0, 0]], times=[last + 1e-9], **options)
+    # The last of ten columns fires after nine tenths of a turn.
+    assert SpinningPattern((0.0,), 10, 0.1, 9.0, 4.77).beams(0).t_ns[-1] > 4e9
+    for pattern in (
+        SpinningPattern((0.0,), 10, 0.1, 9.0, 4.78),
+        make_beam_pattern("mid-360", 4.4),
+    ):
+        with pytest.raises(ValueError, match="a firing time"):
+            pattern.beams(0)
+
+
+@pytest.mark.parametrize(
+    ("preset", "beams_a_second"),
+    [
+        ("vlp-16", 288_000),
+        ("hdl-64e", 1_331_200),
+        ("hesai-pandar64", 1_152_000),
+        ("avia", 240_000),
+    ],
+)
+@pytest.mark.parametrize("rate", [20, 10, 5])
+def test_lasers_that_fire_at_a_fixed_rate(preset, beams_a_second, rate):
+    pattern = make_beam_pattern(preset, 1.0 / rate)
+    assert pattern.num_beams * rate == beams_a_second
+
+
+def test_columns_that_are_a_setting_stay():
+    for preset in ("cns", "os1-64"):
+        assert make_beam_pattern(preset, 0.1).num_columns == 1024
+    # What is asked for wins.
+    assert make_beam_pattern("vlp-16", 0.1, num_columns=9).num_columns == 9
+
+
+def test_equal_patterns_share_their_beams():
+    first, second = (make_beam_pattern("vlp-16", 0.1) for _ in range(2))
+    assert first is not second
+    assert first.beams(0) is second.beams(5)
+    own = SpinningPattern(np.array([0.1, 0.0]), 9, 0.1, 9.0, 0.1)
+    assert own == SpinningPattern((0.1, 0.0), 9, 0.1, 9.0, 0.1)
 
 
 def test_a_flash_is_a_grid():

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 import dataclasses
+import inspect
 
 from drake import lcmt_drake_signal, lcmt_point_cloud
 from helpers.browser import chromium, has_chromium
@@ -26,8 +27,10 @@ from cns_drake import (
     ImuConfig,
     LidarConfig,
     OdometryConfig,
+    add_lidar,
     load_scenario,
 )
+from cns_drake.scene.drake_releases import find_bus
 
 X_WR = RigidTransform(RollPitchYaw(0.0, 0.0, 0.6), [1.0, -2.0, 0.5])
 X_RS = RigidTransform(RollPitchYaw(0.1, -0.2, 2.0), [0.3, 0.1, 0.9])
@@ -116,10 +119,79 @@ def test_fields_are_those_of_a_scenario(struct, section):
     for name in ("name", "X_PB", "seed", "lcm_bus"):
         del fields[name]
     names = set(type(described).model_fields) - {"xyz", "rpy_deg", "layout"}
+    if struct is LidarConfig:
+        # These are as in `add_lidar`.
+        own = {"rate": None, "resolution": 0.0, "causal": False}
+        assert {name: fields.pop(name) for name in own} == own
+        names -= own.keys()
     assert set(fields) == names
     for name, default in fields.items():
         kept = getattr(described, name)
         assert default == getattr(kept, "value", kept), name
+    # What a type checker reads are the fields themselves.
+    assert list(inspect.signature(struct).parameters) == [
+        f.name for f in dataclasses.fields(struct)
+    ]
+    assert struct.__annotations__.keys() >= fields.keys()
+
+
+@pytest.mark.parametrize("preset", ["vlp-16", "hokuyo-ust-20lx", "avia"])
+def test_a_preset_is_that_of_add_lidar(preset):
+    builder, plant = make_site()
+    config = LidarConfig(preset=preset, name="config")
+    lidars = [
+        ApplyLidarConfig(config, builder, lcm=DrakeLcm("memq://")),
+        add_lidar(
+            builder,
+            builder.GetSubsystemByName("scene_graph"),
+            plant.world_body(),
+            RigidTransform(),
+            preset,
+        ),
+    ]
+    assert lidars[0].pattern == lidars[1].pattern
+    context = builder.Build().CreateDefaultContext()
+    first, second = (
+        one.GetOutputPort("scan").Eval(one.GetMyContextFromRoot(context))
+        for one in lidars
+    )
+    assert len(first) > 100
+    np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("rate", [3, 7.5, 12, 400.0])
+def test_any_rate(rate):
+    builder, _ = make_site()
+    lcm = DrakeLcm("memq://")
+    data = f"{{preset: mid-70, rate: {rate}}}"
+    config = yaml_load_typed(schema=LidarConfig, data=data)
+    lidar = ApplyLidarConfig(config, builder, lcm=lcm)
+    assert lidar.pattern.period == 1.0 / rate
+    assert lidar.pattern.num_beams == round(100_000 / rate)
+    channel = "DRAKE_POINT_CLOUD_lidar"
+    _, received = advance(builder, lcm, 2.5 / rate, channel)
+    assert len(received[channel]) == 3
+
+
+def test_clouds_have_intensities_as_greys():
+    builder, _ = make_site()
+    lcm = DrakeLcm("memq://")
+    lidar = ApplyLidarConfig(LidarConfig(), builder, lcm=lcm)
+    channel = "DRAKE_POINT_CLOUD_lidar"
+    simulator, received = advance(builder, lcm, 0.0, channel)
+    cloud = lcmt_point_cloud.decode(received[channel][0])
+    fields = [field.name for field in cloud.fields]
+    assert fields == ["x", "y", "z", "rgb"]
+    rows = np.frombuffer(cloud.data, np.uint8).reshape(cloud.width, -1)
+    context = lidar.GetMyContextFromRoot(simulator.get_context())
+    scan = lidar.GetOutputPort("scan").Eval(context)
+    grey = np.rint(255.0 * scan["intensity"])
+    assert 1 < len(np.unique(grey)) < 30
+    np.testing.assert_array_equal(rows[:, 12:15], grey[:, None].repeat(3, 1))
+    for port in ("point_cloud_S", "point_cloud_W"):
+        rgbs = lidar.GetOutputPort(port).Eval(context).rgbs()
+        np.testing.assert_array_equal(rgbs, [grey] * 3)
+    assert not lidar.GetOutputPort("positions_W").Eval(context).has_rgbs()
 
 
 def test_published_scans_are_the_lidars():
@@ -237,7 +309,7 @@ def test_buses_by_name():
             LcmSubscriberSystem.Make(
                 "DRAKE_POINT_CLOUD_roof",
                 lcmt_point_cloud,
-                buses.Find("test", name),
+                find_bus(builder, buses, "test", name),
             ),
         )
     simulator = Simulator(builder.Build())
@@ -261,7 +333,11 @@ def test_buses_by_name():
     ("change", "fault"),
     [
         ({"preset": "vlp16"}, "roof: preset: unknown preset 'vlp16'"),
-        ({"rate": 7}, "roof: rate: "),
+        ({"rate": 0}, "roof: rate: 0 is not above 0"),
+        ({"rate": -7}, "roof: rate: "),
+        ({"rate": 1000.1}, "roof: rate: "),
+        ({"rate": np.nan}, "roof: rate: "),
+        ({"X_PB": Transform(RigidTransform([np.nan, 0, 0]))}, "roof: X_PB: "),
         ({"dropout": 1.5}, "roof: dropout: "),
         ({"returns": "calibrated"}, "roof: .*range_noise"),
         ({"echoes": "some"}, "roof: echoes: "),
@@ -271,6 +347,17 @@ def test_faults_name_config_and_field(change, fault):
     config = dataclasses.replace(read_roof(), **change)
     with pytest.raises(ValueError, match=fault):
         ApplyLidarConfig(config, make_site()[0], lcm=DrakeLcm("memq://"))
+
+
+@pytest.mark.parametrize(
+    ("apply", "struct"),
+    [(ApplyImuConfig, ImuConfig), (ApplyOdometryConfig, OdometryConfig)],
+)
+@pytest.mark.parametrize("rate", [0, -1, 10**9])
+def test_impossible_rates_of_other_sensors(apply, struct, rate):
+    fault = rf"{struct.__name__} x: rate: {rate:g} is not above 0"
+    with pytest.raises(ValueError, match=fault.replace("+", r"\+")):
+        apply(struct(name="x", rate=rate), make_site()[0])
 
 
 def test_a_frame_that_is_not_there():

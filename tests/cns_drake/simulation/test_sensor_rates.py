@@ -105,6 +105,28 @@ def test_samples_go_on_between_frames_and_after_the_last(tmp_path):
     assert found["/odometry"] == even(20, 200_000_000)
 
 
+@pytest.mark.parametrize("rate", [15, 20])
+def test_tf_goes_on_to_the_end_of_a_distorted_scan(tmp_path, rate):
+    """It puts right the last scan as well; other topics end with it."""
+    unit = {"preset": "vlp-16", "columns": 8, "rate": rate}
+    ends = {}
+    for distorted in (False, True):
+        lidar = unit | {"motion_distortion": distorted}
+        changes = {"imu": {}, "odometry": {}, "frames": 3}
+        scenario = make(
+            tmp_path / str(distorted), lidars={"lidar": lidar}, **changes
+        )
+        found = stamps_ns(simulate(scenario, tmp_path / str(rate)).folder)
+        ends[distorted] = {k: len(v) for k, v in found.items()}
+        turn_ns = 1e9 / rate
+        for topic in ("/tf", "/lidar/points"):
+            expected = turn_ns * np.arange(len(found[topic]))
+            np.testing.assert_array_equal(found[topic], np.rint(expected))
+        shutil.rmtree(tmp_path / str(rate))
+    same = {"/imu/data": 3, "/odometry": 3, "/lidar/points": 3, "/tf_static": 1}
+    assert ends == {False: same | {"/tf": 3}, True: same | {"/tf": 4}}
+
+
 def test_samples_enclose_every_scan(recording):
     for lidar in LIDARS:
         drive = McapDrive(recording, lidar)
@@ -131,8 +153,12 @@ def test_layouts_hold_the_same_points(recording, tmp_path):
         assert len(one) == len(other) > 3
         for scan, expected in zip(one, other, strict=True):
             assert len(scan) > 10
-            for name in ("x", "y", "z", "ring", "label", "instance"):
+            for name in ("x", "y", "z", "label", "instance"):
                 np.testing.assert_array_equal(scan[name], expected[name])
+            # Velodyne's driver counts from below.
+            below = 15 - expected["ring"].astype(int)
+            ring = below if lidar == "rear" else expected["ring"]
+            np.testing.assert_array_equal(scan["ring"], ring)
             np.testing.assert_allclose(
                 scan["t"].astype(float), expected["t"], rtol=0, atol=8
             )
@@ -243,7 +269,17 @@ def test_the_rate_may_be_kalibrs(tmp_path):
         ({"imu": {"rate": 2000}}, r"imu: rate: 2000 .* 20 to 1000 .* 1000$"),
         ({"imu": {"rate": 10}}, r"imu: rate: 10 .* such as 20$"),
         ({"odometry": {"rate": 50}}, r"odometry: rate: 50 .* 40 or 80$"),
-        ({"lidars": {"lidar": {"rate": 15}}}, r"lidars\.lidar\.rate: .*5, 10"),
+        ({"lidars": {"lidar": {"rate": 0}}}, r"lidars\.lidar\.rate: "),
+        ({"lidars": {"lidar": {"rate": 101}}}, r"lidars\.lidar\.rate: "),
+        ({"lidars": {"lidar": {"rate": 7.5}}}, r"lidars\.lidar\.rate: "),
+        (
+            {"lidars": {"a": {"rate": 20}, "b": {"rate": 15}}},
+            r"lidars: b\.rate: 15 does not divide 20",
+        ),
+        (
+            {"lidars": {"lidar": {"rate": 7}}, "odometry": {"rate": 100}},
+            r"odometry: rate: 100 .* multiple of 7 .* there is none$",
+        ),
         ({"lidars": {"lidar": {"layout": "pcl"}}}, r"layout: .*'autoware'"),
     ],
 )

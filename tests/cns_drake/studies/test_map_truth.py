@@ -19,6 +19,7 @@ from cns_drake.sensors.lidar.patterns import BeamCoverage
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.map_truth import (
     NEAR,
+    is_there,
     open_survey,
     simulate_survey,
     write_truth,
@@ -254,3 +255,26 @@ def test_two_worlds_and_changed_worlds_are_refused(
             open_survey(short_recording)
     finally:
         table.write_text(text)
+
+
+def test_small_parts_are_there(tmp_path):
+    """Poles of 2 cm, passed in any direction."""
+    poles = [
+        box_visual(
+            f"p{k}/body", (3.0 * k, 5, 3, 0, 0, 0.3 * k), (0.02, 0.02, 6)
+        )
+        for k in range(9)
+    ]
+    scene = survey(tmp_path / "w", [GROUND, *poles]).still()
+    rng = np.random.default_rng(8)
+    k = rng.integers(0, 9, 4000)
+    # In the axes of a pole.
+    x, y = rng.uniform(-0.15, 0.15, (2, 4000))
+    c, s = np.cos(0.3 * k), np.sin(0.3 * k)
+    z = rng.uniform(1.0, 5.0, 4000)
+    points = np.column_stack([3.0 * k + c * x - s * y, 5.0 + s * x + c * y, z])
+    beside = np.maximum(np.abs([x, y]) - 0.01, 0.0)
+    distance = np.hypot(*beside)
+    found = is_there(points, scene)
+    assert found[distance < 0.09].mean() > 0.99
+    assert not found[distance > 1.25 * NEAR].any()

@@ -154,3 +154,93 @@ def test_submaps_have_no_overlaps(tmp_path, monkeypatch, capsys):
     assert "--scans: overlaps are those of single scans" in (
         capsys.readouterr().err
     )
+
+
+def test_clouds_without_positives_are_counted(tmp_path):
+    runs = [run_of(1, 12), run_of(2, 12)]
+    found = training_tuples(runs)
+    alone = sum(len(one.positives) == 0 for one in found.values())
+    assert 0 < alone < len(found) == 24
+    notes = []
+    pair_export._write_pickles(tmp_path, runs, runs, notes.append)
+    assert f"training: {alone} of 24 clouds have no other" in notes[0]
+
+
+def line(name, number, city=0, start=0.0):
+    X_WS = np.tile(np.eye(4), (number, 1, 1))
+    X_WS[:, 0, 3] = start + 10.0 * np.arange(number)
+    return Run(f"runs/{name}", X_WS, city)
+
+
+@pytest.mark.parametrize(
+    ("tested", "note"),
+    [
+        ([line("a", 30)], "a is the only drive of its city"),
+        ([line("a", 30), line("b", 24)], "b has 24 clouds"),
+        (
+            [line("a", 30), line("b", 30, start=290.0 + 25.1)],
+            "a and b are never within 25 m",
+        ),
+        ([line("a", 25), line("b", 25, start=240.0 + 25.0)], None),
+    ],
+)
+def test_cities_that_cannot_be_evaluated(tmp_path, tested, note):
+    notes = []
+    pair_export._write_pickles(tmp_path, tested, tested, notes.append)
+    written = (tmp_path / "oxford_evaluation_query.pickle").exists()
+    assert written == (note is None)
+    assert (note is None) or note in notes[-1]
+
+
+def test_evaluation_files_have_the_names_of_minkloc(tmp_path):
+    cities = [[line(f"{n}_{k}", 30, n) for k in range(2)] for n in range(5)]
+    names = ("oxford", "university", "residential", "business")
+    for number, shown in (
+        (1, [0, 0, 0, 0]),
+        (3, [0, 1, 2, 0]),
+        (5, [*range(4)]),
+    ):
+        tested = [run for city in cities[:number] for run in city]
+        notes = []
+        pair_export._write_pickles(tmp_path, tested, tested, notes.append)
+        assert len(notes) == (number == 5)
+        for name, city in zip(names, shown, strict=True):
+            database, queries = (
+                pickle.loads(
+                    (tmp_path / f"{name}_evaluation_{one}.pickle").read_bytes()
+                )
+                for one in ("database", "query")
+            )
+            # What the evaluation does: each pair of drives has a match.
+            assert database[0][0]["query"] == f"runs/{city}_0/000000.bin"
+            assert len(database) == len(queries) == 2
+            assert any(queries[1][k][0] for k in range(30))
+            assert any(queries[0][k][1] for k in range(30))
+
+
+def test_a_set_without_drives_to_learn_from(tmp_path):
+    with pytest.raises(InputError, match="no drive to learn from"):
+        export_pairs([], [tiny_scenario(tmp_path)], tmp_path, None, None)
+
+
+def test_a_held_out_drive_may_be_named_with_the_others(
+    tmp_path, monkeypatch, capsys
+):
+    seen = {}
+
+    def take(learned, tested, *rest):
+        seen["names"] = [
+            [one.name for one in part] for part in (learned, tested)
+        ]
+        return []
+
+    monkeypatch.setattr(pair_export, "export_pairs", take)
+    line = (
+        "cns-drake export-pairs riverside_01 riverside_02 --held-out"
+        f" riverside_02 --format pointnetvlad --output {tmp_path}"
+    )
+    monkeypatch.setattr(sys, "argv", line.split())
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert not end.value.code
+    assert seen["names"] == [["riverside_01"], ["riverside_02"]]

@@ -262,3 +262,100 @@ def test_traces_that_are_none(tmp_path, old, new, expected):
         tmp_path / "bad.xml", change=lambda text: re.sub(old, new, text)
     )
     assert re.match(expected, fault(path))
+
+
+@pytest.mark.parametrize("vehicle", ["", ' vehicle="b"'])
+def test_persons_are_not_seen_while_they_ride(tmp_path, vehicle):
+    """Walker p boards the bus at 3 s and leaves it at 5 s; q rides throughout.
+
+    A container rides, too.
+    """
+    number = iter(range(80))
+
+    def boards(match):
+        k = next(number)
+        x, y = re.search(r'id="b" x="(\S+)" y="(\S+)"', match[0]).groups()
+        row = '<person id="{}" x="{}" y="{}" angle="0" speed="6"{}/>'
+        rider = row.format("q", x, y, vehicle)
+        if 30 <= k <= 50:
+            own = row.format("p", x, y, vehicle)
+            match = re.sub(r'<person id="p".*?/>', own, match[0])
+        else:
+            match = match[0]
+        load = f'<container id="load" x="{x}" y="{y}" angle="0"/>'
+        return match.replace("</timestep>", f"{rider}{load}</timestep>")
+
+    def change(text):
+        return re.sub(r"<timestep.*?</timestep>", boards, text, flags=re.DOTALL)
+
+    path = write_trace(tmp_path / "trace.xml", change=change)
+    plan = play(path)
+    for t, there in ((2.85, True), (3.05, False), (4.95, False), (5.15, True)):
+        assert plan.walkers.is_present(t).tolist() == [there]
+        assert plan.vehicles.is_present(t)[0]
+    values, _ = plan.walkers.at(5.15)
+    np.testing.assert_allclose(values[0, :2], [20 - 1.25 * 5.15, 3.0])
+    assert plan.notes == (
+        f"{path}: left out: 2 persons, while they ride in vehicles",
+        f"{path}: left out: 1 elements container",
+    )
+
+
+LINE = np.arange(-60.0, 60.5, 0.5)
+ABOVE = 6.0
+BRIDGE = np.column_stack([0 * LINE - 1.75, LINE, 0 * LINE + ABOVE])
+BELOW = np.column_stack([LINE, 0 * LINE + 1.75, 0 * LINE])
+# A street on two levels, one above the other.
+STACKED = np.column_stack([LINE, 0 * LINE + 1.75, 0 * LINE + ABOVE])
+
+
+@pytest.mark.parametrize("zero", [None, 0.0, -40.0])
+@pytest.mark.parametrize(
+    ("ways", "starts", "heights"),
+    [
+        ((BRIDGE, BELOW), ((-1.75, -50, 0, 8), (-50, 1.75, 8, 0)), (ABOVE, 0)),
+        ((BELOW, STACKED), ((-50, 1.75, 8, 0), (50, 1.75, -8, 0)), (0, ABOVE)),
+    ],
+)
+def test_vehicles_are_on_their_own_level(tmp_path, zero, ways, starts, heights):
+    """Over a crossing on two levels; the trace has heights, or none."""
+    if zero is None and ways[1] is STACKED:
+        pytest.skip("nothing tells the level")
+    steps = []
+    for k in range(120):
+        rows = [f'<timestep time="{k / 10}">']
+        for name, (x, y, u, v), z in zip("ab", starts, heights, strict=True):
+            place = f'x="{x + u * k / 10}" y="{y + v * k / 10}"'
+            if zero is not None:
+                place += f' z="{z + zero}"'
+            angle = np.degrees(np.arctan2(u, v))
+            rows.append(f'<vehicle id="{name}" {place} angle="{angle}"/>')
+        steps.append("".join([*rows, "</timestep>"]))
+    path = tmp_path / "trace.xml"
+    path.write_text(f"<fcd-export>{''.join(steps)}</fcd-export>")
+    graph = LaneGraph(tuple(Piece(way, 13.9, False) for way in ways))
+    plan = play_trace(
+        read_fcd(path), path, graph, [], seed=1, duration=10.0, end=10.0,
+        ego=far_away, ego_box=EGO_BOX,
+    )  # fmt: skip
+    for t in np.arange(0.0, 10.0, 0.1):
+        values, _ = plan.vehicles.at(t)
+        np.testing.assert_allclose(values[:, 2], heights, atol=1e-6)
+
+
+def test_a_walker_stays_on_the_bridge_on_which_he_came(tmp_path):
+    rows = [
+        f'<timestep time="{k}">'
+        f'<person id="p" x="-1.75" y="{k - 30}" angle="0"/>'
+        "</timestep>"
+        for k in range(60)
+    ]
+    path = tmp_path / "trace.xml"
+    path.write_text(f"<fcd-export>{''.join(rows)}</fcd-export>")
+    graph = LaneGraph(tuple(Piece(way, 13.9, False) for way in (BRIDGE, BELOW)))
+    plan = play_trace(
+        read_fcd(path), path, graph, [], seed=1, duration=50.0, end=50.0,
+        ego=far_away, ego_box=EGO_BOX,
+    )  # fmt: skip
+    heights = [plan.walkers.at(t)[0][0, 2] for t in np.arange(0.0, 50.0)]
+    np.testing.assert_allclose(heights, ABOVE, atol=1e-6)

@@ -166,3 +166,23 @@ def test_files_of_lanes_that_are_none(graph, tmp_path, field, value, fault):
         read_lanes(path)
     assert "\n" not in str(error.value)
     assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize("through_junction", [False, True])
+def test_a_ring_that_is_one_lane_follows_itself(through_junction):
+    angle = np.linspace(0.0, 2.0 * np.pi, 201)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) * 40.0
+    if through_junction:
+        lanes = [
+            DirectedLane(ring[:190], 10.0, False),
+            DirectedLane(ring[189:], 10.0, True),
+        ]
+        graph = join_lanes(lanes, [(0, 1), (1, 0)])
+    else:
+        graph = join_lanes([DirectedLane(ring, 10.0, False)], [(0, 0)])
+    lane, way = graph.pieces
+    assert not lane.is_way
+    assert way.is_way
+    assert lane.after == (1,)
+    assert way.after == (0,)
+    assert lane.length + way.length == pytest.approx(80.0 * np.pi, rel=2e-3)

@@ -79,7 +79,7 @@ def test_two_attachments_of_a_name_that_differ(recording):
         _ = open_drive(path).scenario
 
 
-def test_messages_of_an_unnamed_channel(recording, monkeypatch):
+def test_a_channel_that_the_summary_does_not_name(recording, monkeypatch):
     path, messages, attachments = recording
     data = write_messages(messages, attachments)
     path.write_bytes(data)
@@ -93,8 +93,10 @@ def test_messages_of_an_unnamed_channel(recording, monkeypatch):
         return summary
 
     monkeypatch.setattr(SeekingReader, "get_summary", forget)
-    with pytest.raises(InputError, match="which the summary does not list"):
-        open_drive(path)
+    # The summary is optional: the file itself names the channel.
+    whole = open_drive(path).X_WS
+    monkeypatch.undo()
+    np.testing.assert_array_equal(open_drive(path).X_WS, whole)
 
 
 _READ = """

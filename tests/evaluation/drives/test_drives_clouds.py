@@ -176,7 +176,7 @@ def test_empty_clouds(tmp_path):
 def faulty_files(folder):
     """Yields name, content, and expected text of the error."""
     yield "short.bin", bytes(17), "17 bytes is not a whole number"
-    yield "text.npy", b"hello", "npy|pickle|magic"
+    yield "text.npy", b"hello", "not an array of numbers"
     yield "text.pcd", b"hello\n", "no DATA line"
     yield "text.ply", b"hello\n", "not a PLY file"
     yield "open.ply", b"ply\nformat ascii 1.0\n", "no end_header"
@@ -197,7 +197,11 @@ def faulty_files(folder):
         ),
         "large.pcd": (ONE | {"DATA": "ascii"}, b"1 2 1e39", "z: a num"),
         "huge.pcd": (HUGE | {"DATA": "ascii"}, b"1 2 3", "cut off"),
-        "words.pcd": ({"DATA": "ascii"}, b"a b c\n" * 500, "convert"),
+        "words.pcd": (
+            {"DATA": "ascii"},
+            b"a b c\n" * 500,
+            "row 1: 'a' is no number",
+        ),
         "odd.pcd": ({"DATA": "zip"}, b"", "unknown PCD encoding"),
         "fields.pcd": ({"SIZE": "4 4", "DATA": "binary"}, b"", "differ"),
         "no_z.pcd": ({"FIELDS": "x y w", "DATA": "binary"}, b"", "field z"),
@@ -236,7 +240,7 @@ def faulty_files(folder):
     yield (
         "negative.ply",
         (header % (b"ascii", b"float")).replace(b"2", b"-2"),
-        "negative number",
+        "'element vertex -2' is not",
     )
     yield (
         "cut_ascii.ply",
@@ -450,3 +454,151 @@ def test_odd_floats_without_a_word(tmp_path):
         for name, finite in (("half", 1), ("signalling", 3)):
             points = xyz(read_cloud(tmp_path / f"{name}.npy"))
             assert np.isfinite(points).all(axis=1).sum() == finite
+
+
+def notes_of(path):
+    notes = []
+    cloud = read_cloud(path, on_note=notes.append)
+    return cloud, notes
+
+
+@pytest.mark.parametrize(
+    ("viewpoint", "is_told"),
+    [
+        (None, False),
+        ("0 0 0 1 0 0 0", False),
+        ("0.0 -0.0 0e0 1.000 0 0 0", False),
+        ("30 5 0 0.7071 0 0 0.7071", True),
+        ("0 0 1e-3 1 0 0 0", True),
+        ("0 0 0 0 0 0 1", True),
+        ("0 0 0 1", True),
+        ("a b c 1 0 0 0", True),
+    ],
+)
+def test_a_viewpoint_is_named(tmp_path, viewpoint, is_told):
+    header = {k: v for k, v in HEADER.items() if k != "VIEWPOINT"}
+    if viewpoint is not None:
+        header["VIEWPOINT"] = viewpoint
+    path = tmp_path / "a.pcd"
+    write_pcd(path, header | {"DATA": "binary"}, POINTS.tobytes())
+    cloud, notes = notes_of(path)
+    np.testing.assert_array_equal(xyz(cloud), POINTS)
+    assert [f"{path}: VIEWPOINT is not applied" in n for n in notes] == (
+        [True] * is_told
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"SIZE": "3 4 4"}, "x: no type F of SIZE 3"),
+        ({"TYPE": "U F F", "SIZE": "3 4 4"}, "x: no type U of SIZE 3"),
+        ({"TYPE": "D F F"}, "x: no type D of SIZE 4"),
+        ({"COUNT": "0 1 1"}, "x: no type F of SIZE 4 and COUNT 0"),
+        ({"COUNT": "-1 1 1"}, "COUNT -1"),
+        ({"COUNT": "one 1 1"}, "COUNT is missing or wrong"),
+        ({"FIELDS": "x y y"}, "field y is there twice"),
+        ({"POINTS": "many"}, "POINTS is missing or wrong"),
+        ({"SIZE": ""}, "FIELDS, SIZE, TYPE and COUNT differ"),
+    ],
+)
+def test_faults_of_pcd_headers_are_in_our_words(tmp_path, changes, fault):
+    path = tmp_path / "a.pcd"
+    write_pcd(path, HEADER | changes | {"DATA": "binary"}, POINTS.tobytes())
+    with pytest.raises(InputError, match=f"^{path}: PCD header: .*{fault}"):
+        read_cloud(path)
+
+
+def test_rows_of_another_length_are_named(tmp_path):
+    path = tmp_path / "a.pcd"
+    text = b"1 2 3\n" * 30 + b"1 2\n" + b"1 2 3\n" * 469
+    write_pcd(path, HEADER | {"DATA": "ascii"}, text)
+    with pytest.raises(InputError, match=r": row 31: 2 numbers instead of 3$"):
+        read_cloud(path)
+
+
+PLY_XYZ = b"property %s x\nproperty %s y\nproperty %s z\n"
+
+
+def ply(encoding, *elements, data=b""):
+    lines = [b"ply", b"format %s 1.0" % encoding]
+    for name, count, properties in elements:
+        lines += [b"element %s %d" % (name, count), properties.strip()]
+    return b"\n".join([*lines, b"end_header", b""]) + data
+
+
+FLOATS = PLY_XYZ % ((b"float",) * 3)
+CAMERA = (b"camera", 2, b"property float fx\nproperty uchar id")
+
+
+@pytest.mark.parametrize("end", ["<", ">"])
+def test_elements_before_the_vertices(tmp_path, end):
+    name = b"binary_little_endian" if end == "<" else b"binary_big_endian"
+    data = bytes(10) + POINTS.astype(f"{end}f4").tobytes()
+    path = tmp_path / "a.ply"
+    path.write_bytes(ply(name, CAMERA, (b"vertex", 500, FLOATS), data=data))
+    np.testing.assert_array_equal(xyz(read_cloud(path)), POINTS)
+    text = b"9 1\n8 2\n1 2 3\n4 5 6\n"
+    path.write_bytes(ply(b"ascii", CAMERA, (b"vertex", 2, FLOATS), data=text))
+    assert xyz(read_cloud(path)).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    ("elements", "fault"),
+    [
+        (
+            [(b"vertex", 1, FLOATS + b"property list uchar int ring\n")],
+            "vertex: property ring of the type 'list'",
+        ),
+        (
+            [
+                (b"face", 1, b"property list uchar int corners\n"),
+                (b"vertex", 1, FLOATS),
+            ],
+            "face: property corners of the type 'list'",
+        ),
+        ([(b"vertex", 1, FLOATS + b"property half w\n")], "'half'"),
+        ([(b"vertex", 1, FLOATS + b"property int x\n")], "x is there twice"),
+        ([(b"vertex", 1, PLY_XYZ % ((b"int",) * 3))], "property x"),
+        ([(b"point", 1, FLOATS)], "no element vertex"),
+        ([(b"vertex", 1, b"property float\n")], "'property float' is not"),
+    ],
+)
+def test_ply_that_is_not_read(tmp_path, elements, fault):
+    path = tmp_path / "a.ply"
+    path.write_bytes(ply(b"binary_little_endian", *elements, data=bytes(99)))
+    with pytest.raises(InputError, match=f"^{path}: PLY header: .*{fault}"):
+        read_cloud(path)
+
+
+def test_marks_and_line_ends_of_headers(tmp_path):
+    path = tmp_path / "a.ply"
+    text = ply(b"ascii", (b"vertex", 1, FLOATS), data=b"1 2 3\n")
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace(b"\n", b"\r\n"))
+    assert xyz(read_cloud(path)).tolist() == [[1, 2, 3]]
+    path = tmp_path / "a.pcd"
+    write_pcd(path, HEADER | ONE | {"DATA": "ascii"}, b"1 2 3\n")
+    text = path.read_bytes().removeprefix(b"# .PCD v0.7\n")
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace(b"\n", b"\r\n"))
+    assert xyz(read_cloud(path)).tolist() == [[1, 2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("kind", "northing", "step"),
+    [
+        ("<f4", 4.02e6, "0.25"),
+        ("<f4", 262_144.0, "0.031"),
+        ("<f4", 262_143.0, None),
+        ("<f8", 4.02e6, None),
+    ],
+)
+def test_coordinates_too_far_for_single_precision(
+    tmp_path, kind, northing, step
+):
+    points = np.zeros((9, 3), kind)
+    points[4, 1] = northing
+    points[5] = np.nan
+    np.save(tmp_path / "a.npy", points)
+    _, notes = notes_of(tmp_path / "a.npy")
+    assert len(notes) == (step is not None)
+    assert step is None or f"steps of {step} m" in notes[0]

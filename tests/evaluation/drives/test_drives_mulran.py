@@ -66,6 +66,20 @@ def test_the_lidar_is_above_the_base(tmp_path):
     )
 
 
+def test_local_coordinates(tmp_path):
+    stamps_ns, X_UB = pose_table()
+    write_drive(tmp_path / "utm", table=(stamps_ns, X_UB))
+    wanted = open_drive(tmp_path / "utm").X_WS
+    X_UB[:, :3, 3] -= UTM
+    write_drive(tmp_path / "local", table=(stamps_ns, X_UB))
+    drive = open_drive(tmp_path / "local")
+    wanted[:, :3, 3] -= UTM - ORIGIN
+    np.testing.assert_allclose(drive.X_WS, wanted, atol=1e-8)
+    assert drive.world_frame == "mulran/local"
+    assert drive.datum is None
+    assert "no UTM coordinates" in drive.notes[-1]
+
+
 def test_utm_loses_nothing(tmp_path):
     stamps_ns, X_UB = pose_table()
     # Two drives, one a thousandth of a millimetre beside the other.
@@ -172,8 +186,8 @@ def mirrored(stamps_ns, X_UB):
     X_UB[:, :3, 2] *= -1.0
 
 
-def local_metres(stamps_ns, X_UB):
-    X_UB[:, :3, 3] -= UTM
+def lost_for_a_while(stamps_ns, X_UB):
+    X_UB[3, :3, 3] = 0.0
 
 
 def other_day(stamps_ns, X_UB):
@@ -192,7 +206,7 @@ def long_gap(stamps_ns, X_UB):
         (nan_value, "row 21: a number is not finite"),
         (no_rotation, "row 21: no rotation matrix"),
         (mirrored, "row 1: no rotation matrix"),
-        (local_metres, "easting: .* is no UTM coordinate"),
+        (lost_for_a_while, "easting: .* is no UTM coordinate"),
         (other_day, "time: no pose for any scan"),
         (long_gap, "time: no pose for the scan at .* nothing for 2.01 s"),
     ],
@@ -211,7 +225,7 @@ def test_poses_that_cannot_be_used(tmp_path, change, fault):
     [
         ("", "no row of numbers"),
         ("1561000444390857631,1,0,0\n", "row"),
-        ("1561000444390857631," + ",".join("abcdefghijkl"), "convert"),
+        ("1561000444390857631," + ",".join("abcdefghijkl"), "'a' is no number"),
         ("12x," + ",".join("100010001000"), "no row of numbers"),
         ("1561000444390857631," * 13, "row"),
     ],
@@ -263,7 +277,18 @@ def test_a_scan_cut_off_in_a_point(tmp_path):
     assert len(open_drive(tmp_path / "s").scan(0)) == 0
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -3e30])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_beams_without_a_return_have_no_finite_point(tmp_path, value):
+    write_drive(tmp_path / "s")
+    path = tmp_path / "s/sensor_data/Ouster" / f"{T0_NS}.bin"
+    points = make_points(20)
+    points[4, 1] = value
+    write_bytes(path, xyzi(points))
+    scan = open_drive(tmp_path / "s").scan(0)
+    assert np.flatnonzero(~np.isfinite(scan["y"])).tolist() == [4]
+
+
+@pytest.mark.parametrize("value", [1.1e4, -3e30])
 def test_a_point_that_is_no_point(tmp_path, value):
     write_drive(tmp_path / "s")
     path = tmp_path / "s/sensor_data/Ouster" / f"{T0_NS}.bin"
@@ -271,7 +296,7 @@ def test_a_point_that_is_no_point(tmp_path, value):
     points[4, 1] = value
     write_bytes(path, xyzi(points))
     drive = open_drive(tmp_path / "s")
-    with pytest.raises(InputError, match=f"^{path}: y: point 4 of 20 is at"):
+    with pytest.raises(InputError, match=f"^{path}: y: point 4 is at"):
         drive.scan(0)
 
 

@@ -16,8 +16,8 @@ from evaluation.drives.text_tables import read_numbers, read_stamped_rows
         (b" , ,\n1 2\n", ""),
         (b"time,x\n", "no row of numbers"),
         (b"", "no row of numbers"),
-        (b"\xff\n", "not a text file"),
-        (b"1 2\n3\n", "columns"),
+        (b"\xff\n", "not UTF-8 text"),
+        (b"1 2\n3\n", "row 2: 1 numbers instead of 2"),
     ],
 )
 def test_tables_that_are_none(tmp_path, text, fault):
@@ -36,3 +36,40 @@ def test_a_table_of_many_gigabytes(tmp_path):
     os.truncate(path, 10 << 30)
     with pytest.raises(InputError, match=f"^{path}: larger than"):
         read_stamped_rows(path, 7, ",")
+
+
+@pytest.mark.parametrize(
+    "encode",
+    [
+        lambda text: b"\xef\xbb\xbf" + text.encode(),
+        lambda text: text.encode("utf-16"),
+        lambda text: b"\xfe\xff" + text.encode("utf-16-be"),
+        lambda text: text.replace("\n", "\r\n").encode(),
+        lambda text: text.replace("\n", "\r").encode(),
+        lambda text: text.replace(" ", "\t").encode(),
+    ],
+)
+@pytest.mark.parametrize("header", ["", "# a remark\n", "x y\n"])
+def test_texts_of_other_editors(tmp_path, encode, header):
+    path = tmp_path / "times.txt"
+    path.write_bytes(encode(f"{header}1 2\n3 4\n"))
+    np.testing.assert_array_equal(read_numbers(path, float), [[1, 2], [3, 4]])
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("1 2\n3 x\n", "row 2: 'x' is no number"),
+        ("1,5 2\n", "row 1: '1,5' is no number"),
+        ("1 2\n1_0 2\n", "row 2: '1_0' is no number"),
+        ("1 2 3\n", None),
+    ],
+)
+def test_faults_of_rows_are_in_our_words(tmp_path, text, fault):
+    path = tmp_path / "times.txt"
+    path.write_text(text)
+    if fault is None:
+        assert read_numbers(path, float).shape == (1, 3)
+        return
+    with pytest.raises(InputError, match=f"^{path}: {fault}$"):
+        read_numbers(path, float)

@@ -201,3 +201,38 @@ def test_scores_that_are_none(drives, scores):
         InputError, match=r"highest: score returned .* instead of 6"
     ):
         run(*drives, Wrong())
+
+
+class SomeNan(Highest):
+    """Lacks some scores of the queries after the second one."""
+
+    part = slice(None)
+
+    def score_in_drive(self, queries, database, *, exhaustive=False):
+        scores = self.score(queries[-1], database)
+        if len(queries) > 2:
+            scores[self.part] = np.nan
+        return scores
+
+
+@pytest.mark.parametrize(
+    ("part", "number"), [(slice(None), 6), (slice(0, None, 2), 3)]
+)
+def test_scores_that_are_nan_name_the_query(
+    drives, tmp_path, monkeypatch, part, number
+):
+    monkeypatch.setattr(SomeNan, "part", part)
+    frame = retrieve(*drives, Highest()).query_frames[2]
+    fault = f"highest: .*query at frame {frame}: {number} of 6 scores are NaN"
+    with pytest.raises(InputError, match=fault):
+        run(*drives, SomeNan())
+    for name in ("db", "q"):
+        (tmp_path / name).mkdir()
+        for k in range(6):
+            points = np.array([[5, 0, k], [9, 1, 0]], np.float32)
+            np.save(tmp_path / name / f"{k}.npy", points)
+    out = tmp_path / "scores.csv"
+    with pytest.raises(InputError, match=r"q/2\.npy: \d of 6 scores"):
+        write_scores(SomeNan(), tmp_path / "db", tmp_path / "q", out)
+    monkeypatch.setattr(SomeNan, "skips_places", True)
+    assert np.isnan(retrieve(*drives, SomeNan()).scores).any()

@@ -1,6 +1,7 @@
 """Surveys of drives that are made while they are read."""
 
 from dataclasses import dataclass, field
+import os
 
 from helpers.small_towns import drive
 import numpy as np
@@ -201,6 +202,21 @@ def test_a_recording_is_identified_by_its_files(tmp_path):
     assert RecordedDrive(folder).identity() != first
     with pytest.raises(InputError, match=r"none: No such file"):
         RecordedDrive(tmp_path / "none").identity()
+
+
+def test_a_copy_of_a_recording_with_a_fingerprint_is_the_same(tmp_path):
+    folder = tmp_path / "metropolis_01"
+    drive(folder, "01", "a")
+    (folder / "fingerprint.txt").write_text("0123 4567\n")
+    first = RecordedDrive(folder).identity()
+    (path,) = folder.glob("*.mcap")
+    os.utime(path, ns=(1, 1))
+    assert RecordedDrive(folder).identity() == first
+    (folder / "fingerprint.txt").write_text("0123 4568\n")
+    assert RecordedDrive(folder).identity() != first
+    (folder / "fingerprint.txt").write_text("0123 4567\n")
+    path.write_bytes(path.read_bytes() + b" ")
+    assert RecordedDrive(folder).identity() != first
 
 
 def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):

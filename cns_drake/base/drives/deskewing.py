@@ -1,0 +1,83 @@
+"""Undoing the distortion of scans that a moving LiDAR takes."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
+
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.errors import InputError
+
+# Number of poses before and after a scan from which its motion is interpolated.
+# The ends of the splines are free; an error there fades to about a quarter from
+# pose to pose.
+_REACH = 4
+# The points of a scan take about as long as from scan to scan. Times of another
+# unit are off by a thousand.
+_MOST_OFF = 300.0
+
+
+def deskew(drive: Drive, index: int) -> np.ndarray:
+    """Returns a scan as if it had been taken at once, at its stamp.
+
+    A point was measured `t` ns after the stamp and is given in the frame that
+    the LiDAR had then. The pose at that time comes from cubic splines through
+    the poses of the drive around the scan: one for positions, and scipy's
+    RotationSpline, with smooth angular rates, for rotations. This pose takes
+    the point into the world. The pose at the stamp takes it into the LiDAR's
+    frame S.
+
+    At the end of the drive the motion is extrapolated over one scan.
+
+    Args:
+        drive: its scans have a field `t` [ns].
+        index: which scan.
+
+    Returns:
+        A copy of the scan with other `x`, `y`, `z`.
+
+    Raises:
+        InputError: if the scan cannot be read or does not say when its
+            points were measured, in nanoseconds, or there are too few poses.
+    """
+    points = drive.scan(index).copy()
+    if "t" not in (points.dtype.names or ()):
+        raise InputError(
+            f"{drive.name}: scan {index}: no field t, the time of each point"
+            " [ns]"
+        )
+    first = max(0, index - _REACH)
+    around = slice(first, index + _REACH + 2)
+    X_WS = drive.X_WS[around]
+    if len(X_WS) < 2:
+        raise InputError(f"{drive.name}: one pose is not enough for a motion")
+    # Differences of int64 are exact; stamps as doubles would not be.
+    stamps_ns = drive.stamps_ns[around] - drive.stamps_ns[index]
+    # Most points share their firing time with a whole column.
+    t_ns, column = np.unique(points["t"], return_inverse=True)
+    scan_s = np.ptp(t_ns) * 1e-9 if len(t_ns) else 0.0
+    step_s = np.diff(stamps_ns).mean() * 1e-9
+    if points["t"].dtype.kind not in "iu" or (
+        scan_s > 0.0 and not 1.0 / _MOST_OFF < scan_s / step_s < _MOST_OFF
+    ):
+        raise InputError(
+            f"{drive.name}: scan {index}: t: from {t_ns[0]:g} to {t_ns[-1]:g};"
+            f" no nanoseconds of a scan, where scans are {step_s:.3g} s apart"
+        )
+    X_WT = _evaluate(stamps_ns * 1e-9, X_WS, t_ns * 1e-9)
+    X_ST = poses.inverse(X_WS[index - first]) @ X_WT
+    p_T = np.stack([points[axis] for axis in "xyz"], axis=1).astype(float)
+    R_ST, p_ST = X_ST[column, :3, :3], X_ST[column, :3, 3]
+    p_S = np.einsum("nij,nj->ni", R_ST, p_T) + p_ST
+    for axis, values in zip("xyz", p_S.T, strict=True):
+        points[axis] = values
+    return points
+
+
+def _evaluate(
+    times: np.ndarray, X_WS: np.ndarray, wanted: np.ndarray
+) -> np.ndarray:
+    """Returns (M, 4, 4) poses at (M,) times, from N at (N,) [s]."""
+    p = CubicSpline(times, X_WS[:, :3, 3])(wanted)
+    R = RotationSpline(times, Rotation.from_matrix(X_WS[:, :3, :3]))(wanted)
+    return poses.make_pose(R.as_matrix(), p)

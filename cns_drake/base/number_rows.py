@@ -1,0 +1,76 @@
+"""Rows of numbers that are written as text."""
+
+from collections.abc import Iterable, Sequence
+import math
+import warnings
+
+import numpy as np
+
+
+def parse_rows(
+    lines: Sequence[str] | Sequence[bytes],
+    dtype: np.dtype,
+    separator: str | None = None,
+    first: int = 0,
+) -> np.ndarray:
+    """Returns rows of numbers, each a line of text.
+
+    Args:
+        lines: N rows.
+        dtype: of a row, with fields; or of each number.
+        separator: between numbers; None is white space.
+        first: the number of rows before these, for errors.
+
+    Returns:
+        (N,) records, or (N, width) numbers.
+
+    Raises:
+        ValueError: that names the first row of another form.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return np.loadtxt(
+                lines,
+                dtype=dtype,
+                delimiter=separator,
+                ndmin=2 if dtype.names is None else 1,
+                comments=None,
+            )
+    except (ValueError, Warning) as error:
+        raise ValueError(_fault(lines, dtype, separator, first)) from error
+
+
+def _fault(
+    lines: Iterable[str | bytes],
+    dtype: np.dtype,
+    separator: str | None,
+    first: int,
+) -> str:
+    """Returns what is wrong with the first row of another form."""
+    kinds = [
+        dtype[name].base.kind
+        for name in dtype.names or ()
+        for _ in range(math.prod(dtype[name].shape))
+    ]
+    for row, line in enumerate(lines, start=first + 1):
+        text = (
+            line.decode("utf-8", "replace") if isinstance(line, bytes) else line
+        )
+        words = [word.strip() for word in text.split(separator)]
+        kinds = kinds or ["f"] * len(words)
+        if len(words) != len(kinds):
+            return f"row {row}: {len(words)} numbers instead of {len(kinds)}"
+        for word, kind in zip(words, kinds, strict=True):
+            if kind != "U" and not is_number(word):
+                return f"row {row}: {word[:40]!r} is no number"
+    return "not rows of numbers"
+
+
+def is_number(word: str) -> bool:
+    """Returns whether a word is a number in decimal digits, NaN or infinite."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return "_" not in word

@@ -1,0 +1,48 @@
+"""Labels and instance ids of geometries, as points on them have them."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+
+# The highest id of a structure.
+MAX_INSTANCE = 2**16 - 1
+# SemanticKITTI's class of moving things of no other moving class.
+OTHER_MOVING_ID = 259
+
+
+class Labels(NamedTuple):
+    """What points on each of G geometries have, (G,) uint16 each.
+
+    Attributes:
+        label: class.
+        moving_label: class while it moves.
+        instance: id of the structure.
+    """
+
+    label: np.ndarray
+    moving_label: np.ndarray
+    instance: np.ndarray
+
+
+def number_structures(names: Sequence[str]) -> Labels:
+    """Returns labels by the names of structures, without classes.
+
+    Instances follow the alphabet, from 1 on.
+
+    Raises:
+        InputError: there are more structures than instance ids.
+    """
+    unique, place = np.unique(np.array(names, str), return_inverse=True)
+    if len(unique) > MAX_INSTANCE:
+        raise InputError(
+            f"the world has {len(unique)} structures, but an instance id has "
+            f"room for {MAX_INSTANCE}"
+        )
+    return Labels(
+        np.zeros(len(names), np.uint16),
+        np.full(len(names), OTHER_MOVING_ID, np.uint16),
+        (place.reshape(-1) + 1).astype(np.uint16),
+    )

@@ -1,0 +1,1 @@
+"""Cameras: their description, the scene that they see, and their systems."""

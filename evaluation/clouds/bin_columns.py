@@ -1,0 +1,183 @@
+"""The number of columns of `.bin` files, which have no header.
+
+A `.bin` is a sequence of float32. KITTI has four for each point: x y z
+intensity; others leave out the intensity, or add a ring, a time or a colour.
+Read with a wrong number, a file is a cloud that was never measured. The values
+show the right one: the columns of a cloud are distributed differently, and read
+with a wrong number of columns they are mixed, hence alike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular, user_errors
+
+# KITTI's, which are taken where the values tell nothing else.
+_USUAL = 4
+FEWEST_COLUMNS = 3
+_CANDIDATES = range(FEWEST_COLUMNS, 13)
+# A multiple of all candidates: windows of so many values begin with a point.
+_WINDOW = 27720
+_WINDOWS = 4
+_MOST_BINS = 16
+# Average number of values in a bin, and number of points that columns need.
+_FILLED = 16
+# Information of the column about the value that counts: at least so much [nat],
+# and so many standard deviations above that of random columns.
+_LEAST_INFORMATION = 0.05
+_SIGNIFICANCE = 5.0
+# Fewer columns that tell almost as much are right.
+_ALMOST = 0.9
+# Where beams alternate between low and high ones, two points look like one with
+# twice as many columns. Then half of them tell at least this share, and the
+# horizontal coordinates of both points differ by at most this total variation.
+_HALF = 0.5
+_NAMES = ("x", "y", "z", "intensity")
+
+
+@dataclass(frozen=True)
+class BinLayout:
+    """What a point of a `.bin` file is.
+
+    Attributes:
+        columns: number of float32 of a point.
+        note: what the user should know about how it was found; may be empty.
+    """
+
+    columns: int
+    note: str = ""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """The type of a point: x y z intensity column_5 and so on."""
+        more = [f"column_{k + 1}" for k in range(len(_NAMES), self.columns)]
+        names = [*_NAMES[: self.columns], *more]
+        return np.dtype([(name, "<f4") for name in names])
+
+
+def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
+    """Returns the layout of `.bin` files that one program wrote.
+
+    Args:
+        files: at least one; the first, the middle and the last are read.
+        columns: number of columns, if the user gives it.
+
+    Raises:
+        InputError: if a file cannot be read, is no whole number of points, or
+            its values do not show how many columns there are.
+    """
+    if columns is not None:
+        return BinLayout(columns)
+    files = [files[k] for k in sorted({0, len(files) // 2, len(files) - 1})]
+    windows: list[np.ndarray] = []
+    sizes = []
+    for path in files:
+        check_regular(path)
+        with user_errors(path), open(path, "rb") as stream:
+            sizes.append(path.stat().st_size)
+            last = max(0, sizes[-1] // 4 - 1) // _WINDOW
+            for k in np.unique(np.linspace(0, last, _WINDOWS).astype(int)):
+                stream.seek(4 * _WINDOW * int(k))
+                windows.append(np.fromfile(stream, "<f4", _WINDOW))
+    values = np.concatenate(windows)
+    places = np.concatenate([np.arange(len(one)) for one in windows])
+    found = _period(values, places)
+    wanted = found or _USUAL
+    for path, size in zip(files, sizes, strict=True):
+        if size % (4 * wanted):
+            known = ", as its values have" if found else " (see --columns N)"
+            raise InputError(
+                f"{path}: {size} bytes is not a whole number of points of"
+                f" {wanted} float32{known}"
+            )
+    layout = BinLayout(wanted)
+    if found == _USUAL or not len(values):
+        return layout
+    if found:
+        names = " ".join(layout.dtype.names or ())
+        return BinLayout(
+            found,
+            f"{files[0]}: its values show {found} columns, {names} (--columns N"
+            " reads others)",
+        )
+    others = [
+        k
+        for k in _CANDIDATES
+        if k != _USUAL and not any(size % (4 * k) for size in sizes)
+    ]
+    # No LiDAR measures a negative intensity.
+    if others and (values[places % _USUAL == 3] < 0.0).any():
+        raise InputError(
+            f"{files[0]}: its values do not show how many columns it has; give"
+            " --columns N"
+        )
+    return BinLayout(
+        _USUAL,
+        f"{files[0]}: read as x y z intensity; its values do not show how many"
+        " columns it has (--columns N)"
+        if others
+        else "",
+    )
+
+
+def _period(values: np.ndarray, places: np.ndarray) -> int | None:
+    """Returns the number of columns that values show, if they show one.
+
+    Args:
+        values: (N,) in the order of the file.
+        places: (N,) their places in it, modulo any number of columns.
+    """
+    num_bins = min(_MOST_BINS, len(values) // _FILLED)
+    candidates = [k for k in _CANDIDATES if k * _FILLED <= len(values)]
+    if num_bins < 2 or not candidates:
+        return None
+    shares = np.linspace(0.0, 1.0, num_bins + 1)[1:-1]
+    edges = np.unique(np.quantile(values, shares, method="lower"))
+    bins = np.searchsorted(edges, values, side="right")
+    tables = {
+        k: np.histogram2d(
+            places % k, bins, (np.arange(k + 1), np.arange(len(edges) + 2))
+        )[0]
+        for k in candidates
+    }
+    told = {k: _information(table) for k, table in tables.items()}
+    most = max(told.values())
+    if most <= _LEAST_INFORMATION:
+        return None
+    found = min(k for k in told if told[k] >= _ALMOST * most)
+    degrees = len(edges) * (found - 1)
+    chance = _SIGNIFICANCE * math.sqrt(2.0 * degrees) / (2.0 * len(values))
+    # Twice as many must have been tried.
+    too_few = min(2 * found, _CANDIDATES[-1]) not in candidates
+    if too_few or told[found] <= chance:
+        return None
+    half = found // 2
+    if found % 2 == 0 and half in told:
+        table = tables[found] / tables[found].sum(axis=1, keepdims=True)
+        apart = np.abs(table[:2] - table[half : half + 2]).sum(axis=1) / 2.0
+        if told[half] >= _HALF * told[found] and (apart < _HALF).all():
+            return half
+    return found
+
+
+def _information(table: np.ndarray) -> float:
+    """Returns how much columns tell about the bin of a value [nat].
+
+    It is the mutual information, less its expectation for columns that tell
+    nothing (Miller and Madow).
+
+    Args:
+        table: (K, M) number of values by column and bin.
+    """
+    number = table.sum()
+    shares = table / number
+    independent = np.outer(shares.sum(axis=1), shares.sum(axis=0))
+    filled = shares > 0.0
+    terms = shares[filled] * np.log(shares[filled] / independent[filled])
+    degrees = (table.shape[0] - 1) * (table.shape[1] - 1)
+    return float(terms.sum() - degrees / (2.0 * number))

@@ -1,0 +1,75 @@
+"""Times of points in the units and types of drivers, and what they move."""
+
+from helpers.drive_files import T0_NS, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from evaluation.drives import open_drive
+from evaluation.drives.deskewing import deskew
+
+NUM = 200
+# A turn takes 100 ms, in which the vehicle drives 1 m.
+TURN = 0.1
+SECONDS = np.arange(NUM) / NUM * TURN
+
+
+def record(folder, name, kind, values):
+    dtype = [(axis, "<f4") for axis in "xyz"] + [(name, kind)]
+    scan = np.zeros(NUM, dtype)
+    scan["x"] = 20.0
+    scan[name] = values
+    poses = [yaw_pose(1.0 * k, 0.0, 0.0, 0.0) for k in range(6)]
+    stamps_ns = [T0_NS + k * 100_000_000 for k in range(6)]
+    return write_recording(folder / "s", [scan] * 6, poses, stamps_ns=stamps_ns)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "scale"),
+    [
+        ("t", "<u4", 1e9),
+        ("t", "<f4", 1.0),
+        ("t", "<f8", 1.0),
+        ("t", "<f4", 1e9),
+        ("t", "<f8", 1e9),
+        ("time", "<f4", 1.0),
+        ("time", "<f8", 1.0),
+        ("time", "<f8", 1e9),
+    ],
+)
+def test_times_that_are_certain(tmp_path, name, kind, scale):
+    drive = open_drive(record(tmp_path, name, kind, SECONDS * scale))
+    scan = drive.scan(2)
+    assert scan["t"].dtype == np.uint32
+    np.testing.assert_allclose(scan["t"], SECONDS * 1e9, rtol=0, atol=8)
+    # Within a turn the points come nearer as the LiDAR does.
+    np.testing.assert_allclose(
+        deskew(drive, 2)["x"], 20.0 + SECONDS / TURN, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "values"),
+    [
+        ("t", "<u4", SECONDS * 1e6),
+        ("t", "<f4", SECONDS * 1e6),
+        ("t", "<f4", SECONDS * 1e3),
+        ("t", "<f4", SECONDS - TURN),
+        ("t", "<f8", SECONDS + T0_NS * 1e-9),
+        ("t", "<f4", np.full(NUM, np.nan)),
+        ("time", "<f4", SECONDS - TURN),
+        ("time", "<f4", SECONDS * 1e3),
+        ("timestamp", "<f8", SECONDS + T0_NS * 1e-9),
+    ],
+)
+def test_times_that_are_not(tmp_path, name, kind, values):
+    drive = open_drive(record(tmp_path, name, kind, values))
+    scan = drive.scan(2)
+    np.testing.assert_array_equal(scan[name], values.astype(kind))
+    with pytest.raises(InputError, match=r"^s: scan 2: (no field t|t: from)"):
+        deskew(drive, 2)
+
+
+def test_points_measured_at_once(tmp_path):
+    drive = open_drive(record(tmp_path, "t", "<u4", np.zeros(NUM)))
+    np.testing.assert_array_equal(deskew(drive, 2), drive.scan(2))

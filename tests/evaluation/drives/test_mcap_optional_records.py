@@ -1,0 +1,167 @@
+"""MCAP files without what the format leaves to the writer, and cut ones."""
+
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+from mcap.reader import SeekingReader
+from mcap.writer import CompressionType, IndexType
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.recording.repair import repair_mcap
+from evaluation.drives import open_drive
+
+NUM = 6
+ATTACHMENTS = {"scenario.json": {"map": "town", "stage": "02"}}
+
+
+def record(folder, **options):
+    rng = np.random.default_rng(3)
+    scans = [make_scan(rng.uniform(-9.0, 9.0, (40, 3))) for _ in range(NUM)]
+    X_WBs = [yaw_pose(2.0 * k, 0.0, 0.0, 0.1 * k) for k in range(NUM)]
+    options = {"chunk_size": 4000, "attachments": ATTACHMENTS} | options
+    return write_recording(folder / "s", scans, X_WBs, **options)
+
+
+def everything(path):
+    drive = open_drive(path)
+    assert drive.notes == ()
+    return (
+        [scan.tobytes() for scan in drive],
+        drive.X_WS.tolist(),
+        drive.odometry.tobytes(),
+        drive.scenario,
+    )
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"index_types": IndexType.NONE},
+        {"index_types": IndexType.CHUNK},
+        {"index_types": IndexType.MESSAGE},
+        {"index_types": IndexType.CHUNK, "use_statistics": False},
+        {"index_types": IndexType.ATTACHMENT},
+        {"use_statistics": False},
+        {"repeat_channels": False},
+        {"repeat_schemas": False},
+        {"use_summary_offsets": False},
+        {"use_chunking": False},
+        {"use_chunking": False, "use_statistics": False},
+        {
+            "index_types": IndexType.NONE,
+            "use_statistics": False,
+            "repeat_channels": False,
+            "repeat_schemas": False,
+            "use_summary_offsets": False,
+        },
+        {"enable_crcs": False, "index_types": IndexType.CHUNK},
+        {"compression": CompressionType.NONE, "index_types": IndexType.NONE},
+        {"compression": CompressionType.LZ4, "index_types": IndexType.NONE},
+    ],
+)
+def test_writers_leave_records_out(tmp_path, options):
+    wanted = everything(record(tmp_path / "whole"))
+    assert everything(record(tmp_path / "bare", **options)) == wanted
+
+
+def drop_some_message_indexes(summary):
+    summary.chunk_indexes[1].message_index_offsets.clear()
+
+
+def drop_one_message_index(summary):
+    offsets = summary.chunk_indexes[1].message_index_offsets
+    del offsets[max(offsets)]
+
+
+def drop_a_chunk_index(summary):
+    del summary.chunk_indexes[1]
+
+
+def drop_attachments(summary):
+    summary.attachment_indexes.clear()
+
+
+def drop_a_schema(summary):
+    del summary.schemas[min(summary.schemas)]
+
+
+def drop_counts(summary):
+    summary.statistics.channel_message_counts.clear()
+
+
+@pytest.mark.parametrize("counted", [True, False])
+@pytest.mark.parametrize(
+    "change",
+    [
+        drop_some_message_indexes,
+        drop_one_message_index,
+        drop_a_chunk_index,
+        drop_attachments,
+        drop_a_schema,
+        drop_counts,
+    ],
+)
+def test_part_of_a_summary(tmp_path, monkeypatch, change, counted):
+    path = record(tmp_path)
+    wanted = everything(path)
+    read = SeekingReader.get_summary
+
+    def forgetful(reader):
+        summary = read(reader)
+        change(summary)
+        if not counted:
+            summary.statistics = None
+        return summary
+
+    monkeypatch.setattr(SeekingReader, "get_summary", forgetful)
+    assert everything(path) == wanted
+
+
+def test_messages_that_are_counted_but_not_there(tmp_path, monkeypatch):
+    path = record(tmp_path)
+    read = SeekingReader.get_summary
+
+    def boastful(reader):
+        summary = read(reader)
+        summary.statistics.message_count += 1
+        return summary
+
+    monkeypatch.setattr(SeekingReader, "get_summary", boastful)
+    with pytest.raises(InputError, match=r"13 of 14 messages .*repair"):
+        open_drive(path)
+
+
+def test_a_recording_that_was_cut_off(tmp_path):
+    path = record(tmp_path, use_chunking=False)
+    data = path.read_bytes()
+    # A scan comes behind the pose of its stamp, and takes most of the bytes.
+    cut = tmp_path / "cut.mcap"
+    for part in (0.4, 0.7):
+        cut.write_bytes(data[: int(part * len(data))])
+        with pytest.raises(InputError, match="cns-drake repair"):
+            open_drive(cut)
+        repair_mcap(cut, tmp_path / f"{part}.mcap")
+        drive = open_drive(tmp_path / f"{part}.mcap")
+        assert 0 < len(drive) < NUM
+        assert drive.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("shifted", "kept"), [([5], [0, 1, 2, 3, 4]), ([0, 4, 5], [1, 2, 3])]
+)
+def test_scans_without_a_pose_at_the_ends(tmp_path, shifted, kept):
+    whole = open_drive(record(tmp_path / "whole"))
+    path = record(tmp_path / "ends", without_pose=shifted)
+    drive = open_drive(path)
+    assert len(drive) == len(kept)
+    np.testing.assert_array_equal(drive.X_WS, whole.X_WS[kept])
+    np.testing.assert_array_equal(drive.stamps_ns, whole.stamps_ns[kept])
+    for k, frame in enumerate(kept):
+        np.testing.assert_array_equal(drive.scan(k), whole.scan(frame))
+    assert f"for {len(shifted)} of 6 scans" in drive.notes[0]
+
+
+def test_scans_without_a_pose_between_others(tmp_path):
+    path = record(tmp_path, without_pose=[2, 5])
+    with pytest.raises(InputError, match=r"scan 2 \(1 of 5 scans have none\)"):
+        _ = open_drive(path).X_WS
