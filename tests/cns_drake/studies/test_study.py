@@ -411,6 +411,7 @@ def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
         experiment(
             town,
             tasks={"map": {"spacing": 20}},
+            both={"lidars": {"lidar": {"columns": 128}}},
             cases={"construction": {"database": {"stage": "first"}}},
         ),
         tmp_path,
