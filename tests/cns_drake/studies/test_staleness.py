@@ -85,7 +85,8 @@ def test_a_quick_study(reproduce, code, tmp_path):
     options = {"quick": True, "settings": ["solid.sensor_height=1.7"]}
     assert reproduce(**options) == SURVEYS | COMPARED | CONTROL
     assert reproduce(**options) == set()
-    assert reproduce(quick=True) == SURVEYS | COMPARED | CONTROL
+    # Results of each setting stay; why places are wrong is of all methods.
+    assert reproduce(quick=True) == COMPARED
     # One drive, and all comparisons with it.
     stage = tmp_path / "town" / "stage_01.sdf"
     change(stage, "</world>", "<!-- Changed. --></world>")
