@@ -425,6 +425,10 @@ def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
                     pass
                 case ["element", name, count] if count.isdecimal():
                     elements.append(_Element(name, int(count), []))
+                case ["element", name, count] if count[1:].isdecimal():
+                    raise ValueError(
+                        f"PLY header: {count}, a negative number of {name}"
+                    )
                 case ["property", "list", _, _, name] if elements:
                     elements[-1].properties.append((name, "list"))
                 case ["property", kind, name] if elements:
@@ -594,7 +598,7 @@ def _read_npy_header(
     except Exception as error:
         # NumPy evaluates the header as Python, and can raise any error.
         raise ValueError(
-            "not an array of numbers as NumPy saves it, or cut off"
+            "not an array of numbers as NumPy saves it (.npy), or cut off"
         ) from error
     if not isinstance(values, np.memmap):
         values.close()

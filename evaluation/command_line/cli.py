@@ -189,11 +189,6 @@ def pr(
         align,
         across_maps=across_maps,
     )
-    for note in dict.fromkeys(
-        chosen.assumption(one.lidar_field) for one in (places, query_drive)
-    ):
-        if note is not None:
-            terminal.note(note)
     exact = None
     if exact_overlaps is not None:
         frames = overlap_truth.compared_frames(places, query_drive, protocol)
@@ -208,6 +203,11 @@ def pr(
         across_maps=across_maps,
         overlaps=exact,
     )
+    for note in dict.fromkeys(
+        chosen.assumption(one.lidar_field) for one in (places, query_drive)
+    ):
+        if note is not None:
+            terminal.note(note)
     if overlaps is not None:
         found = result.retrieval
         assert found.overlaps is not None
@@ -261,8 +261,6 @@ def scores(
 
     protocol = RetrievalProtocol(radius=radius, gate=gate)
     chosen = _chosen_method(method, parameter, sensor_height)
-    if (note := chosen.assumption(None)) is not None:
-        terminal.note(note)
     num_ignored = scan_folders.write_scores(
         chosen,
         database,
@@ -276,6 +274,8 @@ def scores(
     if num_ignored:
         terminal.note(f"{num_ignored} points are not finite, and left out")
     terminal.note(f"wrote {output}")
+    if (note := chosen.assumption(None)) is not None:
+        terminal.note(note)
 
 
 app.command(

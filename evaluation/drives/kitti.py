@@ -263,7 +263,8 @@ def _read_calibration(path: Path) -> dict[str, np.ndarray]:
             try:
                 values = parse_rows([text], np.dtype(float))
             except ValueError as error:
-                raise InputError(f"{path}: {key}: {error}") from error
+                fault = str(error).removeprefix("row 1: ")
+                raise InputError(f"{path}: {key}: {fault}") from error
             if values.shape[1] != 12:
                 raise InputError(
                     f"{path}: {key}: {values.shape[1]} numbers instead of 12"

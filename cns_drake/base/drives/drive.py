@@ -40,6 +40,8 @@ IMU_DTYPE = np.dtype(
 _PATHS = ("route", "waypoints")
 # Fields that move the vehicle beside its path, or turn it round.
 _CHANGES = ("aside", "u_turns")
+# The LiDAR of a scenario that names none.
+_DEFAULT_UNIT = "cns"
 # A drive's name also names files.
 _NAME = re.compile(r"\w[\w.-]*")
 
@@ -202,7 +204,10 @@ class Drive(abc.ABC):
     @property
     def lidar_field(self) -> LidarField | None:
         """Rings and field of view of the LiDAR, if its unit is known."""
-        return lidar_field(self.lidar_section.get("preset"))
+        unit = self.lidar_section.get("preset")
+        if self.scenario and "lidars" not in self.scenario:
+            unit = _DEFAULT_UNIT
+        return lidar_field(unit)
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:

@@ -16,8 +16,8 @@ from evaluation.drives.text_tables import read_numbers, read_stamped_rows
         (b" , ,\n1 2\n", ""),
         (b"time,x\n", "no row of numbers"),
         (b"", "no row of numbers"),
-        (b"\xff\n", "not UTF-8 text"),
-        (b"1 2\n3\n", "row 2: 1 numbers instead of 2"),
+        (b"\xff\n", "not a text file"),
+        (b"1 2\n3\n", "row 2: 1 columns instead of 2"),
     ],
 )
 def test_tables_that_are_none(tmp_path, text, fault):
@@ -59,9 +59,9 @@ def test_texts_of_other_editors(tmp_path, encode, header):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("1 2\n3 x\n", "row 2: 'x' is no number"),
-        ("1,5 2\n", "row 1: '1,5' is no number"),
-        ("1 2\n1_0 2\n", "row 2: '1_0' is no number"),
+        ("1 2\n3 x\n", "row 2: could not convert 'x' to a number"),
+        ("1,5 2\n", "row 1: could not convert '1,5' to a number"),
+        ("1 2\n1_0 2\n", "row 2: could not convert '1_0' to a number"),
         ("1 2 3\n", None),
     ],
 )
