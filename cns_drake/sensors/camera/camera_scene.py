@@ -202,7 +202,7 @@ def check_renderer() -> None:
     done = subprocess.run(words, capture_output=True, check=False)
     if done.returncode:
         raise InputError(
-            "cameras: no renderer: Drake cannot draw here; it needs EGL (Debian: "
+            "cameras: no renderer: Drake cannot draw here, without EGL (Debian: "
             "apt install libegl1)"
         )
 
