@@ -202,8 +202,8 @@ def check_renderer() -> None:
     done = subprocess.run(words, capture_output=True, check=False)
     if done.returncode:
         raise InputError(
-            "cameras: no renderer: Drake cannot draw here, without EGL (Debian: "
-            "apt install libegl1)"
+            "cameras: no renderer: Drake cannot draw here, for lack of EGL "
+            "(Debian: apt install libegl1)"
         )
 
 
