@@ -73,8 +73,13 @@ def one_line(message: object) -> str:
     characters of a terminal.
     """
     text = str(message)
-    shown = "".join(c if c.isprintable() else " " for c in text[:_LONGEST])
+    shown = printable(text[:_LONGEST]).replace("\n", " ")
     return shown if len(text) <= _LONGEST else f"{shown} ..."
+
+
+def printable(text: str) -> str:
+    """Returns a text whose lines a terminal only shows, without obeying."""
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
 
 
 def validated(model: type[_Model], values: object, source: object) -> _Model:

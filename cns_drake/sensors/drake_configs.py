@@ -37,7 +37,7 @@ from cns_drake.sensors.lidar.config import LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.odometry import odometry
 from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.sensors.sensor_config import Section
+from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 
 # What messages are published on.
 Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
@@ -253,6 +253,11 @@ def ApplyOdometryConfig(
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
     section = _section(config, OdometrySection)
+    rate = _RATE if section.rate is None else section.rate
+    if not 1 <= rate <= HIGHEST_RATE:
+        raise ValueError(
+            f"{_caller(config)}: rate: {rate} is not from 1 to {HIGHEST_RATE}"
+        )
     plant = plant or builder.GetSubsystemByName("plant")
     frame, X_PB = _place(config, plant)
     sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
@@ -261,7 +266,7 @@ def ApplyOdometryConfig(
     measured = [sensor.GetOutputPort("odometry")]
     to_lcm = _SignalToLcm(measured, axes, _odometry_values)
     interface = _interface(config, builder, lcm_buses, lcm)
-    period = 1.0 / (section.rate or _RATE)
+    period = 1.0 / rate
     _publish(builder, config, "ODOMETRY", measured, to_lcm, interface, period)
     return sensor
 
@@ -276,17 +281,27 @@ def _section(config: Any, kind: type[Section]) -> Any:
     try:
         return kind.model_validate(given)
     except ValidationError as error:
-        source = f"{type(config).__name__} {config.name}"
-        text = describe_validation_error(source, error, kind)
+        text = describe_validation_error(_caller(config), error, kind)
         raise ValueError(text) from None
 
 
 def _place(config: Any, plant: MultibodyPlant) -> tuple[Frame, RigidTransform]:
-    """Returns the frame P that carries a sensor, and X_PB."""
+    """Returns the frame P that carries a sensor, and X_PB.
+
+    Raises:
+        ValueError: X_PB is not finite.
+    """
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:
         frame = GetScopedFrameByName(plant, config.X_PB.base_frame)
-    return frame, config.X_PB.GetDeterministicValue()
+    X_PB = config.X_PB.GetDeterministicValue()
+    if not np.isfinite(X_PB.GetAsMatrix34()).all():
+        raise ValueError(f"{_caller(config)}: X_PB: a number is not finite")
+    return frame, X_PB
+
+
+def _caller(config: Any) -> str:
+    return f"{type(config).__name__} {config.name}"
 
 
 def _interface(
@@ -295,7 +310,7 @@ def _interface(
     lcm_buses: LcmBuses | None,
     lcm: Interface | None,
 ) -> Interface:
-    caller = f"{type(config).__name__} {config.name}"
+    caller = _caller(config)
     if lcm is not None:
         return lcm
     if lcm_buses is not None:

@@ -31,6 +31,8 @@ _SOLVED = 0.98
 # Scores differ in their last digits between machines, and ties break either
 # way.
 _EQUAL = 1e-3
+# An interval of resampled queries may miss its own value by this.
+_OUTSIDE = 0.05
 _NUMBERS = ("auc", "auc_low", "auc_high")
 
 # (Map, level) -> fingerprint of its drives.
@@ -122,9 +124,12 @@ def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
                 f"{where}: drives: they are not those of level {level} of "
                 f"{row['map']}; run ladder --levels again"
             )
+        if is_gated not in (0, 1):
+            raise InputError(f"{where}: gate: {is_gated} is not 0 or 1")
         # Rounding may put the value just outside its interval.
         is_ordered = low - 1e-9 <= high and low >= -1e-9 and high <= 1 + 1e-9
-        if not (is_ordered and 0.0 <= auc <= 1.0):
+        is_inside = low - _OUTSIDE <= auc <= high + _OUTSIDE
+        if not (is_ordered and is_inside and 0.0 <= auc <= 1.0):
             raise InputError(
                 f"{where}: auc, auc_low, auc_high: impossible values"
             )

@@ -473,7 +473,9 @@ def _read_npy_header(
 ) -> tuple[np.dtype, tuple[int, ...], bool, int]:
     """Returns type, shape, whether stored by columns, and the offset."""
     try:
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
+        # Of a size that NumPy cannot count it would only warn.
+        with np.errstate(over="ignore"):
+            values = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:
         raise
     except Exception as error:
@@ -487,6 +489,21 @@ def _read_npy_header(
     # The file is mapped but never read: reading could end the process.
     by_column = not values.flags.c_contiguous
     return values.dtype, values.shape, by_column, values.offset
+
+
+def read_npy(path: Path) -> np.ndarray:
+    """Returns the array of a file, whose values follow each other in C order.
+
+    Raises:
+        InputError: it cannot be read, or holds no array of the size it names.
+    """
+    with _faults(path):
+        check_regular(path)
+        dtype, shape, _, offset = _read_npy_header(path)
+        count = math.prod(shape)
+        _check_size(path, offset + count * dtype.itemsize, exactly=True)
+        (values,) = _records(path, dtype, offset, count, max(count, 1))
+    return values.reshape(shape)
 
 
 def _read_columns(

@@ -273,6 +273,7 @@ def _called(
 
     @functools.wraps(command)
     def wrapper(**values: Any) -> None:
+        terminal.check_finite(values)
         run(**values)
 
     wrapper.__doc__ = text or command.__doc__
