@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import locale
 import re
 import sys
 import typing
@@ -178,10 +179,17 @@ def shows_traceback() -> bool:
 
 
 def missing_library(error: ImportError) -> str | None:
-    """Returns a line about the shared library that an import lacked.
+    """Returns a line about what the system lacks for an import.
 
-    None if it failed for another reason.
+    It is a shared library, or a locale that has UTF-8; None if the import
+    failed for another reason.
     """
+    encoding = sys.getfilesystemencoding()
+    if "initialization failed" in str(error) and encoding != "utf-8":
+        name = locale.setlocale(locale.LC_CTYPE)
+        return (
+            f"the locale {name} lacks UTF-8, which Drake needs (LC_ALL=C.UTF-8)"
+        )
     match = _MISSING.search(str(error))
     if match is None:
         return None

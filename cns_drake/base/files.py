@@ -64,6 +64,8 @@ def completing(path: Path) -> Iterator[Path]:
     part = _new_part(path)
     try:
         with user_errors(path):
+            # A pipe or link of that name must not be written to.
+            part.unlink(missing_ok=True)
             yield part
             complete_part(path)
     finally:
@@ -170,10 +172,10 @@ def _escaped(character: str) -> str:
 
 
 def _new_part(path: Path) -> Path:
-    """Returns the name of a file in the making, which is free.
+    """Returns the part name of a file that can be replaced.
 
     Raises:
-        InputError: if the file itself cannot be replaced; see `completing`.
+        InputError: if it cannot; see `completing`.
     """
     with user_errors(path):
         mode = path.lstat().st_mode if os.path.lexists(path) else stat.S_IFREG
@@ -186,10 +188,7 @@ def _new_part(path: Path) -> Path:
             raise InputError(f"{path}: a link; give the name of a file")
         if not stat.S_ISREG(mode):
             raise InputError(f"{path}: not a regular file")
-        part = part_path(path)
-        # A killed run may have left it; a pipe or link is not written to.
-        part.unlink(missing_ok=True)
-    return part
+    return part_path(path)
 
 
 def write_part(path: Path, text: str) -> None:

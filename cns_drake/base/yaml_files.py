@@ -87,11 +87,13 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
     line = node.start_mark.line + 1
     if isinstance(node, yaml.ScalarNode):
         # Python cannot print what `0xff...` stands for.
-        if node.tag == _WHOLE and len(node.value) > _LONGEST_NUMBER:
-            if not node.value.isdecimal():
-                raise ValueError(
-                    f"line {line}: a number of {len(node.value)} characters"
-                )
+        text = node.value
+        if (
+            node.tag == _WHOLE
+            and len(text) > _LONGEST_NUMBER
+            and not text.isdecimal()
+        ):
+            raise ValueError(f"line {line}: a number of {len(text)} letters")
         return 1
     if id(node) in sizes:
         if sizes[id(node)] == 0:

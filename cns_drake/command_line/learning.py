@@ -34,7 +34,7 @@ class Part(str, Enum):
 def train(
     *,
     output: Annotated[Path, typer.Option(metavar="FILE.npz")],
-    minutes: Annotated[float, typer.Option(min=0.0)] = 60.0,
+    minutes: Annotated[float, typer.Option(min=0.0, max=10_000.0)] = 60.0,
     cities: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
     steps: Annotated[int | None, typer.Option(min=1)] = None,
     seed: Annotated[int, typer.Option(min=0, max=10_000)] = 1,
@@ -150,7 +150,7 @@ def overlap(
         max_range: Leave out points farther than this along an axis [m].
     """
     with uninterrupted():
-        from cns_drake.base.files import make_folder
+        from cns_drake.base.files import check_writable
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.simulated_drive import DriveSimulation
         from cns_drake.studies.exact_overlap import exact_overlaps
@@ -165,10 +165,9 @@ def overlap(
         max_range=max_range,
     )
     # Before minutes of work.
-    make_folder(output.parent)
-    places, queries = (
-        DriveSimulation(load_scenario(name))() for name in (database, query)
-    )
+    check_writable(output)
+    scenarios = [load_scenario(name) for name in (database, query)]
+    places, queries = (DriveSimulation(one)() for one in scenarios)
     found = exact_overlaps(places, queries, protocol, terminal.track)
     write_overlaps(output, *compared_frames(places, queries, protocol), found)
     print(output)
@@ -192,9 +191,11 @@ def map_truth(
         output: Folder to write.
     """
     with uninterrupted():
+        from cns_drake.base.files import check_new_folder
         from cns_drake.studies.map_truth import open_survey, write_truth
         from evaluation.map_update.sessions import Label
 
+    check_new_folder(output)
     first, second = open_survey(a), open_survey(b)
     counts, table = write_truth(first, second, output, spacing, terminal.track)
     for side, found in counts.items():

@@ -129,8 +129,10 @@ def fresh(
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.redrawing import draw_fresh_cities
         from cns_drake.studies.reproduction import reproduce_maps
+        from evaluation.study.chosen_methods import choose_methods
 
     cluster = choose_cluster(jobs, scheduler)
+    choose_methods(method or ())  # Before cities are drawn.
     cities = draw_fresh_cities(
         maps or (), number or (), output / "cities", cluster
     )

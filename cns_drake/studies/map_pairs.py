@@ -154,11 +154,12 @@ def score_pairs(
     """
     pairs = frozen_pairs()
     rows: list[dict[str, object]] = []
-    for name in names or pairs:
+    for name in names:
         if name not in pairs:
             raise InputError(
                 f"unknown pair '{name}'; there are: {', '.join(pairs)}"
             )
+    for name in names or pairs:
         maps = make_pair(
             pairs[name], output / name, files, spacing, on_note, track
         )

@@ -22,6 +22,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.provenance import digest_file
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
@@ -100,7 +101,7 @@ class AgeCity(Step):
         )
 
     def _made_of(self) -> dict[str, object]:
-        files = sorted(self.source.glob("*.*"))
+        files = MapFolder(self.source).files()
         return {
             "files": {one.name: digest_file(one) for one in files},
             "years": list(self.years),
