@@ -14,7 +14,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 import yaml
 
-from cns_drake.ageing.history import City, Event
+from cns_drake.ageing.history import TAKEN_DOWN, City, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
 from cns_drake.base import map_folder
@@ -180,6 +180,8 @@ def past(
                 lot, use, {"hatchback": 1}, rng
             ):
                 standing[one.name] = one
+                gone = Event(events[-1].year, TAKEN_DOWN, one.name)
+                events.append(replace(gone, detail="empty plot"))
         elif thing.semantic_class == "vegetation":
             height = thing.top - thing.bottom
             if height > _LEAST_TREE and name.startswith("tree"):

@@ -178,14 +178,18 @@ def shows_traceback() -> bool:
     return TRACEBACK_OPTION in sys.argv
 
 
+def has_utf8() -> bool:
+    """Returns whether the locale, or Python's UTF-8 mode, has UTF-8."""
+    return sys.getfilesystemencoding() == "utf-8"
+
+
 def missing_library(error: ImportError) -> str | None:
     """Returns a line about what the system lacks for an import.
 
     It is a shared library, or a locale that has UTF-8; None if the import
     failed for another reason.
     """
-    encoding = sys.getfilesystemencoding()
-    if "initialization failed" in str(error) and encoding != "utf-8":
+    if "initialization failed" in str(error) and not has_utf8():
         name = locale.setlocale(locale.LC_CTYPE)
         return (
             f"the locale {name} lacks UTF-8, which Drake needs (LC_ALL=C.UTF-8)"

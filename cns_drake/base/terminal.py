@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 import contextlib
 import json
+import logging
 import math
 import os
 import sys
@@ -15,6 +16,7 @@ from cns_drake.base import interrupts
 from cns_drake.base.errors import (
     TRACEBACK_OPTION,
     InputError,
+    has_utf8,
     missing_library,
     one_line,
     printable,
@@ -89,6 +91,9 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     message: str | None = None
     look_seldom()
     _open_standard_streams()
+    if not has_utf8():
+        # Drake would print a traceback of its own.
+        logging.getLogger("drake").disabled = True
     try:
         interrupts.interrupt_on_termination()
         _check_arguments()
