@@ -20,7 +20,7 @@ from cns_drake.ageing.rates import check_years
 from cns_drake.base import map_folder
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import draft_folder, user_errors
+from cns_drake.base.files import draft_folder, is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, stage_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.generate import MAX_STRUCTURES, stage_sdf
@@ -292,7 +292,7 @@ def _copy_inputs(
         map_folder.LANES_NAME,
         folder.views.name,
     ):
-        if (folder.path / name).is_file():
+        if is_there(folder.path / name):
             shutil.copyfile(folder.path / name, draft / name)
 
 

@@ -18,7 +18,7 @@ from cns_drake.base.csv_files import (
     whole_number,
 )
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular
+from cns_drake.base.files import check_regular, is_there
 from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.base.xml_elements import read_elements
 from cns_drake.city.geometry import structures
@@ -183,7 +183,7 @@ class OldWorld:
 
     def junctions(self) -> dict[str, BaseGeometry]:
         """Returns the areas of junctions in W by name; none without roads."""
-        if not self.folder.roads.is_file():
+        if not is_there(self.folder.roads):
             return {}
         network = load_road_network(self.folder.roads)
         return {n: network.junction_area(n) for n in sorted(network.junctions)}

@@ -132,6 +132,18 @@ def check_regular(path: Path) -> None:
         raise InputError(f"{path}: not a regular file")
 
 
+def is_there(path: Path) -> bool:
+    """Returns whether there is a file of a name that may be missing.
+
+    Raises:
+        InputError: something else has the name: a folder, a pipe, a dead link.
+    """
+    if not os.path.lexists(path):
+        return False
+    check_regular(path)
+    return True
+
+
 def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
     """Reads a whole file, unless it is larger than a limit [bytes].
 

@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, user_errors
+from cns_drake.base.files import completing, is_there, user_errors
 from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_blocks, read_cloud, read_npy
@@ -221,7 +221,7 @@ def read_session(folder: Path) -> Session:
         raise InputError(f"{path}: a coordinate is not finite")
     file = folder / "poses.txt"
     X_WS = np.zeros((0, 4, 4))
-    if file.is_file():
+    if is_there(file):
         X_WS = read_poses(file)
         scans = len(list((folder / "Scans").glob("*.pcd")))
         if scans != len(X_WS):

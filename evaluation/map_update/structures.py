@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.csv_files import read_records, whole_number, write_csv
+from cns_drake.base.files import is_there
 from evaluation.map_update.sessions import MOVES, SIDES, Label, Pair
 
 
@@ -147,7 +148,7 @@ def class_names(folder: Path) -> dict[int, str]:
         InputError: the table cannot be read.
     """
     path = folder / "structures.csv"
-    if not path.is_file():
+    if not is_there(path):
         return {}
     return {
         whole_number(row["label"], f"{path}: line {line}: label"): row["class"]
