@@ -114,7 +114,7 @@ def check_new_folder(folder: Path) -> None:
             folder.is_symlink() or not folder.is_dir() or any(folder.iterdir())
         ):
             raise InputError(
-                f"{folder}: the folder is there already; give another one"
+                f"{folder}: exists already; give a new folder"
             )
 
 

@@ -70,7 +70,7 @@ def drive_rows(
     for path in its.drives():
         scenario = scenario_files.read_scenario_file(path)
         world = scenario_files.world_file(scenario)
-        if not world.is_file():
+        if not is_there(world):
             continue
         # A map whose drives follow waypoints has no roads.
         roads = [p for p in (its.roads,) if is_there(p)]

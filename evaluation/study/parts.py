@@ -225,9 +225,8 @@ def _fits(tree: Any, hint: Any) -> bool:
     if kind in (Union, UnionType):
         return any(_fits(tree, one) for one in inner)
     kind = NoneType if kind is None else kind
-    if not isinstance(kind, type) or (
-        isinstance(tree, dict) and "scalar" in tree
-    ):
+    is_open = kind is Any or not isinstance(kind, type)
+    if is_open or (isinstance(tree, dict) and "scalar" in tree):
         return True
     found = type(tree)
     if isinstance(tree, dict):
