@@ -113,9 +113,7 @@ def check_new_folder(folder: Path) -> None:
         if os.path.lexists(folder) and (
             folder.is_symlink() or not folder.is_dir() or any(folder.iterdir())
         ):
-            raise InputError(
-                f"{folder}: exists already; give a new folder"
-            )
+            raise InputError(f"{folder}: exists already; give a new folder")
 
 
 def check_regular(path: Path) -> None:

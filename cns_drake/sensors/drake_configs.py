@@ -212,7 +212,7 @@ def ApplyImuConfig(
     """
     section = _section(config, ImuSection)
     plant = plant or builder.GetSubsystemByName("plant")
-    rate = section.sample_rate(_RATE)
+    rate = _checked_rate(config, section.sample_rate(_RATE))
     ideal = section.replaced(rate=None).is_ideal
     imu = add_imu(
         builder,
@@ -253,11 +253,7 @@ def ApplyOdometryConfig(
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
     section = _section(config, OdometrySection)
-    rate = _RATE if section.rate is None else section.rate
-    if not 1 <= rate <= HIGHEST_RATE:
-        raise ValueError(
-            f"{_caller(config)}: rate: {rate} is not from 1 to {HIGHEST_RATE}"
-        )
+    rate = _checked_rate(config, section.rate)
     plant = plant or builder.GetSubsystemByName("plant")
     frame, X_PB = _place(config, plant)
     sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
@@ -298,6 +294,20 @@ def _place(config: Any, plant: MultibodyPlant) -> tuple[Frame, RigidTransform]:
     if not np.isfinite(X_PB.GetAsMatrix34()).all():
         raise ValueError(f"{_caller(config)}: X_PB: a number is not finite")
     return frame, X_PB
+
+
+def _checked_rate(config: Any, rate: int | None) -> int:
+    """Returns the messages a second; 20 if it names none.
+
+    Raises:
+        ValueError: there are none, or too many.
+    """
+    rate = _RATE if rate is None else rate
+    if not 1 <= rate <= HIGHEST_RATE:
+        raise ValueError(
+            f"{_caller(config)}: rate: {rate} is not from 1 to {HIGHEST_RATE}"
+        )
+    return rate
 
 
 def _caller(config: Any) -> str:

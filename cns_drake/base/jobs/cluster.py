@@ -90,10 +90,10 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
             raise InputError(
                 "--jobs and --scheduler exclude each other; give one of them"
             )
-        if not 1 <= num_jobs <= _MOST_JOBS:
-            raise InputError(
-                f"--jobs: {num_jobs} is not from 1 to {_MOST_JOBS}"
-            )
+        if num_jobs < 1:
+            raise InputError(f"--jobs: {num_jobs} is not a positive number")
+        if num_jobs > _MOST_JOBS:
+            raise InputError(f"--jobs: {num_jobs} is more than {_MOST_JOBS}")
         return Cluster(num_workers=num_jobs)
     return Cluster(
         num_workers=num_cores(),
