@@ -87,7 +87,9 @@ def export_pairs(
     held_out: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     spacing: Annotated[float, typer.Option(min=0.1, metavar="METRES")] = 10.0,
     scans: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
-    max_range: Annotated[float, typer.Option(min=1.0, metavar="METRES")] = 50.0,
+    max_range: Annotated[
+        float, typer.Option(min=1.0, max=10_000.0, metavar="METRES")
+    ] = 50.0,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cns_drake.base import points as clouds
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.files import make_folder
+from cns_drake.base.files import make_folder, read_bytes
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
@@ -77,7 +77,7 @@ def localise_pairs(
         for name in methods
     )
     texts = tuple(
-        one.read_bytes().hex() if isinstance(one, Path) else "" for one in named
+        read_bytes(one).hex() if isinstance(one, Path) else "" for one in named
     )
     found = measure_pairs(
         pairs,
