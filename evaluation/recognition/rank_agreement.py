@@ -142,6 +142,8 @@ def read_answers(path: Path, protocol: str | None = None) -> Answers:
         try:
             score = float(row["score"] or "nan")
             position = [float(row.get(one, "nan")) for one in _POSITION]
+            if np.isinf([score, *position]).any():
+                raise ValueError
             values = (
                 score,
                 _flag(row["correct"]),
@@ -150,8 +152,8 @@ def read_answers(path: Path, protocol: str | None = None) -> Answers:
             )
         except ValueError:
             raise InputError(
-                f"{file}: line {line}: correct, has_match, score: not 0 or 1,"
-                " 0 or 1, and a number"
+                f"{file}: line {line}: correct, has_match, score, place: not 0"
+                " or 1, 0 or 1, and numbers that are finite"
             ) from None
         pair = tuple(row[key] for key in _KEYS if key in row)
         group = groups.setdefault(pair, {})

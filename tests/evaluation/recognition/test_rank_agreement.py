@@ -102,6 +102,8 @@ def test_only_methods_of_both(tmp_path):
         (f"{','.join(HEADER)}\n", "no query"),
         (f"{','.join(HEADER)}\nt,1,2,a,2,1,0.5\n", "line 2: correct"),
         (f"{','.join(HEADER)}\nt,1,2,a,1,1,high\n", "line 2: correct"),
+        (f"{','.join(HEADER)}\nt,1,2,a,1,1,-inf\n", "line 2: correct"),
+        (f"{','.join(HEADER)}\nt,1,2,a,1,1,1e1000000\n", "line 2: correct"),
         (f"{','.join(HEADER)}\nt,1,2,a,1,1,0.5\n", "fewer than two methods"),
     ],
 )
