@@ -19,7 +19,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import is_there, read_bytes
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.gazebo_worlds import (
@@ -245,7 +245,7 @@ def load_world(
     plant.Finalize()
 
     table = Path(structures or MapFolder(sdf.parent).structures)
-    if structures is not None or table.is_file():
+    if structures is not None or is_there(table):
         entries = load_structure_table(table)
         notes += _mismatches(table, {entry.name for entry in entries}, found)
     else:

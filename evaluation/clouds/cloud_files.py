@@ -608,6 +608,21 @@ def _read_npy_header(
     return values.dtype, values.shape, by_column, values.offset
 
 
+def read_npy(path: Path) -> np.ndarray:
+    """Returns the array of a file, whose values follow each other in C order.
+
+    Raises:
+        InputError: it cannot be read, or holds no array of the size it names.
+    """
+    with _faults(path):
+        check_regular(path)
+        dtype, shape, _, offset = _read_npy_header(path)
+        count = math.prod(shape)
+        _check_size(path, offset + count * dtype.itemsize, exactly=True)
+        (values,) = _records(path, dtype, offset, count, max(count, 1))
+    return values.reshape(shape)
+
+
 def _read_columns(
     path: Path, dtype: np.dtype, shape: tuple[int, ...], offset: int, block: int
 ) -> Iterator[np.ndarray]:

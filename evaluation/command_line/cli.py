@@ -160,6 +160,7 @@ def pr(
             truck beside it would.
         seed: Seed of the changes of queries.
     """
+    from cns_drake.base import files
     from cns_drake.base.errors import InputError
     from evaluation.recognition import overlap_truth, place_recognition
 
@@ -183,6 +184,11 @@ def pr(
             f"--exclude-recent: it is for a drive against itself, but {query} "
             f"is not {database}"
         )
+    # Before a long work.
+    if overlaps is not None:
+        files.check_writable(overlaps)
+    if exact_overlaps is not None:
+        files.check_regular(exact_overlaps)
     chosen = _chosen_method(method, parameter, sensor_height)
     places, query_drive = options.aligned(
         options.open_noted(database, query, lidar=lidar, columns=columns),

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 import io
 from pathlib import Path
 
@@ -170,7 +170,7 @@ def _seconds_to_ns(text: str) -> int:
 def _to_ns(text: str, unit_ns: int) -> int:
     try:
         stamp_ns = int((Decimal(text) * unit_ns).to_integral_value())
-    except (InvalidOperation, ValueError, OverflowError) as error:
+    except (ArithmeticError, ValueError) as error:
         raise ValueError(f"{text!r} is no time") from error
     if not -(2**63) <= stamp_ns < 2**63:
         raise ValueError(f"{text!r} is no time")

@@ -13,6 +13,7 @@ import numpy as np
 
 from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import is_there
 from cns_drake.base.yaml_files import read_yaml
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
@@ -86,7 +87,7 @@ def read_scenario(folder: Path) -> Mapping | None:
         InputError: if it is not a mapping in YAML.
     """
     path = folder / "scenario.yaml"
-    if not path.is_file():
+    if not is_there(path):
         return None
     scenario = read_yaml(path)
     if not isinstance(scenario, dict):
