@@ -6,21 +6,21 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
-import re
 import shutil
+from xml.etree import ElementTree
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 import yaml
 
-from cns_drake.ageing.history import City, Event
+from cns_drake.ageing.history import TAKEN_DOWN, City, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
 from cns_drake.base import map_folder
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import draft_folder, user_errors
+from cns_drake.base.files import draft_folder, is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, stage_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.generate import MAX_STRUCTURES, stage_sdf
@@ -31,7 +31,11 @@ from cns_drake.imports.map_files import YEAR_COLUMN, stage_size, triangles_in
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import describe_scenario, load_scenario
+from cns_drake.scenarios.scenario_files import (
+    describe_scenario,
+    find_files,
+    load_scenario,
+)
 from cns_drake.scene.semantics import CLASS_IDS
 
 HISTORY_NAME = "history.csv"
@@ -176,6 +180,8 @@ def past(
                 lot, use, {"hatchback": 1}, rng
             ):
                 standing[one.name] = one
+                gone = Event(events[-1].year, TAKEN_DOWN, one.name)
+                events.append(replace(gone, detail="empty plot"))
         elif thing.semantic_class == "vegetation":
             height = thing.top - thing.bottom
             if height > _LEAST_TREE and name.startswith("tree"):
@@ -226,19 +232,20 @@ class _Writing:
 
     def finish(self, stage: str, text: str, meshes: Mapping[str, Mesh]) -> None:
         """Writes the meshes of a stage that are not there yet; counts it."""
-        for place in re.findall("<uri>([^<]+)</uri>", text):
+        for uri in ElementTree.fromstring(text).iter("uri"):
+            place = str(uri.text)
             if place not in self._triangles:
                 obj = self._obj(place, meshes)
-                (self._draft / place).write_text(obj, "utf-8")
-                self._triangles[place] = triangles_in(obj)
+                (self._draft / place).write_bytes(obj)
+                self._triangles[place] = triangles_in(obj.decode("latin-1"))
         self.sizes[stage] = stage_size(text, self._triangles)
 
-    def _obj(self, place: str, meshes: Mapping[str, Mesh]) -> str:
+    def _obj(self, place: str, meshes: Mapping[str, Mesh]) -> bytes:
         path = self._world.folder.path / place
         if path.is_file():
             with user_errors(path):
-                return path.read_text("utf-8")
-        return meshes[Path(place).stem].to_obj()
+                return path.read_bytes()
+        return meshes[Path(place).stem].to_obj().encode()
 
     def table(self, new: Mapping[str, Structure]) -> None:
         """Writes the table of structures: today's, then the others.
@@ -276,15 +283,25 @@ def _copy_inputs(
     folder: MapFolder, drives: Iterable[Path], draft: Path
 ) -> None:
     """Copies roads, views and ways of drives."""
-    names = {map_folder.ROADS_NAME, map_folder.LANES_NAME, folder.views.name}
     for path in drives:
         way = load_scenario(path).waypoints
         if way is not None:
-            names.add(Path(way).name)
-            shutil.copyfile(way, draft / Path(way).name)
-    for name in sorted(names):
-        if (folder.path / name).is_file():
+            shutil.copyfile(way, draft / _way_name(path))
+    for name in (
+        map_folder.ROADS_NAME,
+        map_folder.LANES_NAME,
+        folder.views.name,
+    ):
+        if is_there(folder.path / name):
             shutil.copyfile(folder.path / name, draft / name)
+
+
+def _way_name(drive: Path) -> str:
+    """Returns the name of the copy of a drive's waypoints.
+
+    Two drives may have files of one name, or of that of the map's own.
+    """
+    return f"waypoints_{drive.stem.removeprefix('sequence_')}.csv"
 
 
 def _write_drives(
@@ -305,13 +322,15 @@ def _write_drives(
         if "base" in values:
             scenario = load_scenario(path)
             values = describe_scenario(scenario, folder.path)
+        # Other files, such as recorded traffic, stay where they are.
+        find_files(values, path)
         kept = {
             key: value
             for key, value in values.items()
             if key not in ("name", "map", "stage", "title", "without", "base")
         }
         if "waypoints" in kept:
-            kept["waypoints"] = Path(kept["waypoints"]).name
+            kept["waypoints"] = _way_name(path)
         when = "today" if year == 0 else f"in year {year} of seed {seed}"
         text = yaml.safe_dump(
             {

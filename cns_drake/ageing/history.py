@@ -26,6 +26,7 @@ from cns_drake.ageing.rates import Tally
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.polygons import polygons_of
 from cns_drake.city.geometry.structures import Part, Structure, assemble, block
+from cns_drake.city.geometry.upper_sides import from_above
 from cns_drake.city.growth import stage_structures
 from cns_drake.city.growth.lowering import top_of
 from cns_drake.city.placement.frontage import lines_along, lot_at
@@ -68,6 +69,10 @@ _HIGHEST_NEW = 20.0
 _IN_TOWN = 30.0
 _GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
 _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
+
+
+# Events of structures that no other event names.
+PUT_UP, TAKEN_DOWN = "put_up", "taken_down"
 
 
 @dataclass(frozen=True)
@@ -201,14 +206,27 @@ class City:
             Event(self.year, event, structure, successor, detail)
         )
 
-    def _put(self, one: Structure, foot: BaseGeometry | None = None) -> None:
+    def _put(
+        self,
+        one: Structure,
+        foot: BaseGeometry | None = None,
+        *,
+        event: str = "",
+    ) -> None:
+        """Adds a structure; an event that does not name it is told."""
         self.standing[one.name] = one
         self.new.setdefault(one.name, one)
         self._added[one.name] = one.footprint_W if foot is None else foot
+        if event:
+            self._tell(PUT_UP, one.name, detail=event)
 
-    def _remove(self, name: str) -> None:
+    def _remove(self, name: str, *, event: str = "") -> None:
+        """Takes a structure away; see `_put`."""
+        is_there = name in self.standing
         self.standing.pop(name, None)
         self._added.pop(name, None)
+        if event and is_there:
+            self._tell(TAKEN_DOWN, name, detail=event)
 
     def near(
         self, area: BaseGeometry, ignored: Sequence[str] = ()
@@ -349,7 +367,7 @@ class City:
         """Lets a year pass."""
         self.year += 1
         for name in self._passing:
-            self._remove(name)
+            self._remove(name, event="scaffold")
         self._passing = []
         for lot in self._lots:
             if lot.finished:
@@ -440,13 +458,13 @@ class City:
         for one in plots.site(plot, f"site_{ending}", rng):
             fences = [part for part in lot.parts if "_fence_" in part]
             if not self.near(one.footprint_W, fences):
-                self._put(one)
+                self._put(one, event="site")
                 lot.parts.append(one.name)
         self._tell("site", coming.name, f"site_{ending}")
 
     def _empty(self, lot: _Lot) -> None:
         for part in lot.parts:
-            self._remove(part)
+            self._remove(part, event="plot")
         lot.parts = []
 
     def _leave_empty(self, lot: _Lot) -> None:
@@ -461,7 +479,7 @@ class City:
             bare, stage_structures.use_by_size(bare), cars, rng
         ):
             if not self.near(one.footprint_W):
-                self._put(one)
+                self._put(one, event="empty plot")
                 lot.parts.append(one.name)
 
     def _go_on(self, lot: _Lot) -> None:
@@ -494,6 +512,12 @@ class City:
         rng = self._rng("scaffold", name)
         one = plots.scaffold_before(plot, height, f"scaffold_{name}", rng)
         area = one.footprint_W
+        # Canopies and porches of its own building may be in the way.
+        own = self._triangles(name)
+        own = own[own[:, :, 2].min(axis=1) < plot.z + height]
+        reached = shapely.intersection(from_above(own), area)
+        if shapely.area(reached).sum() > 0.2:
+            return
         blocked = [
             n
             for n in self.near(area)
@@ -502,7 +526,7 @@ class City:
         ]
         free = not area.intersects(self._world.ground.carriageway)
         if free and not blocked and height > 3.5:
-            self._put(one)
+            self._put(one, event="scaffold")
             parts.append(one.name)
 
     def _build_on_free_lots(self) -> None:
@@ -678,7 +702,7 @@ class City:
             is_part = self._furniture[place] != "benches"
             if near and is_part and old in self.standing:
                 self._move(place)
-        self._remove(self._kerbs.get(name, ""))
+        self._remove(self._kerbs.get(name, ""), event="junction")
         stones: list[Part] = []
         ground = self._world.ground
         for kerb in ground.kerbs(1.0):

@@ -1,7 +1,6 @@
 """The city of today: a stage of a map, with all that ageing must see of it."""
 
 from collections.abc import Callable, Sequence
-import csv
 from functools import cached_property
 from pathlib import Path
 import re
@@ -12,9 +11,14 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.csv_files import read_records
+from cns_drake.base.csv_files import (
+    number_within,
+    read_records,
+    read_rows,
+    whole_number,
+)
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
+from cns_drake.base.files import check_regular, is_there
 from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.base.xml_elements import read_elements
 from cns_drake.city.geometry import structures
@@ -23,11 +27,15 @@ from cns_drake.city.geometry.structures import triple
 from cns_drake.city.geometry.upper_sides import from_above
 from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.roads.network import load_road_network
+from cns_drake.scene.surfaces import LARGEST_SIZE
 from cns_drake.scene.world import load_world
 from cns_drake.transient import world_structures
 
 # The ground is known this far around buildings [m].
 _AROUND = 40.0
+_NO_POSE = "0 0 0 0 0 0"
+# The only files that a stage may name: the aged map gets copies of them.
+_OWN_MESH = re.compile(rf"{MESH_FOLDER}/[^/]+\.obj")
 
 
 class OldWorld:
@@ -56,7 +64,7 @@ class OldWorld:
         self.built = {
             name: int(row[YEAR_COLUMN])
             for name, row in self.rows.items()
-            if row.get(YEAR_COLUMN, "").isdecimal()
+            if row.get(YEAR_COLUMN)
         }
         self.today = max(self.built.values(), default=None)
         self.things = {
@@ -67,10 +75,16 @@ class OldWorld:
 
     def _read_table(self) -> None:
         path = self.folder.structures
-        with user_errors(path), path.open(encoding="utf-8") as file:
-            self.columns = next(csv.reader(file), [])
-        needed = ("instance", "name", "class", "label", "x", "y", "z", "yaw")
-        records = read_records(path, needed)
+        whole, real = ("instance", "label", YEAR_COLUMN), ("x", "y", "z", "yaw")
+        records = read_records(path, ("name", "class", *whole[:2], *real))
+        self.columns = read_rows(path)[0][1]
+        for line, row in records:
+            where = f"{path}: line {line}"
+            for name in whole:
+                if name != YEAR_COLUMN or row.get(name):
+                    whole_number(row[name], f"{where}: {name}")
+            for name in real:
+                number_within(row[name], LARGEST_SIZE, f"{where}: {name}")
         self.rows = {row["name"]: row for _, row in records}
 
     def of_class(self, *classes: str) -> list[world_structures.Structure]:
@@ -83,22 +97,30 @@ class OldWorld:
         Its footprint is the hull of what is near the ground.
 
         Raises:
-            InputError: a shape or a mesh is of another kind.
+            InputError: a shape or a mesh is of another kind, or the table lacks
+                the structure.
         """
-        row = self.rows[name]
+        row = self.rows.get(name)
+        if row is None:
+            raise InputError(f"{self.folder.structures}: no row for {name}")
         xyz = triple(float(row[axis]) for axis in "xyz")
         yaw = float(row["yaw"])
         X_SW = RigidTransform(RollPitchYaw(0, 0, yaw), xyz).inverse()
         parts, meshes = [], {}
         for visual in self._elements[name]:
-            pose = np.array(visual.findtext("pose", "").split(), float)
+            pose = np.array(visual.findtext("pose", _NO_POSE).split(), float)
             X_SP = X_SW @ RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
             rgb = visual.findtext("material/diffuse", "0.6 0.6 0.6 1").split()
             shape = _shape(visual, self.path)
             if isinstance(shape, structures.MeshShape):
                 file = self.folder.path / MESH_FOLDER / f"{shape.mesh}.obj"
-                with user_errors(file):
+                try:
+                    check_regular(file)
                     meshes[shape.mesh] = read_mesh(file.resolve())
+                except ValueError:
+                    raise InputError(
+                        f"{file}: not an OBJ file that ageing can change"
+                    ) from None
             parts.append(
                 structures.Part(
                     visual.attrib["name"].partition("/")[2],
@@ -161,7 +183,7 @@ class OldWorld:
 
     def junctions(self) -> dict[str, BaseGeometry]:
         """Returns the areas of junctions in W by name; none without roads."""
-        if not self.folder.roads.is_file():
+        if not is_there(self.folder.roads):
             return {}
         network = load_road_network(self.folder.roads)
         return {n: network.junction_area(n) for n in sorted(network.junctions)}
@@ -191,6 +213,12 @@ def _read_visuals(
             f"{path}: not one model with visuals named <structure>/<part>, as "
             "`cns-drake city` and `import` write it"
         )
+    for one in root.iter("uri"):
+        if not _OWN_MESH.fullmatch(one.text or ""):
+            raise InputError(
+                f"{path}: uri: {one.text!r} is no file {MESH_FOLDER}/NAME.obj "
+                "of the map"
+            )
     lines: dict[str, list[str]] = {}
     elements: dict[str, list[ElementTree.Element]] = {}
     for one in visuals:

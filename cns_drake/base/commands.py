@@ -10,6 +10,8 @@ from typing import Annotated, Any, get_args
 
 import typer
 
+from cns_drake.base.terminal import check_finite
+
 Jobs = Annotated[
     int | None,
     typer.Option(
@@ -140,6 +142,7 @@ def _called(
 
     @functools.wraps(command)
     def wrapper(**values: Any) -> None:
+        check_finite(values)
         run(**values)
 
     wrapper.__doc__ = text or command.__doc__

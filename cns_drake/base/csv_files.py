@@ -3,11 +3,16 @@
 from collections.abc import Iterable, Sequence
 import csv
 import io
+import math
 from pathlib import Path
+import re
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
 
+# No table has them; a terminal obeys them.
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
+_WHOLE = re.compile(r"[-+]?[0-9]{1,18}")
 # Column of files of earlier versions -> what it is called now.
 _FORMER_COLUMNS = {
     "radius_told": "gate",
@@ -41,11 +46,16 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
     Cells are stripped of space around them; rows without any are left out.
 
     Raises:
-        InputError: the file cannot be read or is not CSV in UTF-8.
+        InputError: the file cannot be read, is not CSV in UTF-8 or holds a
+            control character.
     """
     text = read_text(path)
     try:
-        reader = csv.reader(text.splitlines(), skipinitialspace=True)
+        lines = text.splitlines()
+        for number, line in enumerate(lines, start=1):
+            if _CONTROL.search(line):
+                raise InputError(f"{path}: line {number}: a control character")
+        reader = csv.reader(lines, skipinitialspace=True)
         rows = [
             (reader.line_num, [cell.strip() for cell in row]) for row in reader
         ]
@@ -81,3 +91,35 @@ def read_records(
                 f"{path}: line {line}: {len(row)} cells instead of {len(names)}"
             )
     return [(line, dict(zip(names, row, strict=True))) for line, row in rows]
+
+
+def whole_number(text: str, where: object) -> int:
+    """Returns the whole number that a cell or an argument holds.
+
+    Raises:
+        InputError: it holds none, or one of more than 18 digits; the message
+            begins with the place.
+    """
+    if not _WHOLE.fullmatch(text):
+        raise InputError(
+            f"{where}: {text[:40]!r} is no whole number of up to 18 digits"
+        )
+    return int(text)
+
+
+def number_within(text: str, largest: float, where: object) -> float:
+    """Returns the number that a cell holds.
+
+    Raises:
+        InputError: it holds none, or one beyond the largest, of either sign;
+            the message begins with the place.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= largest:
+        raise InputError(
+            f"{where}: {text[:40]!r} is no number up to {largest:g}"
+        )
+    return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import locale
 import re
 import sys
 import typing
@@ -73,8 +74,13 @@ def one_line(message: object) -> str:
     characters of a terminal.
     """
     text = str(message)
-    shown = "".join(c if c.isprintable() else " " for c in text[:_LONGEST])
+    shown = printable(text[:_LONGEST]).replace("\n", " ")
     return shown if len(text) <= _LONGEST else f"{shown} ..."
+
+
+def printable(text: str) -> str:
+    """Returns a text whose lines a terminal only shows, without obeying."""
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
 
 
 def validated(model: type[_Model], values: object, source: object) -> _Model:
@@ -172,11 +178,22 @@ def shows_traceback() -> bool:
     return TRACEBACK_OPTION in sys.argv
 
 
-def missing_library(error: ImportError) -> str | None:
-    """Returns a line about the shared library that an import lacked.
+def has_utf8() -> bool:
+    """Returns whether the locale, or Python's UTF-8 mode, has UTF-8."""
+    return sys.getfilesystemencoding() == "utf-8"
 
-    None if it failed for another reason.
+
+def missing_library(error: ImportError) -> str | None:
+    """Returns a line about what the system lacks for an import.
+
+    It is a shared library, or a locale that has UTF-8; None if the import
+    failed for another reason.
     """
+    if "initialization failed" in str(error) and not has_utf8():
+        name = locale.setlocale(locale.LC_CTYPE)
+        return (
+            f"the locale {name} lacks UTF-8, which Drake needs (LC_ALL=C.UTF-8)"
+        )
     match = _MISSING.search(str(error))
     if match is None:
         return None

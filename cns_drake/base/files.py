@@ -59,11 +59,14 @@ def completing(path: Path) -> Iterator[Path]:
     an exception it is removed.
 
     Raises:
-        InputError: if it cannot be written.
+        InputError: if it cannot be written, or the name is that of a folder, a
+            link, a device or a pipe.
     """
-    part = part_path(path)
+    part = _new_part(path)
     try:
         with user_errors(path):
+            # A pipe or link of that name must not be written to.
+            part.unlink(missing_ok=True)
             yield part
             complete_part(path)
     finally:
@@ -82,19 +85,36 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     Raises:
         InputError: if it cannot be written.
     """
-    part = part_path(folder)
-    draft = part / folder.resolve().name
+    # `.` has no name.
+    place = Path(os.path.abspath(folder))
+    part = part_path(place)
+    draft = part / place.name
+    if not replaces:
+        check_new_folder(folder)
     try:
         with user_errors(folder):
             # A run that was killed may have left one behind.
             shutil.rmtree(part, ignore_errors=True)
             draft.mkdir(parents=True)
             yield draft
-            if replaces and os.path.lexists(folder):
-                os.replace(folder, part / "replaced")
-            os.replace(draft, folder)
+            if replaces and os.path.lexists(place):
+                os.replace(place, part / "replaced")
+            os.replace(draft, place)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def check_new_folder(folder: Path) -> None:
+    """Refuses a folder to write whose name is taken; it may be there, empty.
+
+    Raises:
+        InputError: the folder holds files, or something else has its name.
+    """
+    with user_errors(folder):
+        if os.path.lexists(folder) and (
+            folder.is_symlink() or not folder.is_dir() or any(folder.iterdir())
+        ):
+            raise InputError(f"{folder}: exists already; give a new folder")
 
 
 def check_regular(path: Path) -> None:
@@ -109,6 +129,18 @@ def check_regular(path: Path) -> None:
         raise InputError(f"{path}: Is a directory")
     if not stat.S_ISREG(mode):
         raise InputError(f"{path}: not a regular file")
+
+
+def is_there(path: Path) -> bool:
+    """Returns whether there is a file of a name that may be missing.
+
+    Raises:
+        InputError: something else has the name: a folder, a pipe, a dead link.
+    """
+    if not os.path.lexists(path):
+        return False
+    check_regular(path)
+    return True
 
 
 def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
@@ -174,13 +206,33 @@ def _escaped(character: str) -> str:
     return "".join(f"%{octet:02X}" for octet in octets)
 
 
+def _new_part(path: Path) -> Path:
+    """Returns the part name of a file that can be replaced.
+
+    Raises:
+        InputError: if it cannot; see `completing`.
+    """
+    with user_errors(path):
+        mode = path.lstat().st_mode if os.path.lexists(path) else stat.S_IFREG
+        if stat.S_ISDIR(mode):
+            raise InputError(
+                f"{path}: a folder has this name; give another file name"
+            )
+        if stat.S_ISLNK(mode):
+            # What others linked must not be written, nor the link be lost.
+            raise InputError(f"{path}: a link; give the name of a file")
+        if not stat.S_ISREG(mode):
+            raise InputError(f"{path}: not a regular file")
+    return part_path(path)
+
+
 def write_part(path: Path, text: str) -> None:
     """Writes text under the part name of `path`, down to the disk.
 
     Raises:
         InputError: if that fails, e.g. on a full disk.
     """
-    part = part_path(path)
+    part = _new_part(path)
     # Several files must all be whole before the first gets its name.
     with user_errors(part), open(part, "w", encoding="utf-8") as stream:
         stream.write(text)
@@ -222,12 +274,8 @@ def check_writable(path: Path) -> None:
         InputError: if the file could not be written.
     """
     with user_errors(path):
-        if path.is_dir():
-            raise InputError(
-                f"{path}: a folder has this name; give another file name"
-            )
+        part = _new_part(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = part_path(path)
         part.touch()
         part.unlink()
 

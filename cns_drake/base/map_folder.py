@@ -47,6 +47,17 @@ class MapFolder:
         self.meshes = path / MESH_FOLDER
         self.views = path / "views.yaml"
 
+    def files(self) -> list[Path]:
+        """Returns the files beside the folders, in order.
+
+        Hidden files, such as locks of editors, are none of the map's.
+        """
+        return [
+            path
+            for path in sorted(self.path.glob("*.*"))
+            if path.is_file() and not path.name.startswith(".")
+        ]
+
     def stage(self, stage: str) -> Path:
         """Returns the SDF file of a stage."""
         return self.path / stage_name(stage)

@@ -60,10 +60,10 @@ def _fault(
         words = [word.strip() for word in text.split(separator)]
         kinds = kinds or ["f"] * len(words)
         if len(words) != len(kinds):
-            return f"row {row}: {len(words)} numbers instead of {len(kinds)}"
+            return f"row {row}: {len(words)} columns instead of {len(kinds)}"
         for word, kind in zip(words, kinds, strict=True):
             if kind != "U" and not is_number(word):
-                return f"row {row}: {word[:40]!r} is no number"
+                return f"row {row}: could not convert {word[:40]!r} to a number"
     return "not rows of numbers"
 
 

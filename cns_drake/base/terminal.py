@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 import json
+import logging
 import math
 import os
 import sys
@@ -16,7 +17,10 @@ from cns_drake.base import interrupts
 from cns_drake.base.errors import (
     TRACEBACK_OPTION,
     InputError,
+    has_utf8,
     missing_library,
+    one_line,
+    printable,
     shows_traceback,
 )
 from cns_drake.base.process import look_seldom
@@ -128,6 +132,9 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     message: str | None = None
     look_seldom()
     _open_standard_streams()
+    if not has_utf8():
+        # Drake would print a traceback of its own.
+        logging.getLogger("drake").disabled = True
     try:
         interrupts.interrupt_on_termination()
         _check_arguments()
@@ -160,6 +167,11 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         status = 2
         if error.filename is None:
             _forget_results()
+    except RuntimeError as error:
+        # `Path.resolve` has no error of its own for a link to itself.
+        if not str(error).startswith("Symlink loop"):
+            raise
+        message, status = f"error: {error}", 2
     except ImportError as error:
         fault = missing_library(error)
         if fault is None:
@@ -175,7 +187,8 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     # The command has done its work; nothing is left to interrupt.
     interrupts.ignore_interrupts()
     if message is not None:
-        print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+        text = one_line(" ".join(message.split()))
+        print(f"{program}: {text}", file=sys.stderr)
     if status == interrupts.INTERRUPTED:
         interrupts.end_interrupted()
     raise SystemExit(status)
@@ -236,9 +249,24 @@ def track(items: Iterable[Any], description: str, total: int) -> Iterator[Any]:
         progress.remove_task(task)
 
 
+def check_finite(values: Mapping[str, object]) -> None:
+    """Refuses values of options, by name, that are no finite numbers.
+
+    Typer lets NaN pass any bound.
+
+    Raises:
+        InputError: it names the option.
+    """
+    for name, value in values.items():
+        for one in value if isinstance(value, tuple) else (value,):
+            if isinstance(one, float) and not math.isfinite(one):
+                option = name.replace("_", "-")
+                raise InputError(f"--{option}: {one} is not a finite number")
+
+
 def note(message: str) -> None:
     """Prints a note for the user on stderr."""
-    print(message, file=sys.stderr)
+    print(printable(message), file=sys.stderr)
 
 
 def print_json(values: dict) -> None:
@@ -251,7 +279,7 @@ def print_rows(rows: Iterable[tuple[str, str]]) -> None:
     rows = list(rows)
     width = max(len(name) for name, _ in rows)
     for name, value in rows:
-        print(f"{name:<{width}}  {value}")
+        print(printable(f"{name:<{width}}  {value}"))
 
 
 def number(value: float | None) -> str:

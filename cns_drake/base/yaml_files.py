@@ -11,6 +11,8 @@ from cns_drake.base.files import read_bytes
 # Files written by hand stay far below both.
 _DEEPEST = 50
 _MOST_NODES = 1_000_000
+_LONGEST_NUMBER = 100
+_WHOLE = "tag:yaml.org,2002:int"
 
 
 def read_yaml(path: Path) -> Any:
@@ -82,9 +84,17 @@ def _check_depth(text: str | bytes, loader: type) -> None:
 
 def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
     """Returns how many nodes a node stands for when aliases are resolved."""
-    if isinstance(node, yaml.ScalarNode):
-        return 1
     line = node.start_mark.line + 1
+    if isinstance(node, yaml.ScalarNode):
+        # Python cannot print what `0xff...` stands for.
+        text = node.value
+        if (
+            node.tag == _WHOLE
+            and len(text) > _LONGEST_NUMBER
+            and not text.isdecimal()
+        ):
+            raise ValueError(f"line {line}: a number of {len(text)} letters")
+        return 1
     if id(node) in sizes:
         if sizes[id(node)] == 0:
             raise ValueError(f"line {line}: contains itself")

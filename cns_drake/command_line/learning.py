@@ -31,7 +31,7 @@ class Part(str, Enum):
 def train(
     *,
     output: Annotated[Path, typer.Option(metavar="FILE.npz")],
-    minutes: Annotated[float, typer.Option(min=0.0)] = 60.0,
+    minutes: Annotated[float, typer.Option(min=0.0, max=10_000.0)] = 60.0,
     cities: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
     steps: Annotated[int | None, typer.Option(min=1)] = None,
     seed: Annotated[int, typer.Option(min=0, max=10_000)] = 1,
@@ -87,7 +87,8 @@ def export_pairs(
     spacing: Annotated[float, typer.Option(min=0.1, metavar="METRES")] = 10.0,
     scans: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
     max_range: Annotated[
-        float | None, typer.Option(min=1.0, metavar="METRES")
+        float | None,
+        typer.Option(min=1.0, max=10_000.0, metavar="METRES"),
     ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
@@ -168,9 +169,11 @@ def map_truth(
         output: Folder to write.
     """
     with uninterrupted():
+        from cns_drake.base.files import check_new_folder
         from cns_drake.studies.map_truth import open_survey, write_truth
         from evaluation.map_update.sessions import Label
 
+    check_new_folder(output)
     first, second = open_survey(a), open_survey(b)
     counts, table = write_truth(first, second, output, spacing, terminal.track)
     for side, found in counts.items():

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base.commands import Jobs
+from cns_drake.base.csv_files import whole_number
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.map_folder import MapFolder
@@ -191,7 +192,9 @@ def import_city(
     """
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]
-    more = [int(word) for word in source if word.isdecimal()]
+    more = [
+        whole_number(word, "--years") for word in source if word.isdecimal()
+    ]
     if len(paths) != 1 or (more and not years):
         raise InputError(f"give one file, not {' '.join(source)}")
     path = Path(paths[0])
@@ -369,7 +372,7 @@ def maps_and_years(
     maps, years = [], list(first)
     for word in words:
         if word.removeprefix("-").isdecimal():
-            years.append(int(word))
+            years.append(whole_number(word, "--years"))
         elif word.startswith("-"):
             raise InputError(f"{word}: no such option")
         else:

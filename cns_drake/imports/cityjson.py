@@ -645,11 +645,13 @@ def _geometries(
     kept = []
     for one, geometry in chosen:
         is_whole = not one.parents
-        # A chimney of level 2 stands on a house of level 2.2, too.
+        # Levels of the same number, such as 2 and 2.2, may go together.
         better = [
             other
-            for _, other in chosen
-            if other.lod > geometry.lod
+            for owner, other in chosen
+            if _is_house(one)
+            and _is_house(owner)
+            and other.lod > geometry.lod
             and (is_whole or int(other.lod) > int(geometry.lod))
         ]
         if better and _is_covered(geometry, better):
@@ -657,6 +659,11 @@ def _geometries(
         else:
             kept.append(geometry)
     return kept
+
+
+def _is_house(one: CityObject) -> bool:
+    """Returns whether it is a whole or a part, not a balcony or a room."""
+    return not one.parents or one.kind.endswith("Part")
 
 
 def _is_covered(one: CityGeometry, others: Sequence[CityGeometry]) -> bool:

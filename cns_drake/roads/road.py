@@ -24,6 +24,9 @@ LaneCount = Annotated[int, Field(ge=0, le=4)]
 Corner = Annotated[tuple[Finite, Finite, NonNegative], Strict(False)]
 ProfilePoint = Annotated[tuple[Positive, Finite], Strict(False)]
 
+# A part of the names of mesh files, which must not lead to another folder.
+MeshStem = Annotated[str, Field(pattern=r"^[^/<>&\x00-\x1f\x7f]+$")]
+
 
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -102,8 +105,8 @@ class RoadsFile(_Model):
     """
 
     defaults: RoadStyle = RoadStyle()
-    junctions: dict[str, JunctionEntry] = Field(min_length=1)
-    roads: dict[str, RoadEntry] = Field(min_length=1)
+    junctions: dict[MeshStem, JunctionEntry] = Field(min_length=1)
+    roads: dict[MeshStem, RoadEntry] = Field(min_length=1)
 
 
 def read_roads_file(path: Path | str) -> RoadsFile:

@@ -13,7 +13,7 @@ import zlib
 
 from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
+from cns_drake.base.files import is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios import scenario_files
@@ -70,10 +70,10 @@ def drive_rows(
     for path in its.drives():
         scenario = scenario_files.read_scenario_file(path)
         world = scenario_files.world_file(scenario)
-        if not world.is_file():
+        if not is_there(world):
             continue
         # A map whose drives follow waypoints has no roads.
-        roads = [p for p in (its.roads,) if p.is_file()]
+        roads = [p for p in (its.roads,) if is_there(p)]
         total = 0
         for file in (*scenario.files, *roads, world):
             with user_errors(file):

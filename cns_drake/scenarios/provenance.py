@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 import platform
 
-from cns_drake.base.files import user_errors
+from cns_drake.base.files import check_regular, is_there, user_errors
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__, installed_versions
 from cns_drake.scenarios.scenario import Scenario
@@ -58,7 +58,7 @@ def digest_inputs(
     """
     inputs = {"world": world_file(scenario), "vehicle": vehicle_file()}
     structures = map_folder(scenario).structures
-    if structures.is_file():
+    if is_there(structures):
         inputs["structures"] = structures
     if scenario.ride.profile() is not None:
         inputs["suspension"] = suspension_file()
@@ -131,6 +131,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     Raises:
         InputError: a file cannot be read.
     """
+    check_regular(path)
     digest = hashlib.sha256()
     found = referenced_files(path, watch or FileWatch())
     named = [(f"{n} {size}\n", one) for n, (one, size) in sorted(found.items())]

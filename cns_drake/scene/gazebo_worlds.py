@@ -176,6 +176,8 @@ _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 _DEEPEST = 20
 # Thickness of a plane with a size, below its surface [m].
 _PLANE_THICKNESS = 1e-4
+# The single precision of rays would show on larger shapes [m].
+_ENDLESS = 5000.0
 _EVERY_FLAG = 0xFFFFFFFF
 
 
@@ -437,8 +439,14 @@ class _Simplifier:
                 self.skip("choices of a part of a mesh")
             shape = mesh
         elif shape.tag == "plane" and shape.find("size") is not None:
-            shape = _thin_box(shape, made, link, model)
-            self.skip("planes", how="end at their size, as Gazebo shows them")
+            sides = map(float, (shape.findtext("size") or "").split())
+            if min(sides) > _ENDLESS:
+                what = f"planes of more than {_ENDLESS / 1000:g} km"
+                self.skip(what, how="taken as endless")
+            else:
+                shape = _thin_box(shape, made, link, model)
+                how = "end at their size, as Gazebo shows them"
+                self.skip("planes", how=how)
         elif lacks_size(shape):
             what = f"shapes without a size ({shape.tag})"
             self.skip(what, how="made as large as SDF's default")

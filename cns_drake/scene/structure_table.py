@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.csv_files import read_records
+from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError
 from cns_drake.scene.labels import MAX_INSTANCE, Labels
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
@@ -103,12 +103,7 @@ def load_structure_table(path: Path) -> StructureTable:
     for line, row in read_records(path, ("instance", "name", "class")):
         where = f"{path}: line {line}"
         name, semantic_class = row["name"], row["class"]
-        try:
-            instance = int(row["instance"])
-        except ValueError:
-            raise InputError(
-                f"{where}: instance: {row['instance']!r} is not a number"
-            ) from None
+        instance = whole_number(row["instance"], f"{where}: instance")
         if not 1 <= instance <= MAX_INSTANCE or instance in instances:
             raise InputError(
                 f"{where}: instance: {instance} is not a new number from "

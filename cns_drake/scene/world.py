@@ -19,7 +19,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import is_there, read_bytes
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.gazebo_worlds import (
@@ -75,7 +75,9 @@ def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:
     return names
 
 
-def _check_visible(scene_graph: SceneGraph, sdf: Path) -> set[str]:
+def _check_visible(
+    scene_graph: SceneGraph, sdf: Path, notes: tuple[str, ...]
+) -> set[str]:
     """Checks what a LiDAR can see; returns the names of its structures."""
     inspector, structures = scene_graph.model_inspector(), set()
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
@@ -86,9 +88,10 @@ def _check_visible(scene_graph: SceneGraph, sdf: Path) -> set[str]:
         except InputError as error:
             raise InputError(f"{sdf}: {error}") from None
     if not structures:
+        left_out = "; ".join(note.removeprefix(f"{sdf}: ") for note in notes)
         raise InputError(
             f"{sdf}: the world has no visuals, and so no geometry that a "
-            "LiDAR can see"
+            f"LiDAR can see{left_out and f' ({left_out})'}"
         )
     return structures
 
@@ -234,7 +237,7 @@ def load_world(
             scene_graph.RemoveGeometry(source, geometry_id)
     if missing:
         raise InputError(f"{sdf}: no structure {min(missing)} to leave out")
-    found = _check_visible(scene_graph, sdf)
+    found = _check_visible(scene_graph, sdf, notes)
     notes += _gltf_notes(scene_graph)
     vehicle_model = None
     if vehicle is not None:
@@ -242,7 +245,7 @@ def load_world(
     plant.Finalize()
 
     table = Path(structures or MapFolder(sdf.parent).structures)
-    if structures is not None or table.is_file():
+    if structures is not None or is_there(table):
         entries = load_structure_table(table)
         notes += _mismatches(table, {entry.name for entry in entries}, found)
     else:

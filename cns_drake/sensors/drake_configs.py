@@ -247,7 +247,7 @@ def ApplyImuConfig(
     """
     section = _section(config, ImuSection)
     plant = plant or builder.GetSubsystemByName("plant")
-    rate = section.sample_rate(_RATE)
+    rate = _checked_rate(config, section.sample_rate(_RATE))
     ideal = section.replaced(rate=None).is_ideal
     imu = add_imu(
         builder,
@@ -288,6 +288,7 @@ def ApplyOdometryConfig(
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
     section = _section(config, OdometrySection)
+    rate = _checked_rate(config, section.rate)
     plant = plant or builder.GetSubsystemByName("plant")
     frame, X_PB = _place(config, plant)
     sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
@@ -296,7 +297,7 @@ def ApplyOdometryConfig(
     measured = [sensor.GetOutputPort("odometry")]
     to_lcm = _SignalToLcm(measured, axes, _odometry_values)
     interface = _interface(config, builder, lcm_buses, lcm)
-    period = 1.0 / (section.rate or _RATE)
+    period = 1.0 / rate
     _publish(builder, config, "ODOMETRY", measured, to_lcm, interface, period)
     return sensor
 
@@ -323,23 +324,43 @@ def _section(
     try:
         return kind.model_validate(given)
     except ValidationError as error:
-        text = describe_validation_error(source, error, kind)
+        text = describe_validation_error(_caller(config), error, kind)
         raise ValueError(text) from None
 
 
 def _place(
     config: Config, plant: MultibodyPlant
 ) -> tuple[Frame, RigidTransform]:
-    """Returns the frame P that carries a sensor, and X_PB."""
+    """Returns the frame P that carries a sensor, and X_PB.
+
+    Raises:
+        ValueError: X_PB is not finite.
+    """
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:
         frame = GetScopedFrameByName(plant, config.X_PB.base_frame)
     X_PB = config.X_PB.GetDeterministicValue()
-    if not np.isfinite(X_PB.GetAsMatrix4()).all():
-        raise ValueError(
-            f"{type(config).__name__} {config.name}: X_PB: not finite"
-        )
+    if not np.isfinite(X_PB.GetAsMatrix34()).all():
+        raise ValueError(f"{_caller(config)}: X_PB: a number is not finite")
     return frame, X_PB
+
+
+def _checked_rate(config: Config, rate: int | None) -> int:
+    """Returns the messages a second; 20 if it names none.
+
+    Raises:
+        ValueError: there are none, or too many.
+    """
+    rate = _RATE if rate is None else rate
+    if not 1 <= rate <= HIGHEST_RATE:
+        raise ValueError(
+            f"{_caller(config)}: rate: {rate} is not from 1 to {HIGHEST_RATE}"
+        )
+    return rate
+
+
+def _caller(config: Config) -> str:
+    return f"{type(config).__name__} {config.name}"
 
 
 def _interface(
@@ -348,7 +369,7 @@ def _interface(
     lcm_buses: LcmBuses | None,
     lcm: Interface | None,
 ) -> Interface:
-    caller = f"{type(config).__name__} {config.name}"
+    caller = _caller(config)
     if lcm is not None:
         return lcm
     if lcm_buses is not None:

@@ -24,6 +24,7 @@ from cns_drake.scenarios.planning import shown_beside
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
 from cns_drake.sensors.camera.camera import optical_pose
+from cns_drake.sensors.camera.camera_scene import check_renderer
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.config import KALIBR_FILE
 from cns_drake.sensors.lidar.config import describe_unit
@@ -127,6 +128,8 @@ def simulate(
             if file is not None:
                 check_writable(file)
         RecordingFolder(folder).check(overwrite)
+        if scenario.cameras:
+            check_renderer()
         if not scenario.traffic.is_off:
             on_note(f"{scenario.name}: planning the traffic")
         drive = loaded_drive.load_drive(scenario)

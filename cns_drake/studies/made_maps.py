@@ -89,7 +89,7 @@ class AgeCity(_MakeMap):
         )
 
     def _made_of(self) -> dict[str, object]:
-        files = sorted(p for p in self.source.glob("*.*") if p.is_file())
+        files = MapFolder(self.source).files()
         return {
             "files": {one.name: digest_file(one) for one in files},
             "years": list(self.years),

@@ -35,19 +35,18 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, validated
 from cns_drake.base.files import draft_folder, user_errors, write_text
 from cns_drake.base.process import num_cores
 from cns_drake.base.progress import Track, silent
-from cns_drake.base.yaml_files import read_yaml
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scenarios.provenance import (
-    INPUTS_KEY,
-    combined_digest,
-    digest_inputs,
-)
+from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario, map_folder
+from cns_drake.scenarios.scenario_files import (
+    describe_scenario,
+    load_scenario,
+    map_folder,
+)
 from cns_drake.sensors.lidar.patterns import BeamCoverage, BeamPattern
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
@@ -157,7 +156,7 @@ def open_survey(place: str | Path) -> Survey:
     drive = McapDrive(path)
     _check_instances(drive, path)
     scenario = load_scenario(folder / "scenario.yaml")
-    _check_unchanged(folder, scenario)
+    _check_unchanged(drive, path, scenario)
     simulated = SimulatedDrive(scenario)
     planned = simulated.X_WS[: len(drive)]
     if planned.shape != drive.X_WS.shape or not np.allclose(
@@ -411,20 +410,26 @@ def _check_instances(drive: McapDrive, path: Path) -> None:
         )
 
 
-def _check_unchanged(folder: Path, scenario: Scenario) -> None:
-    """Refuses a recording whose world has changed since."""
-    metadata = read_yaml(folder / "metadata.yaml")
-    try:
-        data = metadata["rosbag2_bagfile_information"]["custom_data"]
-        recorded = data[INPUTS_KEY]
-    except (TypeError, KeyError):
+def _check_unchanged(drive: McapDrive, path: Path, scenario: Scenario) -> None:
+    """Refuses a recording of another scenario, or whose world has changed.
+
+    The files beside a recording may be of another one; the MCAP itself says
+    what it shows.
+    """
+    if drive.scenario is None or not isinstance(drive.inputs, dict):
         raise InputError(
-            f"{folder / 'metadata.yaml'}: {INPUTS_KEY}: missing: the recording "
-            "does not say which world it shows"
-        ) from None
-    if recorded != combined_digest(digest_inputs(scenario)):
+            f"{path}: the recording does not say which world it shows"
+        )
+    recorded = describe_scenario(validated(Scenario, drive.scenario, path))
+    told = describe_scenario(scenario)
+    for field in sorted({*recorded, *told}):
+        if recorded.get(field) != told.get(field):
+            raise InputError(
+                f"{path}: {field}: its scenario.yaml is that of another drive"
+            )
+    if drive.inputs != digest_inputs(scenario):
         raise InputError(
-            f"{folder}: its world ({map_folder(scenario).path}) has changed "
+            f"{path}: its world ({map_folder(scenario).path}) has changed "
             "since it was recorded; record the drive anew"
         )
 

@@ -10,7 +10,7 @@ import sys
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, user_errors
+from cns_drake.base.files import make_folder, read_bytes, user_errors
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter, Step
@@ -216,8 +216,7 @@ def is_recorded(scenario: Scenario, folder: Path) -> bool:
         # Recordings that were damaged later do not count.
         read_yaml(files.scenario)
         read_yaml(files.metadata)["rosbag2_bagfile_information"]
-        with user_errors(files.fingerprint):
-            known = files.fingerprint.read_text("utf-8").split()
+        known = read_bytes(files.fingerprint).decode().split()
     except (InputError, LookupError, TypeError, UnicodeDecodeError):
         return False
     return recording_fingerprint(scenario, digest_inputs(scenario)) in known

@@ -19,6 +19,7 @@ from cns_drake.base.files import check_writable, completing, make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.npz_files import read_npz
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.version import __version__
 from cns_drake.studies.training_drives import DrawnCity, scan_city
@@ -54,6 +55,8 @@ _RATE, _LEAST_RATE, _WARM_UP = 2e-3, 2e-5, 30
 _DECAYS = (0.9, 0.99)
 _GRADIENT = 1.0
 _KEPT_EVERY = 50
+# Greatest size of a state [bytes].
+_MOST_STATE = 1 << 26
 
 Parameters = dict[str, Any]
 
@@ -371,18 +374,19 @@ def _read_state(
     zero = {name: np.zeros_like(one) for name, one in start.items()}
     if not path.exists():
         return (start, zero, zero), []
+    names = [f"{prefix}_{name}" for prefix in _PREFIXES for name in start]
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if str(file["key"]) != key:
-                raise InputError(
-                    f"{path}: the state of another training; delete it"
-                )
-            moments = tuple(
-                {name: file[f"{prefix}_{name}"] for name in start}
-                for prefix in _PREFIXES
+        file = read_npz(path, ("key", "curve", *names), _MOST_STATE)
+        if str(file["key"]) != key:
+            raise InputError(
+                f"{path}: the state of another training; delete it"
             )
-            return moments, [tuple(row) for row in file["curve"].tolist()]
-    except (OSError, ValueError, KeyError, EOFError) as error:
+        moments = tuple(
+            {name: file[f"{prefix}_{name}"] for name in start}
+            for prefix in _PREFIXES
+        )
+        return moments, [tuple(row) for row in file["curve"].tolist()]
+    except (ValueError, KeyError) as error:
         raise InputError(f"{path}: damaged ({error}); delete it") from error
 
 

@@ -140,21 +140,23 @@ class SceneEditing:
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
         triangles = surface.triangles[kept]
+        # The mesh is unscaled, so that parts of one mesh share one again.
+        shape, scale = self._shape(part), np.ones(3)
+        # Boxes and cones are the only such shapes without triangles.
+        if isinstance(shape, geometry.Mesh | geometry.Convex):
+            scale = np.array(shape.scale3())
+        # The old part goes first: the new one may have its very name.
+        properties = [type(one)(one) for one in self._properties(part)]
+        self._remove_part(part)
         if len(triangles):
-            # The mesh is unscaled, so that parts of one mesh share one again.
-            shape, scale = self._shape(part), np.ones(3)
-            # Boxes and cones are the only such shapes without triangles.
-            if isinstance(shape, geometry.Mesh | geometry.Convex):
-                scale = np.array(shape.scale3())
             if np.prod(scale) < 0.0:
                 triangles = triangles[:, ::-1]
             self._register(
                 f"{part.geometry.structure}/{part.name}",
                 part.X_WG,
                 _memory_mesh(surface.p_GVset / scale, triangles, scale),
-                *self._properties(part),
+                *properties,
             )
-        self._remove_part(part)
 
     def add_triangles(
         self,

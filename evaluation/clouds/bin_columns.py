@@ -16,6 +16,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
+from cns_drake.base.poses import FARTHEST
 
 # KITTI's, which are taken where the values tell nothing else.
 _USUAL = 4
@@ -110,8 +111,13 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
         for k in _CANDIDATES
         if k != _USUAL and not any(size % (4 * k) for size in sizes)
     ]
-    # No LiDAR measures a negative intensity.
-    if others and (values[places % _USUAL == 3] < 0.0).any():
+    with np.errstate(invalid="ignore"):
+        if not others or (np.abs(values) >= FARTHEST).any():
+            # What cannot be coordinates is refused where points are read.
+            return layout
+        # No LiDAR measures a negative intensity.
+        is_contrary = (values[places % _USUAL == 3] < 0.0).any()
+    if is_contrary:
         raise InputError(
             f"{files[0]}: its values do not show how many columns it has; give"
             " --columns N"
@@ -119,9 +125,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
     return BinLayout(
         _USUAL,
         f"{files[0]}: read as x y z intensity; its values do not show how many"
-        " columns it has (--columns N)"
-        if others
-        else "",
+        " columns it has (--columns N)",
     )
 
 

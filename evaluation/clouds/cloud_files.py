@@ -425,6 +425,10 @@ def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
                     pass
                 case ["element", name, count] if count.isdecimal():
                     elements.append(_Element(name, int(count), []))
+                case ["element", name, count] if count[1:].isdecimal():
+                    raise ValueError(
+                        f"PLY header: {count}, a negative number of {name}"
+                    )
                 case ["property", "list", _, _, name] if elements:
                     elements[-1].properties.append((name, "list"))
                 case ["property", kind, name] if elements:
@@ -594,7 +598,7 @@ def _read_npy_header(
     except Exception as error:
         # NumPy evaluates the header as Python, and can raise any error.
         raise ValueError(
-            "not an array of numbers as NumPy saves it, or cut off"
+            "not an array of numbers as NumPy saves it (.npy), or cut off"
         ) from error
     if not isinstance(values, np.memmap):
         values.close()
@@ -602,6 +606,21 @@ def _read_npy_header(
     # The file is mapped but never read: reading could end the process.
     by_column = not values.flags.c_contiguous
     return values.dtype, values.shape, by_column, values.offset
+
+
+def read_npy(path: Path) -> np.ndarray:
+    """Returns the array of a file, whose values follow each other in C order.
+
+    Raises:
+        InputError: it cannot be read, or holds no array of the size it names.
+    """
+    with _faults(path):
+        check_regular(path)
+        dtype, shape, _, offset = _read_npy_header(path)
+        count = math.prod(shape)
+        _check_size(path, offset + count * dtype.itemsize, exactly=True)
+        (values,) = _records(path, dtype, offset, count, max(count, 1))
+    return values.reshape(shape)
 
 
 def _read_columns(

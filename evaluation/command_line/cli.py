@@ -160,6 +160,7 @@ def pr(
             truck beside it would.
         seed: Seed of the changes of queries.
     """
+    from cns_drake.base import files
     from cns_drake.base.errors import InputError
     from evaluation.recognition import overlap_truth, place_recognition
 
@@ -183,17 +184,17 @@ def pr(
             f"--exclude-recent: it is for a drive against itself, but {query} "
             f"is not {database}"
         )
+    # Before a long work.
+    if overlaps is not None:
+        files.check_writable(overlaps)
+    if exact_overlaps is not None:
+        files.check_regular(exact_overlaps)
     chosen = _chosen_method(method, parameter, sensor_height)
     places, query_drive = options.aligned(
         options.open_noted(database, query, lidar=lidar, columns=columns),
         align,
         across_maps=across_maps,
     )
-    for note in dict.fromkeys(
-        chosen.assumption(one.lidar_field) for one in (places, query_drive)
-    ):
-        if note is not None:
-            terminal.note(note)
     exact = None
     if exact_overlaps is not None:
         frames = overlap_truth.compared_frames(places, query_drive, protocol)
@@ -208,6 +209,11 @@ def pr(
         across_maps=across_maps,
         overlaps=exact,
     )
+    for note in dict.fromkeys(
+        chosen.assumption(one.lidar_field) for one in (places, query_drive)
+    ):
+        if note is not None:
+            terminal.note(note)
     if overlaps is not None:
         found = result.retrieval
         assert found.overlaps is not None
@@ -261,8 +267,6 @@ def scores(
 
     protocol = RetrievalProtocol(radius=radius, gate=gate)
     chosen = _chosen_method(method, parameter, sensor_height)
-    if (note := chosen.assumption(None)) is not None:
-        terminal.note(note)
     num_ignored = scan_folders.write_scores(
         chosen,
         database,
@@ -276,6 +280,8 @@ def scores(
     if num_ignored:
         terminal.note(f"{num_ignored} points are not finite, and left out")
     terminal.note(f"wrote {output}")
+    if (note := chosen.assumption(None)) is not None:
+        terminal.note(note)
 
 
 app.command(

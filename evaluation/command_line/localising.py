@@ -59,13 +59,14 @@ def localise(
 
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
-    from cns_drake.base.process import num_cores
+    from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.change.drive_change import open_source
     from evaluation.drives import Drive, check_same_world
     from evaluation.localisation import estimators, tracking
     from evaluation.localisation import localise as queries
     from evaluation.study.chosen_methods import parse_setting
 
+    num_jobs = choose_cluster(jobs, None).num_workers
     starts = queries.Starts(start, start_turn, seed)
     if not (math.isfinite(query_spacing) and query_spacing > 0.0):
         raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
@@ -114,7 +115,7 @@ def localise(
             drive,
             frames,
             starts,
-            jobs or num_cores(),
+            num_jobs,
             terminal.track,
         )
     values |= queries.Localisation(rows).to_json()

@@ -97,15 +97,14 @@ def map_sessions(
         output: Folder to write.
     """
     from cns_drake.base.drives.drive import check_same_world
-    from cns_drake.base.errors import InputError
+    from cns_drake.base.files import draft_folder
     from evaluation.map_update.sessions import SIDES, write_session
 
     drives = open_noted(a, b, lidar=lidar, columns=columns)
     check_same_world(*drives)
-    if output.exists():
-        raise InputError(f"{output}: exists already; give a new folder")
-    for side, drive in zip(SIDES, drives, strict=True):
-        write_session(drive, output / side, spacing, terminal.track)
+    with draft_folder(output) as draft:
+        for side, drive in zip(SIDES, drives, strict=True):
+            write_session(drive, draft / side, spacing, terminal.track)
     print(output)
 
 

@@ -22,7 +22,7 @@ import yaml
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import IMU_DTYPE, read_scenario
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_text
+from cns_drake.base.files import is_there, read_text
 from cns_drake.base.yaml_files import parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.scan_files import FileDrive, list_stamped
@@ -96,7 +96,7 @@ class CnsFolderDrive(FileDrive):
 
     @cached_property
     def imu(self) -> np.ndarray | None:
-        if not self._imu_path.is_file():
+        if not is_there(self._imu_path):
             return None
         stamps_ns, values = read_stamped_rows(self._imu_path, 10, ",")
         imu = np.empty(len(values), dtype=IMU_DTYPE)
@@ -117,7 +117,7 @@ def holds_cns(path: Path) -> bool:
 
 def _find_mount(path: Path) -> Path | None:
     for folder in (path, path.parent, path.parent.parent):
-        if (folder / _MOUNT).is_file():
+        if is_there(folder / _MOUNT):
             return folder / _MOUNT
     return None
 

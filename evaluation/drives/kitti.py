@@ -32,7 +32,7 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import index_instances, read_scenario
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes, read_text
+from cns_drake.base.files import is_there, read_bytes, read_text
 from cns_drake.base.json_text import parse_json
 from cns_drake.base.number_rows import parse_rows
 from evaluation.drives.scan_files import BinDrive, read_packed
@@ -101,7 +101,7 @@ class KittiDrive(BinDrive):
             )
         calibration = path / "calib.txt"
         X_CS, unit = np.eye(4), None
-        if calibration.exists():
+        if is_there(calibration):
             rows = _read_calibration(calibration)
             X_CS = pose_matrices(calibration, rows["Tr"])[0]
             if "P0" in rows and rows["P0"][0, 0] > _KITTIS_FOCAL_LENGTH:
@@ -115,7 +115,7 @@ class KittiDrive(BinDrive):
         name = path.resolve().name
         world_frame = f"kitti/{name}"
         first_pose = path / _FIRST_POSE
-        if first_pose.is_file():
+        if is_there(first_pose):
             X_WS = _read_first_pose(first_pose) @ X_WS
             world_frame = "map"
         scenario = read_scenario(path)
@@ -137,7 +137,7 @@ class KittiDrive(BinDrive):
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
         path = self._structures
-        if not path.is_file():
+        if not is_there(path):
             return None
         try:
             table = parse_json(read_bytes(path))
@@ -180,7 +180,7 @@ def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
             raise InputError(f"{file}: the name is no number of six digits")
     numbers = [int(file.stem) for file in files]
     frames = path / _FRAMES
-    if not frames.is_file():
+    if not is_there(frames):
         return files, numbers
     listed = read_numbers(frames, [("number", "U40")])["number"]
     if len(listed) != len(files):
@@ -263,7 +263,8 @@ def _read_calibration(path: Path) -> dict[str, np.ndarray]:
             try:
                 values = parse_rows([text], np.dtype(float))
             except ValueError as error:
-                raise InputError(f"{path}: {key}: {error}") from error
+                fault = str(error).removeprefix("row 1: ")
+                raise InputError(f"{path}: {key}: {fault}") from error
             if values.shape[1] != 12:
                 raise InputError(
                     f"{path}: {key}: {values.shape[1]} numbers instead of 12"

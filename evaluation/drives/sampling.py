@@ -19,6 +19,9 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 
+# Frames that lie closer stand at one place [m].
+_LEAST_SPACING = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class QuerySensor:
@@ -94,7 +97,8 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
     Returns:
         (K,) increasing frame numbers; the first is 0.
     """
-    passed = np.floor(travelled(positions) / spacing).astype(np.int64)
+    steps = travelled(positions) / max(spacing, _LEAST_SPACING)
+    passed = np.floor(steps).astype(np.int64)
     return np.flatnonzero(np.diff(passed, prepend=-1) > 0)
 
 

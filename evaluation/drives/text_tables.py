@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 import io
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_text
+from cns_drake.base.files import decode_text, read_bytes
 from cns_drake.base.number_rows import is_number, parse_rows
 
 _NS_PER_S = 1_000_000_000
@@ -73,7 +73,10 @@ def read_numbers(
         InputError: if there is no such table, it is empty, or a row has another
             form.
     """
-    text = read_text(path, _TABLE_LIMIT_BYTES)
+    try:
+        text = decode_text(read_bytes(path, _TABLE_LIMIT_BYTES))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a text file") from error
     # Only the line ends of files end a line; str.splitlines splits at more.
     lines = [
         line
@@ -167,7 +170,7 @@ def _seconds_to_ns(text: str) -> int:
 def _to_ns(text: str, unit_ns: int) -> int:
     try:
         stamp_ns = int((Decimal(text) * unit_ns).to_integral_value())
-    except (InvalidOperation, ValueError, OverflowError) as error:
+    except (ArithmeticError, ValueError) as error:
         raise ValueError(f"{text!r} is no time") from error
     if not -(2**63) <= stamp_ns < 2**63:
         raise ValueError(f"{text!r} is no time")

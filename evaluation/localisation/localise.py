@@ -316,6 +316,7 @@ def localise(
     global _localiser
     X_WS, stamps = query.X_WS, query.stamps_ns
     R_WT = way_axes(X_WS[:, :3, 3], X_WS)
+    jobs = max(1, min(jobs, len(frames)))
 
     def arguments(frame: int) -> tuple:
         drawn = starts.draw(frame)

@@ -25,10 +25,10 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, user_errors
+from cns_drake.base.files import completing, is_there, user_errors
 from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import Track, silent
-from evaluation.clouds.cloud_files import read_blocks, read_cloud
+from evaluation.clouds.cloud_files import read_blocks, read_cloud, read_npy
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.text_tables import read_poses
 
@@ -221,7 +221,7 @@ def read_session(folder: Path) -> Session:
         raise InputError(f"{path}: a coordinate is not finite")
     file = folder / "poses.txt"
     X_WS = np.zeros((0, 4, 4))
-    if file.is_file():
+    if is_there(file):
         X_WS = read_poses(file)
         scans = len(list((folder / "Scans").glob("*.pcd")))
         if scans != len(X_WS):
@@ -278,16 +278,7 @@ def _read_array(path: Path) -> np.ndarray:
             if name in (points.dtype.names or ()):
                 return points[name]
         raise InputError(f"{path}: no property truth, change or prediction")
-    try:
-        labels = np.load(path, allow_pickle=False)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
-    except Exception as error:
-        # NumPy evaluates the header as Python, and can raise any error.
-        raise InputError(f"{path}: not a NumPy array ({error})") from error
-    if not isinstance(labels, np.ndarray):
-        raise InputError(f"{path}: an archive instead of one array")
-    return labels
+    return read_npy(path)
 
 
 def _session(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
@@ -295,10 +286,28 @@ def _session(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
     for name in ("label", "instance"):
         columns[name] = np.zeros(len(points), np.uint16)
         if name in (points.dtype.names or ()):
-            columns[name] = points[name].astype(np.uint16)
+            columns[name] = _numbers_of(folder / "map.ply", points, name)
     return Session(
         folder, xyz(points), columns["label"], columns["instance"], X_WS
     )
+
+
+def _numbers_of(path: Path, points: np.ndarray, name: str) -> np.ndarray:
+    """Returns a column of a map as (N,) uint16.
+
+    Raises:
+        InputError: a value is no whole number from 0 to 65535.
+    """
+    with np.errstate(invalid="ignore"):
+        numbers = points[name].astype(np.uint16)
+    wrong = numbers != points[name]
+    if wrong.any():
+        place = int(wrong.argmax())
+        raise InputError(
+            f"{path}: {name}: {points[name][place]} of point {place} is no"
+            " whole number from 0 to 65535"
+        )
+    return numbers
 
 
 def _scan_name(number: int) -> str:

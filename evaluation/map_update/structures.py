@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.csv_files import read_records, write_csv
+from cns_drake.base.csv_files import read_records, whole_number, write_csv
+from cns_drake.base.files import is_there
 from evaluation.map_update.sessions import MOVES, SIDES, Label, Pair
 
 
@@ -147,10 +148,10 @@ def class_names(folder: Path) -> dict[int, str]:
         InputError: the table cannot be read.
     """
     path = folder / "structures.csv"
-    if not path.is_file():
+    if not is_there(path):
         return {}
     return {
-        int(row["label"]): row["class"]
-        for _, row in read_records(path, ("label", "class"))
-        if row["label"].isdecimal()
+        whole_number(row["label"], f"{path}: line {line}: label"): row["class"]
+        for line, row in read_records(path, ("label", "class"))
+        if row["label"]
     }

@@ -15,12 +15,13 @@ from functools import lru_cache
 import hashlib
 import math
 from pathlib import Path
-import zipfile
 
 import numpy as np
 from pydantic import computed_field
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular, user_errors
+from cns_drake.base.npz_files import read_npz
 from cns_drake.base.terminal import note
 from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
 
@@ -238,10 +239,9 @@ def load_weights(path: Path) -> Mapping[str, np.ndarray]:
     Raises:
         InputError: it cannot be read, or has another version or size.
     """
-    try:
+    check_regular(path)
+    with user_errors(path):
         changed = path.stat()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
     return _load(path, changed.st_mtime_ns, changed.st_size)
 
 
@@ -253,10 +253,13 @@ def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
             f"{path}: {size} bytes are too many for weights (at most "
             f"{_MOST_BYTES})"
         )
+    shapes: dict[str, tuple[int, ...]] = {SEEN: (2,)}
+    for number, (before, after, _, _) in enumerate(LAYERS):
+        shapes[f"kernel_{number}"] = (9 * before, after)
+        shapes[f"bias_{number}"] = (after,)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            values = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        values = read_npz(path, ("version", *shapes), _MOST_BYTES)
+    except ValueError as error:
         raise InputError(f"{path}: no file of weights ({error})") from error
     version = values.get("version")
     if version is None or version.shape != () or version != WEIGHTS_VERSION:
@@ -264,10 +267,6 @@ def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
             f"{path}: version: {version} instead of {WEIGHTS_VERSION}; train "
             "again with this version of the program"
         )
-    shapes: dict[str, tuple[int, ...]] = {SEEN: (2,)}
-    for number, (before, after, _, _) in enumerate(LAYERS):
-        shapes[f"kernel_{number}"] = (9 * before, after)
-        shapes[f"bias_{number}"] = (after,)
     for name, shape in shapes.items():
         if name not in values:
             raise InputError(f"{path}: {name} is missing")
@@ -276,9 +275,12 @@ def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
             raise InputError(
                 f"{path}: {name}: size {found.shape} instead of {shape}"
             )
-        if found.dtype.kind != "f" or not np.isfinite(found).all():
+        if found.dtype.kind == "f":
+            # Numbers of double precision may be too large for single.
+            with np.errstate(over="ignore"):
+                values[name] = found.astype(np.float32)
+        if found.dtype.kind != "f" or not np.isfinite(values[name]).all():
             raise InputError(f"{path}: {name}: not all are finite numbers")
-        values[name] = found.astype(np.float32)
     return values
 
 

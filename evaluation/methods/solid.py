@@ -140,7 +140,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         return (
             f"solid: the LiDAR is not known; taken for one of {elevations}"
             f" beams from {lowest_deg:g} to {highest_deg:g} deg (--set"
-            " elevations=N, lowest_deg=DEG, highest_deg=DEG)"
+            " elevations=N --set lowest_deg=DEG --set highest_deg=DEG)"
         )
 
     def describe(self, points: np.ndarray) -> Solid:

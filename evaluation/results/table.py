@@ -83,6 +83,10 @@ _RANGES = (
         math.inf,
     ),
 )
+# Their intervals are of resampled queries, and may miss their own value by a
+# little.
+_RESAMPLED = ("auc", "auc_strict", "r1")
+_OUTSIDE, _ROUNDED = 0.05, 1e-9
 # They are numbers of any queries.
 _ALWAYS_KNOWN = ("auc", "auc_strict")
 # Columns of tables of earlier versions -> what makes such a table now.
@@ -444,6 +448,11 @@ def _measured(one: _Line) -> dict[str, Any]:
         raise one.fault("low", "an interval has a low and a high end")
     if low > high:
         raise one.fault("low", f"{low:g} is more than high ({high:g})")
+    if metric in _RESAMPLED and not math.isnan(low):
+        if not (low >= -_ROUNDED and high <= 1.0 + _ROUNDED):
+            raise one.fault("low", "an interval from 0 to 1 at most")
+        if not low - _OUTSIDE <= value <= high + _OUTSIDE:
+            raise one.fault("value", f"{value:g} lies far off its interval")
     n = one.value("n", int)
     return {
         "metric": metric,

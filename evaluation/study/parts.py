@@ -19,20 +19,61 @@ import re
 import struct
 import sys
 import tokenize
-from typing import Any, BinaryIO
+from types import NoneType, UnionType
+from typing import (
+    Any,
+    BinaryIO,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 import zstandard
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, file_name, make_folder
+from cns_drake.base.files import (
+    check_regular,
+    completing,
+    file_name,
+    make_folder,
+)
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter, Step
 
 _LENGTH = struct.Struct("<Q")
+# What methods keep is their authors' affair.
+_METHODS = "evaluation.methods"
 _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
+# Greatest size of a line of inputs [bytes].
+_MOST_INPUTS = 1 << 24
+# Compressed bytes stand for so many times as many, or for so many, at most.
+_MOST_RATIO, _ALWAYS = 200, 1 << 27
+# Errors for a tree of another form or with other fields, and for headers of
+# arrays that NumPy cannot parse.
+_FAULTS = (
+    AttributeError,
+    ImportError,
+    IndexError,
+    KeyError,
+    MemoryError,
+    OverflowError,
+    RecursionError,
+    SyntaxError,
+    TypeError,
+    struct.error,
+    tokenize.TokenError,
+)
+# The form of a tree -> the type of its value; see `_Encoder`.
+_FORMS: dict[str, type] = {
+    "tuple": tuple,
+    "dict": dict,
+    "array": np.ndarray,
+    "bytes": bytes,
+}
 
 
 def encode(value: object) -> bytes:
@@ -70,20 +111,7 @@ def decode(data: bytes) -> Any:
         start = _LENGTH.size + length
         tree = json.loads(data[_LENGTH.size : start])
         return _decode(tree, _read_arrays(data, start))
-    except (
-        # Errors for a tree of another form or with other fields, and for
-        # headers of arrays that NumPy cannot parse.
-        AttributeError,
-        ImportError,
-        IndexError,
-        KeyError,
-        OverflowError,
-        RecursionError,
-        SyntaxError,
-        TypeError,
-        struct.error,
-        tokenize.TokenError,
-    ) as error:
+    except _FAULTS as error:
         raise ValueError(f"{type(error).__name__}: {error}") from error
 
 
@@ -191,6 +219,51 @@ def _find(module: str, name: str) -> Any:
     return found
 
 
+def _fits(tree: Any, hint: Any) -> bool:
+    """Returns whether a tree may be of a type; arrays may hold anything."""
+    kind, inner = get_origin(hint) or hint, get_args(hint)
+    if kind in (Union, UnionType):
+        return any(_fits(tree, one) for one in inner)
+    kind = NoneType if kind is None else kind
+    is_open = kind is Any or not isinstance(kind, type)
+    if is_open or (isinstance(tree, dict) and "scalar" in tree):
+        return True
+    found = type(tree)
+    if isinstance(tree, dict):
+        name = tree.get("dataclass") or tree.get("named")
+        forms = [one for form, one in _FORMS.items() if form in tree]
+        found = _find(*name) if name else forms[0]
+    if not issubclass(found, (kind, int) if kind is float else kind):
+        return False
+    if is_dataclass(found) and not found.__module__.startswith(_METHODS):
+        hints = _hints(found)
+        return all(
+            _fits(tree["fields"][one.name], hints.get(one.name, Any))
+            for one in fields(found)
+        )
+    if found not in (list, tuple, dict) or not inner:
+        return True
+    items = tree if found is list else tree[found.__name__]
+    if found is dict:
+        items = [one for _, one in items]
+    elif kind is tuple and inner[1:] != (...,):
+        return len(items) == len(inner) and all(map(_fits, items, inner))
+    return all(_fits(one, inner[found is dict]) for one in items)
+
+
+def _hints(kind: Any) -> dict[str, Any]:
+    """Returns the annotations of a class or function, if they can be found."""
+    try:
+        return get_type_hints(kind)
+    except NameError:  # A type is imported for type checkers alone.
+        return {}
+
+
+def _most(size: int) -> int:
+    """Returns how many bytes compressed ones may stand for, at most."""
+    return max(_MOST_RATIO * size, _ALWAYS)
+
+
 @dataclass(frozen=True)
 class Part:
     """An intermediate result in a file."""
@@ -211,10 +284,13 @@ class Part:
             raise InputError(f"{self.path}: {error}") from error
         compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
         data = compressor.compress(plain)
+        is_stored = len(plain) > _most(len(data))
+        data = plain if is_stored else data
         header = {
             "digest": fingerprint(inputs),
             "bytes": len(data),
             "inputs": inputs,
+            **({"stored": True} if is_stored else {}),
         }
         make_folder(self.path.parent)
         with (
@@ -247,28 +323,54 @@ class Part:
         Raises:
             InputError: if there is no such part, or it is damaged.
         """
-        with self._opened() as (_, stream):
+        with self._opened() as (header, stream):
             data = stream.read()
-            return decode(zstandard.ZstdDecompressor().decompress(data))
+            if "stored" not in header:
+                data = zstandard.ZstdDecompressor().decompress(data)
+            return decode(data)
+
+    def fits(self, hint: object) -> bool:
+        """Returns whether the value may be of an annotated type.
+
+        Only its beginning is read.
+        """
+        with (
+            contextlib.suppress(InputError),
+            self._opened() as (header, stream),
+        ):
+            source: Any = stream
+            if "stored" not in header:
+                source = zstandard.ZstdDecompressor().stream_reader(stream)
+            (length,) = _LENGTH.unpack(source.read(_LENGTH.size))
+            tree = source.read(min(length, _most(header["bytes"])))
+            return _fits(json.loads(tree), hint)
+        return False
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[tuple[dict, BinaryIO]]:
         """Yields header and value, which must have its full length."""
+        check_regular(self.path)
         try:
             with open(self.path, "rb") as stream:
                 if stream.readline(len(_MAGIC)) != _MAGIC:
                     raise ValueError("no part of a study")
-                header = json.loads(stream.readline())
+                header = json.loads(stream.readline(_MOST_INPUTS))
                 start = stream.tell()
-                if stream.seek(0, 2) - start != header["bytes"]:
+                size = stream.seek(0, 2) - start
+                if size != header["bytes"]:
                     raise ValueError("cut off")
                 stream.seek(start)
+                if "stored" not in header:
+                    claimed = zstandard.frame_content_size(stream.read(18))
+                    if not 0 <= claimed <= _most(size):
+                        raise ValueError(f"{size} bytes stand for {claimed}")
+                    stream.seek(start)
                 yield header, stream
         except OSError as error:
             raise InputError(
                 f"{self.path}: {error.strerror or error}"
             ) from error
-        except (zstandard.ZstdError, ValueError, KeyError, TypeError) as error:
+        except (zstandard.ZstdError, ValueError, *_FAULTS) as error:
             raise InputError(
                 f"{self.path}: damaged ({error}); delete it"
             ) from error
@@ -297,8 +399,11 @@ class MakePart(Step):
         return self.part.path
 
     def is_done(self) -> bool:
-        return self.part.is_current(self._inputs()) and all(
-            file.is_file() for file in self.figures
+        hint = _hints(self.function).get("return", Any)
+        return (
+            self.part.is_current(self._inputs())
+            and all(file.is_file() for file in self.figures)
+            and self.part.fits(hint)
         )
 
     def run(self, reporter: Reporter) -> None:

@@ -39,6 +39,8 @@ Further: TypeAlias = (
 )
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
+# Greatest size of a kept scan; one in a file is smaller [bytes].
+_MOST_BYTES = 1 << 29
 
 
 class MappedDrive(RecentScans):
@@ -192,7 +194,11 @@ class KeptScans:
 
     def scan(self, frame: int) -> np.ndarray:
         """Returns a scan; see `Drive.scan`."""
-        plain = zstandard.decompress(self.packed[frame])
+        packed = self.packed[frame]
+        size = zstandard.frame_content_size(packed)
+        if not 0 <= size <= _MOST_BYTES:
+            raise InputError(f"scan {frame}: {size} bytes; delete its part")
+        plain = zstandard.decompress(packed)
         return np.load(io.BytesIO(plain), allow_pickle=False)
 
 

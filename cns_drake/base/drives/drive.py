@@ -13,6 +13,7 @@ import numpy as np
 
 from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import is_there
 from cns_drake.base.yaml_files import read_yaml
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
@@ -40,6 +41,8 @@ IMU_DTYPE = np.dtype(
 _PATHS = ("route", "waypoints")
 # Fields that move the vehicle beside its path, or turn it round.
 _CHANGES = ("aside", "u_turns")
+# The LiDAR of a scenario that names none.
+_DEFAULT_UNIT = "cns"
 # A drive's name also names files.
 _NAME = re.compile(r"\w[\w.-]*")
 
@@ -84,7 +87,7 @@ def read_scenario(folder: Path) -> Mapping | None:
         InputError: if it is not a mapping in YAML.
     """
     path = folder / "scenario.yaml"
-    if not path.is_file():
+    if not is_there(path):
         return None
     scenario = read_yaml(path)
     if not isinstance(scenario, dict):
@@ -202,7 +205,10 @@ class Drive(abc.ABC):
     @property
     def lidar_field(self) -> LidarField | None:
         """Rings and field of view of the LiDAR, if its unit is known."""
-        return lidar_field(self.lidar_section.get("preset"))
+        unit = self.lidar_section.get("preset")
+        if self.scenario and "lidars" not in self.scenario:
+            unit = _DEFAULT_UNIT
+        return lidar_field(unit)
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:

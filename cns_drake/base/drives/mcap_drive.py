@@ -157,6 +157,12 @@ class McapDrive(Drive):
         return scenario
 
     @property
+    def inputs(self) -> Any:
+        """Digests of the files that it was simulated from, if it says so."""
+        found = self._json("provenance.json")
+        return found.get("inputs_sha256") if isinstance(found, dict) else None
+
+    @property
     def instances(self) -> Mapping[int, Mapping] | None:
         table = self._json("structures.json")
         if table is None:

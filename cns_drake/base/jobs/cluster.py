@@ -33,6 +33,8 @@ _ADDRESS_VARIABLE = "DASK_SCHEDULER_ADDRESS"
 Listener = Callable[..., None]
 # How long a scheduler may take to answer [s].
 _ANSWER_TIMEOUT = 10.0
+# Greatest number of jobs side by side; each is a process.
+_MOST_JOBS = 1024
 # Dask's name for the key of all jobs.
 _KIND = "job"
 
@@ -81,7 +83,7 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
             with a job for each core.
 
     Raises:
-        InputError: if both are given, or the number is not positive.
+        InputError: if both are given, or the number is not from 1 to 1024.
     """
     if num_jobs is not None:
         if scheduler is not None:
@@ -90,6 +92,8 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
             )
         if num_jobs < 1:
             raise InputError(f"--jobs: {num_jobs} is not a positive number")
+        if num_jobs > _MOST_JOBS:
+            raise InputError(f"--jobs: {num_jobs} is more than {_MOST_JOBS}")
         return Cluster(num_workers=num_jobs)
     return Cluster(
         num_workers=num_cores(),

@@ -242,6 +242,9 @@ def generate_city(
             not to be repaired; or if one is gone, and that cannot be.
     """
     world = Path(world)
+    if (world / MESH_FOLDER).is_symlink():
+        # The files there may be another map's.
+        raise InputError(f"{world / MESH_FOLDER}: a link instead of a folder")
     files = _rendered(world, progress, repair_stages)
     with user_errors(world / MESH_FOLDER):
         (world / MESH_FOLDER).mkdir(exist_ok=True)

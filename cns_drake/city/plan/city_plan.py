@@ -17,6 +17,7 @@ from pydantic import (
 
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.yaml_files import read_yaml
+from cns_drake.roads.road import MeshStem
 
 # A city's extent [m]: what is generated grows with its area.
 _LARGEST_SIDE = 10_000.0
@@ -65,7 +66,7 @@ class BuildingPlan(_Model):
     outline: Area | None = None
     yaw_deg: float = 0.0
     height: float = Field(gt=0)
-    kind: str | None = None
+    kind: MeshStem | None = None
 
     @model_validator(mode="after")
     def _has_one_footprint(self) -> BuildingPlan:
@@ -96,7 +97,7 @@ class RowPlan(_Model):
     height: Range
     gap: Range = (0.0, 3.0)
     fill: float = Field(default=1.0, gt=0, le=1)
-    kind: str | None = None
+    kind: MeshStem | None = None
     within: Area | None = None
 
 
@@ -160,7 +161,7 @@ class ScatterPlan(_Model):
     within: Area | None = None
     clearance: float = Field(default=1.5, ge=0)
     ground: tuple[Ground, ...] = ("lawn",)
-    kind: str | None = None
+    kind: MeshStem | None = None
 
 
 class LinePlan(_Model):
@@ -180,7 +181,7 @@ class LinePlan(_Model):
     points: Line
     spacing: Range | None = None
     yaw_deg: float = 0.0
-    kind: str | None = None
+    kind: MeshStem | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
 
 
@@ -199,7 +200,7 @@ class ObjectPlan(_Model):
     object: str
     at: Point
     yaw_deg: float = 0.0
-    kind: str | None = None
+    kind: MeshStem | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
 
 

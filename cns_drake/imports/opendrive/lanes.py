@@ -71,7 +71,10 @@ def is_raised(kind: str, height: float) -> bool:
 
     Its inner edge stands at a height above the road in the file [m].
     """
-    return kind in _RAISED or (height >= _LEAST_KERB and kind not in DRIVEN)
+    has_kerb = height >= _LEAST_KERB
+    return kind in _RAISED or (
+        has_kerb and lane_class(kind) not in ("road", "parking")
+    )
 
 
 @dataclass(frozen=True)

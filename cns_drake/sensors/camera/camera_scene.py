@@ -6,12 +6,17 @@ class.
 """
 
 from collections.abc import Callable, Collection
+import functools
 import json
+import subprocess
+import sys
 
 import numpy as np
 from pydrake.common import MemoryFile
 from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
     FrameId,
     FramePoseVector,
     GeometryFrame,
@@ -21,12 +26,14 @@ from pydrake.geometry import (
     MakeRenderEngineVtk,
     Mesh,
     PerceptionProperties,
+    RenderCameraCore,
     RenderEngineVtkParams,
     RenderLabel,
     SceneGraph,
 )
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
+from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.perception_geometry import (
@@ -99,12 +106,10 @@ class CameraScene(LeafSystem):
         """
         super().__init__()
         self.scene_graph = SceneGraph()
-        try:
-            engine = MakeRenderEngineVtk(RenderEngineVtkParams(lights=_LIGHTS))
-            self.scene_graph.AddRenderer(RENDERER, engine)
-        except RuntimeError as error:
-            fault = " ".join(str(error).split())
-            raise InputError(f"cameras: no renderer: {fault}") from None
+        check_renderer()
+        self.scene_graph.AddRenderer(
+            RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams(lights=_LIGHTS))
+        )
         self._source = self.scene_graph.RegisterSource("cameras")
         geometries = read_perception_geometry(
             scene_graph.model_inspector(), lambda frame: frame not in vehicle
@@ -182,6 +187,24 @@ class CameraScene(LeafSystem):
         for frame, own in self.frames.items():
             poses.set_value(own, RigidTransform(known.X_WFs[known.rows[frame]]))
         output.set_value(poses)
+
+
+@functools.cache
+def check_renderer() -> None:
+    """Checks that Drake can draw an image.
+
+    Another process draws it: without EGL, drawing ends a process.
+
+    Raises:
+        InputError: it cannot.
+    """
+    words = [sys.executable, "-m", __name__]
+    done = subprocess.run(words, capture_output=True, check=False)
+    if done.returncode:
+        raise InputError(
+            "cameras: no renderer: Drake cannot draw here, for lack of EGL "
+            "(Debian: apt install libegl1)"
+        )
 
 
 def _as_mesh(corners: np.ndarray, rgb: tuple[float, float, float]) -> Mesh:
@@ -262,4 +285,16 @@ def _as_mesh(corners: np.ndarray, rgb: tuple[float, float, float]) -> Mesh:
             mesh_file=MemoryFile(text, ".gltf", "mesh.gltf"),
             supporting_files={"mesh.bin": MemoryFile(data, ".bin", "mesh.bin")},
         )
+    )
+
+
+if __name__ == "__main__":
+    core = RenderCameraCore(
+        RENDERER,
+        CameraInfo(4, 4, 1.0),
+        ClippingRange(1.0, 2.0),
+        RigidTransform(),
+    )
+    MakeRenderEngineVtk(RenderEngineVtkParams()).RenderColorImage(
+        ColorRenderCamera(core), ImageRgba8U(4, 4)
     )

@@ -195,9 +195,8 @@ class LimitedPattern(BeamPattern):
         self.min_range, self.max_range = whole.min_range, whole.max_range
         self.period, self.repeats = whole.period, whole.repeats
         self._whole = whole
-        self._azimuths_deg = azimuths_deg
-        self._elevations_deg = elevations_deg
-        self._first = self._limit(0)
+        self._limits = tuple(azimuths_deg), tuple(elevations_deg)
+        self._first = _limit(whole.beams(0), *self._limits)
         if len(self._first.column) == 0:
             raise ValueError(
                 f"no beam within azimuths {azimuths_deg} and elevations "
@@ -207,31 +206,37 @@ class LimitedPattern(BeamPattern):
     def beams(self, frame: int) -> Beams:
         if self.repeats or frame == 0:
             return self._first
-        return self._limit(frame)
+        return _limit(self._whole.beams(frame), *self._limits)
 
-    def _limit(self, frame: int) -> Beams:
-        beams = self._whole.beams(frame)
-        x, y, z = beams.d_Sset.T
-        azimuth = np.rad2deg(np.arctan2(y, x))
-        elevation = np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0)))
-        # Beams on a limit are inside, with either rounding.
-        low, high = self._azimuths_deg[0] - 1e-9, self._azimuths_deg[1] + 1e-9
-        if low <= high:
-            kept = (azimuth >= low) & (azimuth <= high)
-        else:
-            kept = (azimuth >= low) | (azimuth <= high)
-        kept &= elevation >= self._elevations_deg[0] - 1e-9
-        kept &= elevation <= self._elevations_deg[1] + 1e-9
-        place = np.cumsum(kept) - 1
-        order = beams.packet_order[kept[beams.packet_order]]
-        # All firing times stay, so that all turns have the same.
-        return Beams(
-            beams.d_Sset[kept],
-            beams.ring[kept],
-            beams.column[kept],
-            beams.column_t_ns,
-            place[order],
-        )
+
+@lru_cache(maxsize=4)
+def _limit(
+    beams: Beams,
+    azimuths_deg: tuple[float, ...],
+    elevations_deg: tuple[float, ...],
+) -> Beams:
+    """Returns the beams within limits, the same for all that are equal."""
+    x, y, z = beams.d_Sset.T
+    azimuth = np.rad2deg(np.arctan2(y, x))
+    elevation = np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0)))
+    # Beams on a limit are inside, with either rounding.
+    low, high = azimuths_deg[0] - 1e-9, azimuths_deg[1] + 1e-9
+    if low <= high:
+        kept = (azimuth >= low) & (azimuth <= high)
+    else:
+        kept = (azimuth >= low) | (azimuth <= high)
+    kept &= elevation >= elevations_deg[0] - 1e-9
+    kept &= elevation <= elevations_deg[1] + 1e-9
+    place = np.cumsum(kept) - 1
+    order = beams.packet_order[kept[beams.packet_order]]
+    # All firing times stay, so that all turns have the same.
+    return Beams(
+        beams.d_Sset[kept],
+        beams.ring[kept],
+        beams.column[kept],
+        beams.column_t_ns,
+        place[order],
+    )
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from cns_drake.base import points as clouds
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.studies.tasks.task import (
     Answers,
@@ -85,7 +86,7 @@ class LocaliseTask(Task):
             for one in self.settings["methods"]
         )
         texts = tuple(
-            one.read_bytes().hex() if isinstance(one, Path) else ""
+            read_bytes(one).hex() if isinstance(one, Path) else ""
             for one in named
         )
         spacing = self.settings["spacing"] or pair.protocol.query_spacing

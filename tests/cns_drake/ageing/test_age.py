@@ -2,6 +2,7 @@
 
 import csv
 import itertools
+import os
 import re
 
 from helpers.small_city import write_small_city
@@ -10,6 +11,7 @@ import pytest
 from scipy.stats import poisson
 import shapely
 
+from cns_drake.ageing import plots
 from cns_drake.ageing.aged_map import age_map, past
 from cns_drake.ageing.history import City
 from cns_drake.ageing.old_world import OldWorld
@@ -351,3 +353,163 @@ def test_new_buildings_stay_on_their_plot():
         assert area.buffer(0.05).contains(one.footprint_W)
         assert one.name == f"{one.tags[0]}_x"
         assert other.semantic_class == "building"
+
+
+def names_in(folder, stage):
+    text = (folder / f"stage_{stage}.sdf").read_text()
+    return set(re.findall('visual name="([^/"]+)/', text))
+
+
+def test_each_stage_is_what_the_history_tells(long):
+    """Scaffolds, uses of empty plots and annexes have rows as well."""
+    standing, rows = names_in(long, "01"), _rows(long)
+    assert {"put_up", "taken_down", "demolished", "frame"} <= {
+        row["event"] for row in rows
+    }
+    for stage, year in (("02", 3), ("03", 8)):
+        while rows and int(rows[0]["year"]) <= year:
+            row = rows.pop(0)
+            one, successor = row["structure"], row["successor"]
+            if row["event"] in (
+                *("demolished", "felled", "removed", "taken_down"),
+                "furniture",
+            ):
+                standing.remove(one)
+            if row["event"] in ("built", "put_up"):
+                assert one not in standing
+                standing.add(one)
+            if successor and row["event"] != "site":
+                assert successor not in standing
+                standing.add(successor)
+        assert standing == names_in(long, stage)
+    assert not rows
+
+
+def test_a_scaffold_stands_before_its_building(town):
+    world = OldWorld(MapFolder(town))
+    city = City(world, _BUSY, 3, shapely.Polygon())
+    seen = 0
+    for _ in range(8):
+        city.live()
+        for name in city.standing:
+            if not name.startswith("scaffold_"):
+                continue
+            seen += 1
+            own = city._structure(name).footprint_W.buffer(-0.02)
+            triangles = city._triangles(name.removeprefix("scaffold_"))
+            top = plots.structure_triangles(city._structure(name))[..., 2].max()
+            for z in np.arange(triangles[..., 2].min() + 0.1, top - 1.2, 0.3):
+                cut = section(triangles, z)
+                inside = shapely.intersection(shapely.linestrings(cut), own)
+                assert shapely.length(inside).sum() < 0.5
+    assert seen
+
+
+def copied(town, folder):
+    folder.mkdir(parents=True)
+    for path in town.iterdir():
+        if path.is_file():
+            (folder / path.name).write_bytes(path.read_bytes())
+    (folder / "meshes").symlink_to(town / "meshes")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "../../evil.obj",
+        "meshes/../../evil.obj",
+        "/tmp/evil.obj",
+        "meshes/a/evil.obj",
+        "&#46;&#46;/evil.obj",
+        "<![CDATA[../evil.obj]]>",
+        "model://evil.obj",
+    ],
+)
+def test_a_map_of_others_writes_nothing_outside(town, tmp_path, uri):
+    folder = copied(town, tmp_path / "pack" / "in" / "town")
+    evil = tmp_path / "pack" / "evil.obj"
+    evil.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    output = tmp_path / "mine" / "old"
+    output.parent.mkdir()
+    mine = output.parent / "evil.obj"
+    mine.write_text("mine")
+    stage = folder / "stage_02.sdf"
+    text = re.sub(
+        "<uri>meshes/[^<]*</uri>",
+        lambda _: f"<uri>{uri}</uri>",
+        stage.read_text(),
+        count=1,
+    )
+    stage.write_text(text)
+    with pytest.raises(InputError, match=r"stage_02\.sdf: uri: '.* is no file"):
+        age_map(folder, [1], 1, _BUSY, output)
+    assert mine.read_text() == "mine"
+    assert [path.name for path in output.parent.iterdir()] == ["evil.obj"]
+
+
+def test_waypoints_of_any_names_are_kept_apart(town, tmp_path):
+    folder = copied(town, tmp_path / "town")
+    (folder / "stage_01.sdf").write_bytes((town / "stage_02.sdf").read_bytes())
+    for number, x in (("01", 40.0), ("02", 60.0)):
+        way = tmp_path / number / "structures.csv"
+        way.parent.mkdir()
+        way.write_text(f"x,y,z\n10,-48,0\n{x},-48,0\n")
+        (folder / f"sequence_{number}.yaml").write_text(
+            f'map: .\nstage: "{number}"\nwaypoints: ../{number}/{way.name}\n'
+            "speeds: {cruise: 5.0}\n"
+        )
+    age_map(folder, [1], 1, _BUSY, tmp_path / "old")
+    assert len(_rows(tmp_path / "old", "structures.csv")) > 9
+    for number, x in (("01", "40"), ("02", "60")):
+        scenario = load_scenario(tmp_path / "old" / f"sequence_{number}.yaml")
+        assert scenario.waypoints.startswith(str(tmp_path / "old"))
+        text = (tmp_path / "old" / scenario.waypoints).read_text()
+        assert text.splitlines()[-1].startswith(x)
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("x", "nan"),
+        ("y", ""),
+        ("z", "abc"),
+        ("yaw", "inf"),
+        ("x", "1e300"),
+        ("label", "9" * 5000),
+        ("built", "9" * 5000),
+        ("built", "1950.5"),
+        ("instance", "1e2"),
+    ],
+)
+def test_values_of_structures_that_cannot_be(town, tmp_path, column, value):
+    folder = copied(town, tmp_path / "town")
+    rows = [{"built": "", **row} for row in _rows(town, "structures.csv")]
+    rows[3][column] = value
+    with (folder / "structures.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows(rows)
+    with pytest.raises(
+        InputError, match=rf"structures\.csv: line 5: {column}: '{value[:40]}'"
+    ):
+        age_map(folder, [1], 1, _BUSY, tmp_path / "old")
+
+
+def test_tables_of_structures_that_are_none(town, tmp_path):
+    folder = copied(town, tmp_path / "town")
+    table = folder / "structures.csv"
+    whole = table.read_text()
+    table.write_bytes(whole.encode() + b"\xe9")
+    with pytest.raises(InputError, match="not UTF-8"):
+        OldWorld(MapFolder(folder))
+    table.unlink()
+    os.mkfifo(table)
+    with pytest.raises(InputError, match="not a regular file"):
+        OldWorld(MapFolder(folder))
+    table.unlink()
+    lines = whole.splitlines(keepends=True)
+    name = lines[-1].split(",")[1]
+    table.write_text("".join(lines[:-1]))
+    with pytest.raises(InputError, match=f"no row for {name}"):
+        OldWorld(MapFolder(folder)).structure(name)

@@ -2,7 +2,12 @@
 
 import pytest
 
-from cns_drake.base.csv_files import read_records, read_rows
+from cns_drake.base.csv_files import (
+    number_within,
+    read_records,
+    read_rows,
+    whole_number,
+)
 from cns_drake.base.errors import InputError
 
 
@@ -61,3 +66,37 @@ def test_an_error_is_one_printable_line(tmp_path):
     assert str(error).startswith("a b [31m c x")
     assert str(error).isprintable()
     assert len(str(error)) < 2100
+
+
+@pytest.mark.parametrize("code", [0, 7, 27, 31, 127, 0x9B])
+def test_what_a_terminal_would_obey_is_refused(tmp_path, code):
+    path = write(tmp_path, f"a,b\n1,x{chr(code)}[31m\n".encode())
+    with pytest.raises(InputError, match="line 2: a control character"):
+        read_rows(path)
+
+
+def test_whole_numbers():
+    assert whole_number("-12", "x") == -12
+    assert whole_number("9" * 18, "x") == 10**18 - 1
+    for text in (
+        "",
+        "1.0",
+        "nan",
+        "1e3",
+        "1_0",
+        "\u0661",
+        "9" * 19,
+        "9" * 5000,
+    ):
+        with pytest.raises(
+            InputError, match=r"^x: .* is no whole number"
+        ) as one:
+            whole_number(text, "x")
+        assert len(str(one.value)) < 100
+
+
+def test_numbers_up_to_a_size():
+    assert number_within("-2e0", 2.0, "x") == -2.0
+    for text in ("", "abc", "nan", "inf", "-inf", "2.0000001", "1e1000000"):
+        with pytest.raises(InputError, match=r"^x: .* is no number up to 2"):
+            number_within(text, 2.0, "x")

@@ -1,4 +1,7 @@
 import os
+from pathlib import Path
+import re
+import stat
 
 import pytest
 
@@ -6,10 +9,13 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import (
     check_writable,
     complete_part,
+    draft_folder,
+    is_there,
     part_path,
     read_bytes,
     user_errors,
     write_part,
+    write_text,
 )
 
 
@@ -95,3 +101,68 @@ def test_a_file_that_is_too_large(tmp_path):
     assert read_bytes(path, limit=5) == b"12345"
     with pytest.raises(InputError, match=f"^{path}: larger than 4 bytes"):
         read_bytes(path, limit=4)
+
+
+def test_only_plain_names_are_written(tmp_path, monkeypatch):
+    """A link, a pipe, a folder of the name of a result stay as they are."""
+    monkeypatch.chdir(tmp_path)
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+    (tmp_path / "linked").symlink_to(mine)
+    (tmp_path / "loop").symlink_to("loop")
+    os.mkfifo(tmp_path / "pipe")
+    for name, fault in (
+        (".", "a folder"),
+        ("linked", "a link"),
+        ("loop", "a link"),
+        ("pipe", "not a regular file"),
+    ):
+        with pytest.raises(InputError, match=rf"^{re.escape(name)}: {fault}"):
+            write_text(Path(name), "text")
+        with pytest.raises(InputError, match=fault):
+            check_writable(tmp_path / name)
+    assert mine.read_text() == "mine"
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+
+
+def test_a_part_name_that_is_a_pipe_or_a_link_is_not_written_to(tmp_path):
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+    part_path(tmp_path / "a").symlink_to(mine)
+    os.mkfifo(part_path(tmp_path / "b"))
+    for name in "ab":
+        write_text(tmp_path / name, "text")
+        assert (tmp_path / name).read_text() == "text"
+    assert mine.read_text() == "mine"
+
+
+def test_a_new_folder_takes_no_name_that_is_taken(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine").touch()
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "linked").symlink_to("empty")
+    (tmp_path / "loop").symlink_to("loop")
+    os.mkfifo(tmp_path / "pipe")
+    for name in (".", "full", "linked", "loop", "pipe"):
+        with (
+            pytest.raises(InputError, match=f"^{re.escape(name)}: exists"),
+            draft_folder(Path(name)),
+        ):
+            raise AssertionError("begun")
+    for name in ("empty", "new"):
+        with draft_folder(Path(name)) as draft:
+            assert draft.name == name
+            (draft / "a").touch()
+        assert (tmp_path / name / "a").exists()
+
+
+def test_a_file_that_may_be_missing(tmp_path):
+    assert not is_there(tmp_path / "a")
+    (tmp_path / "a").touch()
+    assert is_there(tmp_path / "a")
+    (tmp_path / "dead").symlink_to("nowhere")
+    os.mkfifo(tmp_path / "pipe")
+    for name in (".", "dead", "pipe"):
+        with pytest.raises(InputError):
+            is_there(tmp_path / name)

@@ -61,3 +61,25 @@ def test_a_missing_library_is_one_line_and_names_the_package(tmp_path):
         assert line.startswith("cns-drake: error: ")
         assert line.endswith("(Debian: apt install libglib2.0-0)")
         assert "Traceback" not in result.stderr
+
+
+def test_a_locale_without_utf8_is_named():
+    """Drake cannot be imported there, and would print a traceback."""
+    environment = {
+        **os.environ,
+        **{"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    }
+    command = ("-m", "cns_drake.command_line.cli", "scan", "x.sdf")
+    place = ("--pose", *"000000", "--output", "x.pcd")
+    done = subprocess.run(
+        [sys.executable, *command, *place],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr == (
+        "cns-drake: error: the locale C lacks UTF-8, which Drake needs "
+        "(LC_ALL=C.UTF-8)\n"
+    )

@@ -1,5 +1,7 @@
 """The files in the folder of a map."""
 
+import os
+
 from cns_drake.base.map_folder import MapFolder, drive_name
 
 
@@ -19,6 +21,18 @@ def test_existing_files(tmp_path):
     assert stages["10"] == folder.path / "stage_10.sdf"
     assert folder.drives() == [folder.drive("03"), folder.drive("10")]
     assert folder.recordable_drives() == [folder.drive("10")]
+
+
+def test_what_editors_leave_is_no_file_of_a_map(tmp_path):
+    folder = MapFolder(tmp_path)
+    for name in (".git", "old.d", "meshes"):
+        (tmp_path / name).mkdir()
+    (tmp_path / ".#stage_01.sdf").symlink_to("me@host.1:2")
+    (tmp_path / "dead.sdf").symlink_to("nowhere")
+    os.mkfifo(tmp_path / "x.y")
+    for name in ("stage_01.sdf", "roads.yaml"):
+        (tmp_path / name).touch()
+    assert [p.name for p in folder.files()] == ["roads.yaml", "stage_01.sdf"]
 
 
 def test_names_of_drives(tmp_path):

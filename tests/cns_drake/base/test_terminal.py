@@ -1,6 +1,7 @@
 """Commands show one line for each task in a terminal of any width."""
 
 import io
+import math
 import subprocess
 import sys
 
@@ -21,6 +22,11 @@ from cns_drake.base.errors import FailedJobsError, InputError
         (MemoryError(), 2, "error: not enough memory for this input"),
         (FileNotFoundError(2, "gone", "FILE"), 2, "error: FILE: gone"),
         (OSError("full"), 2, "error: standard output: full"),
+        (
+            RuntimeError("Symlink loop from 'x'"),
+            2,
+            "error: Symlink loop from 'x'",
+        ),
     ],
 )
 def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
@@ -153,3 +159,20 @@ def test_an_argument_that_is_no_text(tmp_path):
     assert result.returncode == 2
     assert result.stderr.count(b"\n") == 1
     assert b"not UTF-8 text" in result.stderr
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_options_are_finite_numbers(value):
+    terminal.check_finite({"far": 1e308, "name": "nan", "count": 3, "x": None})
+    with pytest.raises(InputError, match=rf"^--max-range: {value} is not"):
+        terminal.check_finite({"max_range": value})
+    with pytest.raises(InputError, match=r"^--pose: "):
+        terminal.check_finite({"pose": (0.0, value)})
+
+
+def test_what_is_shown_moves_no_cursor(capsys):
+    terminal.note("a\x1b[31mb\nc\x9bd")
+    terminal.print_rows([("x\x1b[2J", "1\x07")])
+    out, err = capsys.readouterr()
+    assert err == "a [31mb\nc d\n"
+    assert out == "x [2J  1 \n"

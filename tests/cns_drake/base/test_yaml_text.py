@@ -33,6 +33,8 @@ def test_what_people_write_is_read():
         ("a: 1\nb: {c: 1,\n  c: 2}", "line 3: 'c' is there twice"),
         ("a: 2001-99-99", "month must be"),
         ("a: " + "9" * 5000, "4300 digits"),
+        ("a: 0x" + "f" * 4000, "line 1: a number of 4002 letters"),
+        ("a: 1" + ":59" * 3000, "line 1: a number of 9001 letters"),
         ("a: !!int x", "invalid literal"),
         ("!!timestamp x", "groupdict"),
         ("? [1]\n: 2", "unhashable"),

@@ -126,3 +126,20 @@ def test_a_disk_that_fills_up_leaves_no_half_file(
         generate_city(folder)
     assert list(folder.rglob("*.part")) == []
     assert len(list(folder.rglob("*.obj"))) <= 4
+
+
+def test_a_plan_of_others_writes_nothing_outside(tmp_path):
+    folder = write_small_city(tmp_path / "a" / "small")
+    plan = folder / "city.yaml"
+    text = plan.read_text()
+    plan.write_text(text.replace("office, at", "office, kind: ../../e, at"))
+    with pytest.raises(InputError, match=r"city\.yaml: .*kind: String should"):
+        generate_city(folder)
+    plan.write_text(text)
+    others = tmp_path / "others"
+    others.mkdir()
+    (others / "mine.obj").write_text("mine")
+    (folder / "meshes").symlink_to(others)
+    with pytest.raises(InputError, match="meshes: a link instead of a folder"):
+        generate_city(folder)
+    assert [path.name for path in others.iterdir()] == ["mine.obj"]

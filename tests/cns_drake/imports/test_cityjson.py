@@ -515,7 +515,7 @@ def solid(city, lod, *box):
         (("2.2", 0, 0, 0, (20, 10, 9)), ["2.2", "2.2"], 2900.0, 0),
         (("1", 0, 30, 0, (20, 10, 9)), ["2.2", "2.2"], 2900.0, 0),
         (("2.2", 0, 30, 0, (20, 10, 9)), ["1", "2.2"], 2900.0, 0),
-        # A chimney of an older level.
+        # A part of a similar level.
         (("2.2", 0, 0, 0, (20, 30, 9)), ["2.0"], 5800.0, 0),
     ],
 )
@@ -596,3 +596,14 @@ def test_faces_that_only_close_a_solid_are_not_seen(tmp_path):
     assert area(found["a"]) == pytest.approx(20.0)
     kind = "face that only closes a solid, left out"
     assert read.faults.rows() == [(kind, 1, "a")]
+
+
+@pytest.mark.parametrize(("lods"), [("2", "3"), ("3", "1")])
+def test_a_roof_garden_replaces_no_house(tmp_path, lods):
+    city = CityWriter()
+    city.add("house", "Building", solid(city, lods[0], 0, 0, 0, (10, 10, 9)))
+    garden = solid(city, lods[1], 0, 0, 9, (10, 10, 1))
+    city.add("top", "BuildingInstallation", garden, parents=["house"])
+    read, found = structures(city.write(tmp_path / "city.json"))
+    assert volume(found["house"]) == pytest.approx(1000.0)
+    assert read.faults.rows() == []

@@ -472,3 +472,19 @@ def test_a_ring_road_without_a_junction_has_traffic(tmp_path, pieces):
     lanes_file.write_text(text)
     whole = sum(p.length for p in read_lanes(lanes_file).graph.pieces)
     assert whole == pytest.approx(2 * 2 * math.pi * radius, rel=5e-3)
+
+
+@pytest.mark.parametrize("kind", ["driving", "shoulder", "bus", "parking"])
+def test_a_raised_lane_keeps_its_class(tmp_path, kind):
+    lanes = (
+        lane(1, "driving", 3.5), lane(-1, "driving", 3.5),
+        lane(-2, kind, 3.5, more=height(0, 0.1, 0.1)),
+    )  # fmt: skip
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 60, 0, lanes=lanes)
+    )
+    streets = ImportedStreets(bands_of(path))
+    assert streets.carriageway().contains(Point(30.0, -5.0))
+    surface = RoadHeights(bands_of(path))
+    for y, z in ((1.75, 0.0), (-1.75, 0.0), (-5.25, 0.1)):
+        assert surface.heights((30.2, y))[0] == pytest.approx(z, abs=0.005)

@@ -47,6 +47,14 @@ FAULTS = {
         lambda c: c["roads"]["e"].pop("end"),
         r"roads\.e\.end: Field required",
     ),
+    "name that leads to another folder": (
+        lambda c: c["roads"].update({"../../e": c["roads"].pop("e")}),
+        r"roads\.\.\./\.\./e\.\[key\]: String should match pattern",
+    ),
+    "name of a junction with a control character": (
+        lambda c: c["junctions"].update({"a\x1b": c["junctions"]["east"]}),
+        r"junctions\..*\[key\]: String should match pattern",
+    ),
     "unknown junction": (
         lambda c: c["roads"]["e"].update(end="nowhere"),
         r"roads\.e\.end: no junction 'nowhere'",

@@ -426,3 +426,19 @@ def test_a_fault_has_its_line_below_a_comment(tmp_path):
     path.write_text(path.read_text().replace("</world>", "</model></world>"))
     with pytest.raises(InputError, match="line 4: pose: x is no number"):
         load_world(path)
+
+
+@pytest.mark.parametrize(("size", "is_endless"), [(4999.0, 0), (5001.0, 1)])
+def test_the_largest_planes_are_endless(tmp_path, size, is_endless):
+    plane = f"<plane><normal>0 0 1</normal><size>{size} {size}</size></plane>"
+    model = f"<model name='m'>{link(f'<geometry>{plane}</geometry>')}</model>"
+    world = load_world(write(tmp_path, model))
+    far = RigidTransform([0.0, 3000.0, 1.0])
+    assert len(scan_world(world, far, AROUND)) == (4 if is_endless else 0)
+
+
+def test_a_world_of_which_nothing_is_seen_says_why(tmp_path):
+    extra = "<transparency>1</transparency>"
+    path = write(tmp_path, f"<model name='m'>{link(extra=extra)}</model>")
+    with pytest.raises(InputError, match=r"no visuals.* \(1 invisible"):
+        load_world(path)

@@ -347,6 +347,8 @@ def test_equal_patterns_share_their_beams():
     first, second = (make_beam_pattern("vlp-16", 0.1) for _ in range(2))
     assert first is not second
     assert first.beams(0) is second.beams(5)
+    front = [one.within((-30, 30)).beams(0) for one in (first, second)]
+    assert front[0] is front[1]
     own = SpinningPattern(np.array([0.1, 0.0]), 9, 0.1, 9.0, 0.1)
     assert own == SpinningPattern((0.1, 0.0), 9, 0.1, 9.0, 0.1)
 

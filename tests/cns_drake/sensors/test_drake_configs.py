@@ -349,15 +349,29 @@ def test_faults_name_config_and_field(change, fault):
         ApplyLidarConfig(config, make_site()[0], lcm=DrakeLcm("memq://"))
 
 
-@pytest.mark.parametrize(
-    ("apply", "struct"),
-    [(ApplyImuConfig, ImuConfig), (ApplyOdometryConfig, OdometryConfig)],
+APPLIED = (
+    (LidarConfig, ApplyLidarConfig),
+    (ImuConfig, ApplyImuConfig),
+    (OdometryConfig, ApplyOdometryConfig),
 )
-@pytest.mark.parametrize("rate", [0, -1, 10**9])
-def test_impossible_rates_of_other_sensors(apply, struct, rate):
-    fault = rf"{struct.__name__} x: rate: {rate:g} is not above 0"
-    with pytest.raises(ValueError, match=fault.replace("+", r"\+")):
-        apply(struct(name="x", rate=rate), make_site()[0])
+
+
+@pytest.mark.parametrize(("struct", "apply"), APPLIED[1:])
+def test_rates_out_of_range(struct, apply):
+    for rate in (1, 1000):
+        apply(struct(rate=rate), make_site()[0], lcm=DrakeLcm("memq://"))
+    for rate in (0, -1, 1001, 10**9):
+        with pytest.raises(ValueError, match="rate"):
+            apply(struct(rate=rate), make_site()[0], lcm=DrakeLcm("memq://"))
+
+
+@pytest.mark.parametrize(("struct", "apply"), APPLIED)
+@pytest.mark.parametrize("value", [".nan", ".inf", "-.inf"])
+def test_places_that_are_no_numbers(struct, apply, value):
+    text = f"{{name: top, X_PB: {{translation: [0, {value}, 0]}}}}"
+    config = yaml_load_typed(schema=struct, data=text)
+    with pytest.raises(ValueError, match=r"Config top: X_PB: .* not finite"):
+        apply(config, make_site()[0], lcm=DrakeLcm("memq://"))
 
 
 def test_a_frame_that_is_not_there():

@@ -10,6 +10,7 @@ from helpers.small_map import box_visual, scenario_values
 import numpy as np
 import open3d
 import pytest
+import yaml
 
 from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
@@ -278,3 +279,25 @@ def test_small_parts_are_there(tmp_path):
     found = is_there(points, scene)
     assert found[distance < 0.09].mean() > 0.99
     assert not found[distance > 1.25 * NEAR].any()
+
+
+def test_files_beside_a_recording_may_be_those_of_another(
+    short_recording, tmp_path
+):
+    folder = tmp_path / "town" / short_recording.name
+    shutil.copytree(short_recording, folder)
+    file = folder / "scenario.yaml"
+    values = yaml.safe_load(file.read_text())
+    # The folder has moved, not the map.
+    values["map"] = str((short_recording / values["map"]).resolve())
+    file.write_text(yaml.safe_dump(values))
+    open_survey(folder)
+    (lidar,) = values["lidars"]
+    for change, field in (
+        ({"seed": 77}, "seed"),
+        ({"lidars": {lidar: {"preset": "vlp-16"}}}, "lidars"),
+        ({"without": ["tower_000"]}, "without"),
+    ):
+        file.write_text(yaml.safe_dump(values | change))
+        with pytest.raises(InputError, match=f"{field}: .* of another drive"):
+            open_survey(folder)

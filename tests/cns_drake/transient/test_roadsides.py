@@ -169,3 +169,16 @@ def test_without_roads_there_is_a_note(tmp_path, sdf):
     assert [note.split(":")[:2] for note in world.notes] == [
         ["transient", " roadsides"]
     ]
+
+
+def test_what_is_put_up_loses_its_leaves(changed):
+    """It changes as all else does, with the part of its leaves that is left."""
+    whole = new_things(changed, roadsides=1.0)
+    _, bare = changed(roadsides=1.0, leaves=0.3)
+    assert bare.keys() >= whole.keys()
+    fewer = {
+        kind_of(n) for n in whole if len(bare[n].p_WPs) < len(whole[n].p_WPs)
+    }
+    assert {"shrub", "tree"} <= fewer
+    assert not fewer & {"garage", "wall", "car"}
+    changed(roadsides=1.0, leaves=0.0, snow=0.1)

@@ -141,7 +141,7 @@ def test_bad_folders_of_scans(capsys, towns, tmp_path):
     noise.mkdir()
     junk = np.random.default_rng(9).bytes(1600)
     (noise / "a.bin").write_bytes(junk)
-    assert_refused(capsys, scores(good, noise), "a.bin", "--columns")
+    assert_refused(capsys, scores(good, noise), "a.bin", "point", "is at")
     assert not (tmp_path / "out.csv").exists()
     assert not (tmp_path / "out.csv.part").exists()
     blocked = tmp_path / "a file" / "out.csv"

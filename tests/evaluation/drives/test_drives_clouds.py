@@ -176,7 +176,7 @@ def test_empty_clouds(tmp_path):
 def faulty_files(folder):
     """Yields name, content, and expected text of the error."""
     yield "short.bin", bytes(17), "17 bytes is not a whole number"
-    yield "text.npy", b"hello", "not an array of numbers"
+    yield "text.npy", b"hello", "npy|pickle|magic"
     yield "text.pcd", b"hello\n", "no DATA line"
     yield "text.ply", b"hello\n", "not a PLY file"
     yield "open.ply", b"ply\nformat ascii 1.0\n", "no end_header"
@@ -200,7 +200,7 @@ def faulty_files(folder):
         "words.pcd": (
             {"DATA": "ascii"},
             b"a b c\n" * 500,
-            "row 1: 'a' is no number",
+            "row 1: could not convert 'a'",
         ),
         "odd.pcd": ({"DATA": "zip"}, b"", "unknown PCD encoding"),
         "fields.pcd": ({"SIZE": "4 4", "DATA": "binary"}, b"", "differ"),
@@ -240,7 +240,7 @@ def faulty_files(folder):
     yield (
         "negative.ply",
         (header % (b"ascii", b"float")).replace(b"2", b"-2"),
-        "'element vertex -2' is not",
+        "negative number",
     )
     yield (
         "cut_ascii.ply",
@@ -281,6 +281,20 @@ def test_damaged_npy_headers(tmp_path, old, new):
     path.write_bytes(data.replace(old, new.ljust(len(old))))
     with pytest.raises(InputError, match=r"map.npy: "):
         read_cloud(path)
+
+
+@pytest.mark.parametrize("digits", [9, 15, 17, 18, 19, 20, 40])
+def test_a_number_of_points_that_numpy_cannot_count(tmp_path, digits):
+    """It is refused without a warning beside the error."""
+    path = tmp_path / "map.npy"
+    for shape in (f"({10**digits}, 3)", f"({10**digits}, {10**digits})"):
+        header = "{'descr': '<f8', 'fortran_order': False, 'shape': " + shape
+        header = (header + "}").ljust(245) + "\n"
+        path.write_bytes(b"\x93NUMPY\x01\x00\xf6\x00" + header.encode())
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with pytest.raises(InputError, match=r"map\.npy: "):
+                read_cloud(path)
 
 
 def test_archives_and_records_of_no_numbers(tmp_path):
@@ -513,7 +527,7 @@ def test_rows_of_another_length_are_named(tmp_path):
     path = tmp_path / "a.pcd"
     text = b"1 2 3\n" * 30 + b"1 2\n" + b"1 2 3\n" * 469
     write_pcd(path, HEADER | {"DATA": "ascii"}, text)
-    with pytest.raises(InputError, match=r": row 31: 2 numbers instead of 3$"):
+    with pytest.raises(InputError, match=r": row 31: 2 columns instead of 3$"):
         read_cloud(path)
 
 

@@ -251,7 +251,7 @@ def eleven_columns(root, folder):
         (eleven_columns, "rows of 11 numbers instead of 12"),
         (replace("calib.txt", "Tr:", "Tr_velo_to_cam:"), "Tr: missing"),
         (replace("calib.txt", "Tr: ", "Tr: 0 "), "Tr: 13 numbers"),
-        (replace("calib.txt", "Tr: ", "Tr: x"), "Tr: row 1: 'x4"),
+        (replace("calib.txt", "Tr: ", "Tr: x"), "Tr: could not convert 'x4"),
     ],
 )
 def test_files_that_do_not_fit(tmp_path, change, fault):

@@ -225,7 +225,10 @@ def test_poses_that_cannot_be_used(tmp_path, change, fault):
     [
         ("", "no row of numbers"),
         ("1561000444390857631,1,0,0\n", "row"),
-        ("1561000444390857631," + ",".join("abcdefghijkl"), "'a' is no number"),
+        (
+            "1561000444390857631," + ",".join("abcdefghijkl"),
+            "could not convert 'a'",
+        ),
         ("12x," + ",".join("100010001000"), "no row of numbers"),
         ("1561000444390857631," * 13, "row"),
     ],

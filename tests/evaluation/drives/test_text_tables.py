@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.drives.text_tables import read_numbers, read_stamped_rows
+from evaluation.drives.text_tables import (
+    parse_seconds,
+    parse_stamps_ns,
+    read_numbers,
+    read_stamped_rows,
+)
 
 
 @pytest.mark.parametrize(
@@ -16,8 +21,8 @@ from evaluation.drives.text_tables import read_numbers, read_stamped_rows
         (b" , ,\n1 2\n", ""),
         (b"time,x\n", "no row of numbers"),
         (b"", "no row of numbers"),
-        (b"\xff\n", "not UTF-8 text"),
-        (b"1 2\n3\n", "row 2: 1 numbers instead of 2"),
+        (b"\xff\n", "not a text file"),
+        (b"1 2\n3\n", "row 2: 1 columns instead of 2"),
     ],
 )
 def test_tables_that_are_none(tmp_path, text, fault):
@@ -59,9 +64,9 @@ def test_texts_of_other_editors(tmp_path, encode, header):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("1 2\n3 x\n", "row 2: 'x' is no number"),
-        ("1,5 2\n", "row 1: '1,5' is no number"),
-        ("1 2\n1_0 2\n", "row 2: '1_0' is no number"),
+        ("1 2\n3 x\n", "row 2: could not convert 'x' to a number"),
+        ("1,5 2\n", "row 1: could not convert '1,5' to a number"),
+        ("1 2\n1_0 2\n", "row 2: could not convert '1_0' to a number"),
         ("1 2 3\n", None),
     ],
 )
@@ -73,3 +78,19 @@ def test_faults_of_rows_are_in_our_words(tmp_path, text, fault):
         return
     with pytest.raises(InputError, match=f"^{path}: {fault}$"):
         read_numbers(path, float)
+
+
+@pytest.mark.parametrize(
+    "text", ["1e1000000", "-1e999999", "9" * 5000, "1e19", "inf", "nan", "0x1"]
+)
+def test_times_that_are_none(text):
+    for parse in (parse_seconds, parse_stamps_ns):
+        with pytest.raises(ValueError, match="is no time"):
+            parse(np.array(["1.5", text]))
+
+
+def test_times_near_zero_and_at_the_end():
+    assert parse_seconds(np.array(["1e-1000000"])).tolist() == [0]
+    assert parse_seconds(np.array(["9223372036.854775807"])) == 2**63 - 1
+    with pytest.raises(ValueError, match="is no time"):
+        parse_seconds(np.array(["9223372036.854775808"]))

@@ -401,6 +401,12 @@ def test_faults_of_an_own_method(streets, tmp_path, capsys, name):
         assert_refused(capsys, [*command, "--jobs", jobs], str(path), fault)
 
 
+def test_numbers_of_jobs(streets, capsys):
+    command = ["localise", streets["map"], streets["query"], "--method", "icp"]
+    for jobs in (0, -1, 1025, 10**11):
+        assert_refused(capsys, [*command, "--jobs", jobs], f"--jobs: {jobs}")
+
+
 def test_bad_input(streets, tmp_path, capsys, monkeypatch):
     pair = [streets["map"], streets["query"]]
     gicp = ["--method", "gicp"]

@@ -2,10 +2,14 @@
 
 from dataclasses import replace
 import json
+import os
+import shutil
 
 from helpers.eval_program import assert_refused, run
 import numpy as np
+import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.map_update.baselines import by_distance, by_free_space
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import (
@@ -17,7 +21,11 @@ from evaluation.map_update.sessions import (
     read_session,
     write_labels,
 )
-from evaluation.map_update.structures import verdicts, write_structures
+from evaluation.map_update.structures import (
+    class_names,
+    verdicts,
+    write_structures,
+)
 
 
 def write_map(folder, points):
@@ -301,3 +309,93 @@ def test_bad_labels_are_refused(tmp_path, capsys):
     )
     assert_refused(capsys, ["map-update", folder], folder / "B", "poses.txt")
     assert_refused(capsys, ["map-update", tmp_path], "no folder A")
+
+
+def write_column(path, kind, value):
+    """Writes a map of three points with one more column, as text."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    name, kind = kind
+    path.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\n"
+        f"property double y\nproperty double z\nproperty {kind} {name}\n"
+        f"end_header\n0 0 0 1\n1 0 0 {value}\n2 0 0 0\n"
+    )
+
+
+@pytest.mark.parametrize("name", ["instance", "label"])
+@pytest.mark.parametrize(
+    ("kind", "value", "expected"),
+    [
+        ("int", 65535, 65535),
+        ("double", 3.0, 3),
+        ("int", 65536, None),
+        ("int", -1, None),
+        ("uint", (7 << 16) + 50, None),
+        ("float", 1.5, None),
+        ("double", "nan", None),
+        ("float", "inf", None),
+    ],
+)
+def test_numbers_of_a_map_are_taken_as_they_are(
+    tmp_path, name, kind, value, expected
+):
+    write_column(tmp_path / "A" / "map.ply", (name, kind), value)
+    if expected is None:
+        with pytest.raises(
+            InputError, match=rf"map\.ply: {name}: .* of point 1 is no whole"
+        ):
+            read_session(tmp_path / "A")
+        return
+    session = read_session(tmp_path / "A")
+    found = session.instances if name == "instance" else session.classes
+    assert found.tolist() == [1, expected, 0]
+
+
+def test_labels_that_lie_about_their_number(tmp_path, capsys):
+    """They are refused in one line, whatever number their header has."""
+    folder = tmp_path / "pair"
+    clouds(folder)
+    whole = (folder / "A" / "truth.npy").read_bytes()
+    bad = tmp_path / "bad.npy"
+    command = ["map-update", folder, "--labels-a", bad]
+    command += ["--labels-b", folder / "B" / "truth.npy"]
+    for shape in (
+        b"(401,)",
+        b"(399,)",
+        *(b"(%d,)" % 10**k for k in (9, 18, 20)),
+    ):
+        # The header keeps its length.
+        end = whole.index(b"\n")
+        text = whole[:end].rstrip().replace(b"(400,)", shape)
+        bad.write_bytes(text.ljust(end) + whole[end:])
+        assert_refused(capsys, command, bad)
+    bad.unlink()
+    os.mkfifo(bad)
+    assert_refused(capsys, command, bad, "not a regular file")
+
+
+def test_classes_of_a_table_are_whole_numbers(tmp_path):
+    table = tmp_path / "structures.csv"
+    assert class_names(tmp_path) == {}
+    table.write_text("label,class\n50,building\n,\n71,trunk\n")
+    assert class_names(tmp_path) == {50: "building", 71: "trunk"}
+    for label in ("9" * 4400, "x", "1.5", "nan"):
+        table.write_text(f"label,class\n{label},building\n")
+        with pytest.raises(InputError, match="line 2: label: "):
+            class_names(tmp_path)
+
+
+def test_half_a_folder_is_never_left(towns, tmp_path, capsys):
+    late = shutil.copytree(towns / "town_02", tmp_path / "late")
+    file = next(late.glob("*.mcap"))
+    content = bytearray(file.read_bytes())
+    middle = len(content) * 3 // 4
+    content[middle : middle + 200] = bytes(200)
+    file.write_bytes(content)
+    output = tmp_path / "maps"
+    drives = ["map-sessions", towns / "town_01", late]
+    assert_refused(capsys, [*drives, "--output", output], file.name)
+    assert not output.exists()
+    sound = [*drives[:2], towns / "town_02", "--output", output]
+    assert run(capsys, *sound)[0] == 0
+    assert_refused(capsys, sound, "exists already")

@@ -1,6 +1,8 @@
 """The learned descriptor: images, network, scores, files of weights."""
 
 import json
+import os
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -190,4 +192,34 @@ def test_other_files_are_no_weights(tmp_path):
         make_method("learned", {"weights": path})
     path.write_bytes(b"no archive")
     with pytest.raises(InputError, match="no file of weights"):
+        make_method("learned", {"weights": path})
+
+
+def test_weights_that_are_no_numbers_in_single_precision(tmp_path):
+    largest = float(np.finfo(np.float32).max)
+    shape = (9 * LAYERS[0][0], LAYERS[0][1])
+    path = write(tmp_path / "w.npz", kernel_0=np.full(shape, largest))
+    make_method("learned", {"weights": path})
+    for value in (1.01 * largest, 1e300, np.nan, np.inf):
+        path = write(tmp_path / "w.npz", kernel_0=np.full(shape, value))
+        with pytest.raises(InputError, match=r"w\.npz: kernel_0: not all are"):
+            make_method("learned", {"weights": path})
+
+
+def test_weights_neither_fill_the_memory_nor_wait(tmp_path):
+    path = tmp_path / "w.npz"
+    np.savez_compressed(
+        path, **weight_values(), **{f"z{k}": np.zeros(10**7) for k in range(9)}
+    )
+    tracemalloc.start()
+    make_method("learned", {"weights": path})
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 20e6
+    np.savez_compressed(path, **{**weight_values(), "seen": np.zeros(10**7)})
+    with pytest.raises(InputError, match=r"no file of weights .*seen"):
+        make_method("learned", {"weights": path})
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(InputError, match=r"w\.npz: not a regular file"):
         make_method("learned", {"weights": path})

@@ -349,3 +349,25 @@ def test_former_tables_of_queries(tmp_path):
     path = write(tmp_path / "queries.csv", header, "a,01,02,btc,1,1,0.5")
     with pytest.raises(InputError, match="earlier version"):
         QueryRows.read(path)
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "fault"),
+    [
+        (0.5, 0.55 - 1e-9, 0.7, None),
+        (0.5, 0.55 + 1e-9, 0.7, "value: .* off its interval"),
+        (0.5, 0.3, 0.45 - 1e-9, "value: .* off its interval"),
+        (1.0, 0.99, 1.0 + 1e-10, None),
+        (1.0, 0.99, 1.0 + 1e-8, "low: an interval from 0 to 1"),
+        (0.0, -1e-8, 0.1, "low: an interval from 0 to 1"),
+    ],
+)
+def test_intervals_that_cannot_be(tmp_path, value, low, high, fault):
+    path = tmp_path / "results.csv"
+    numbers = {"metric": "auc", "value": value, "low": low, "high": high}
+    Results.of([Row(**key(), **numbers)]).write_csv(path)
+    if fault is None:
+        assert len(Results.read(path).rows) == 1
+        return
+    with pytest.raises(InputError, match=rf"results\.csv: line 2: {fault}"):
+        Results.read(path)

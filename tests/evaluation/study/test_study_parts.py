@@ -1,14 +1,21 @@
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+import io
+import json
+import os
 import pickle
 import struct
-from typing import NamedTuple
+import tracemalloc
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import zstandard
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.study.parts import Part, decode, encode
+from cns_drake.base.jobs.step import Reporter
+from evaluation.study.parts import MakePart, Part, decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 
@@ -184,3 +191,112 @@ def test_what_cannot_be_kept(tmp_path, value):
     with pytest.raises(InputError, match=f"^{path}: .*cannot be kept"):
         Part(path).write({}, value)
     assert not list(tmp_path.iterdir())
+
+
+def _replaced(part, header=None, data=None, **fields):
+    """Writes a part again with another header or another value."""
+    magic, line, old = part.path.read_bytes().split(b"\n", 2)
+    data = old if data is None else data
+    values = json.loads(line) | {"bytes": len(data)} | fields
+    line = json.dumps(values).encode() if header is None else header
+    part.path.write_bytes(b"\n".join([magic, line, data]))
+
+
+@pytest.mark.parametrize(
+    "header",
+    [b"[" * 100_000, b"[]", b"null", b"3", b"{}", b'{"bytes": "1"}', b"\xff"],
+)
+def test_headers_that_are_none(part, header):
+    _replaced(part, header)
+    assert not part.is_current(INPUTS)
+    with pytest.raises(InputError, match=r"values\.data: damaged"):
+        part.read()
+
+
+def test_a_part_neither_fills_the_memory_nor_waits(part):
+    bomb = zstandard.compress(bytes(1 << 28))
+    assert len(bomb) < 20_000
+    _replaced(part, data=bomb)
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"damaged .*stand for 268435456"):
+        part.read()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5e6
+    lying = struct.pack("<Q", 2) + b"{}" + npy_header("(100000000000000,)")
+    _replaced(part, data=zstandard.compress(lying))
+    with pytest.raises(InputError, match="damaged"):
+        part.read()
+    part.path.unlink()
+    os.mkfifo(part.path)
+    assert not part.is_current(INPUTS)
+    with pytest.raises(InputError, match="not a regular file"):
+        part.read()
+
+
+def npy_header(shape):
+    stream = io.BytesIO()
+    np.save(stream, np.zeros(0))
+    return stream.getvalue().replace(b"(0,)", shape.encode())
+
+
+def test_a_part_of_zeros_is_read_however_small_it_could_be(tmp_path):
+    part = Part(tmp_path / "zeros.data")
+    part.write(INPUTS, np.zeros(1 << 25))
+    assert not part.read().any()
+    assert part.fits(np.ndarray)
+    assert not part.fits(list[float])
+
+
+@dataclass(frozen=True)
+class Measured:
+    name: str
+    auc: float
+    rows: tuple[int, ...] = ()
+    more: dict[str, float | None] = field(default_factory=dict)
+    drawn: "list[Pair] | None" = None
+
+
+@pytest.mark.parametrize(
+    ("value", "hint", "expected"),
+    [
+        (None, None, True),
+        (None, Measured, False),
+        (None, Measured | None, True),
+        (3, float, True),
+        (np.float32(3), float, True),
+        ("3", float, False),
+        ([1.0, 2], list[float], True),
+        ([1.0, None], list[float], False),
+        ((1, "a"), tuple[int, str], True),
+        ((1, "a", 2), tuple[int, str], False),
+        ((1, 2), Sequence[int], True),
+        ({"a": {"b": None}}, dict[str, dict[str, float | None]], True),
+        ({"a": [1]}, dict[str, dict[str, float | None]], False),
+        (Measured("a", 0.5, (1, 2), {"x": None}, [Pair(0, 1)]), Measured, True),
+        (Measured("a", None), Measured, False),
+        (Measured("a", 0.5, (1, "2")), Measured, False),
+        (Pair(0, 1), Measured, False),
+        (np.zeros(2), np.ndarray, True),
+        (b"12", bytes, True),
+        ([], Any, True),
+    ],
+)
+def test_values_of_another_type_are_made_again(tmp_path, value, hint, expected):
+    part = Part(tmp_path / "one.data")
+    part.write(INPUTS, value)
+    assert part.fits(hint) == expected
+
+
+def test_a_step_whose_part_holds_something_else_is_not_done(tmp_path):
+    step = MakePart(Part(tmp_path / "one.data"), measured, (2.0,))
+    step.run(Reporter())
+    assert step.is_done()
+    for value in (None, [None], {"a": 1}, [Measured(1, 0.5)]):
+        _replaced(step.part, data=zstandard.compress(encode(value)))
+        assert step.part.read() == value
+        assert not step.is_done()
+
+
+def measured(reporter: Reporter, value: float) -> list[Measured]:
+    return [Measured("one", value)]

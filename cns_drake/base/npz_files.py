@@ -1,0 +1,52 @@
+"""Reading NumPy's archives from untrusted sources."""
+
+from collections.abc import Iterable
+import io
+from pathlib import Path
+import zipfile
+
+import numpy as np
+
+from cns_drake.base.files import read_bytes
+
+# Those that `np.savez` and `np.savez_compressed` write, and whose readers stop
+# at a given size.
+_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+
+def read_npz(
+    path: Path, names: Iterable[str], most_bytes: int
+) -> dict[str, np.ndarray]:
+    """Returns the arrays of an archive by name; absent ones are left out.
+
+    A small file cannot fill the memory, nor run code.
+
+    Args:
+        path: the file.
+        names: of the wanted arrays; no others are read.
+        most_bytes: greatest size of the file, and of each array.
+
+    Raises:
+        InputError: the file cannot be read, or is too large.
+        ValueError: it is no such archive, or an array is too large.
+    """
+    content = read_bytes(path, most_bytes)
+    found = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            known = {info.filename: info for info in archive.infolist()}
+            for name in names:
+                info = known.get(f"{name}.npy")
+                if info is None:
+                    continue
+                if info.file_size > most_bytes:
+                    raise ValueError(f"{name}: {info.file_size} bytes")
+                if info.compress_type not in _COMPRESSIONS:
+                    raise ValueError(f"{name}: an unknown compression")
+                found[name] = np.lib.format.read_array(
+                    io.BytesIO(archive.read(info)), allow_pickle=False
+                )
+    except Exception as error:
+        # NumPy evaluates headers as Python, and can raise any error.
+        raise ValueError(f"{type(error).__name__}: {error}") from error
+    return found

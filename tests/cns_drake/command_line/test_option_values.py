@@ -1,0 +1,61 @@
+"""Options that are numbers: each command refuses what is none."""
+
+from helpers.eval_program import run_program
+import pytest
+import typer
+
+from cns_drake.command_line import cli as simulator
+from evaluation.command_line import cli as evaluation
+
+PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
+
+
+def commands():
+    """Yields program, command and option, for each option of real numbers."""
+    for name, program in PROGRAMS.items():
+        group = typer.main.get_command(program.app)
+        for command in group.commands.values():
+            for one in command.params:
+                if one.type.name in ("float", "float range"):
+                    yield name, command, one
+
+
+def usual(one):
+    """Returns the words of a required argument or option."""
+    word = one.type.choices[0] if one.type.name == "choice" else "0"
+    words = [word] * max(one.nargs, 1)
+    return words if one.param_type_name == "argument" else [one.opts[0], *words]
+
+
+FOUND = list(commands())
+
+
+def test_there_are_such_options():
+    assert {command.name for _, command, _ in FOUND} >= {
+        *("pr", "localise", "map-sessions", "export-pairs", "map-truth"),
+        *("train", "age", "simulate"),
+    }
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+@pytest.mark.parametrize(
+    ("program", "command", "option"),
+    FOUND,
+    ids=[f"{c.name}{o.opts[0]}" for _, c, o in FOUND],
+)
+def test_it_is_a_finite_number(
+    capsys, monkeypatch, tmp_path, program, command, option, value
+):
+    monkeypatch.chdir(tmp_path)
+    words = [command.name, f"{option.opts[0]}={value}"]
+    for one in command.params:
+        if one.required and one is not option:
+            words += usual(one)
+    status, out, err = run_program(
+        capsys, program, PROGRAMS[program].main, *words
+    )
+    assert (status, out) == (2, ""), err
+    assert err.startswith(f"{program}: error: ")
+    assert err.count("\n") == 1
+    assert option.opts[0] in err
+    assert not list(tmp_path.iterdir())
