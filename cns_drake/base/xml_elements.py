@@ -72,16 +72,19 @@ class Element(ElementTree.Element):
         return value
 
 
+# Blanks before the declaration of XML.
+_BLANKS = re.compile(rb"\A([ \t\r\n]+)(<\?xml[^>]*>)")
 # What holds no elements; it may lack its end.
 _COMMENT = re.compile(
     rb"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)", re.DOTALL
 )
 
 
-def without_comments(content: bytes) -> bytes:
-    """Returns a file without the text of its comments.
+def readable_xml(content: bytes) -> bytes:
+    """Returns a file without what XML forbids and many programs write.
 
-    XML forbids two dashes there, which many programs write and read.
+    Such are two dashes in comments, and blanks before the declaration. Lines
+    keep their numbers.
     """
 
     def cleared(found: re.Match[bytes]) -> bytes:
@@ -90,6 +93,7 @@ def without_comments(content: bytes) -> bytes:
             return b"<!--" + b"\n" * text.count(b"\n") + b"-->"
         return text
 
+    content = _BLANKS.sub(rb"\2\1", content, count=1)
     return _COMMENT.sub(cleared, content)
 
 
@@ -145,8 +149,7 @@ def read_elements(
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = lambda *_: refuse("holds a document type")
     try:
-        content = without_comments(read_bytes(path, _MOST_BYTES))
-        parser.Parse(content, True)
+        parser.Parse(readable_xml(read_bytes(path, _MOST_BYTES)), True)
     except expat.ExpatError as error:
         raise InputError(
             f"{path}: cannot be parsed: line {error.lineno}:"

@@ -8,7 +8,7 @@ import stat
 from xml.parsers import expat
 
 from cns_drake.base.files import user_errors
-from cns_drake.base.xml_elements import without_comments
+from cns_drake.base.xml_elements import readable_xml
 from cns_drake.scene.gazebo_worlds import ModelFinder
 
 # Files of a model's folder, besides meshes.
@@ -159,7 +159,7 @@ def _xml_references(content: bytes) -> list[str]:
     parser.EndElementHandler = end
     # The loader refuses a file that is not XML.
     with contextlib.suppress(expat.ExpatError):
-        parser.Parse(without_comments(content), True)
+        parser.Parse(readable_xml(content), True)
     return found
 
 

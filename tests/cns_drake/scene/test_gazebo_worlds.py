@@ -421,6 +421,13 @@ def test_valid_worlds_are_read(tmp_path, body, notes, suffix):
     assert [note.split(": ")[1] for note in world.notes] == notes
 
 
+def test_a_world_with_blanks_before_its_declaration(tmp_path):
+    model = f"<model name='m'><pose>5 0 1 0 0 0</pose>{link()}</model>"
+    path = write(tmp_path, model)
+    path.write_text("\n <?xml version='1.0'?>" + path.read_text())
+    assert place(load_world(path), "m") == [5.0, 0.0, 1.0]
+
+
 def test_a_fault_has_its_line_below_a_comment(tmp_path):
     path = write(tmp_path, "<!-- a\n--\nb -->\n<model name='m'><pose>x</pose>")
     path.write_text(path.read_text().replace("</world>", "</model></world>"))
