@@ -5,6 +5,7 @@ from pathlib import Path
 import re
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular
 
 ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"
@@ -50,13 +51,21 @@ class MapFolder:
     def files(self) -> list[Path]:
         """Returns the files beside the folders, in order.
 
-        Hidden files, such as locks of editors, are none of the map's.
+        Hidden files, such as locks of editors, and dead links are none of the
+        map's.
+
+        Raises:
+            InputError: there is a pipe or a device.
         """
-        return [
+        found = [
             path
             for path in sorted(self.path.glob("*.*"))
-            if path.is_file() and not path.name.startswith(".")
+            if not (path.name.startswith(".") or path.is_dir())
+            and path.exists()
         ]
+        for path in found:
+            check_regular(path)
+        return found
 
     def stage(self, stage: str) -> Path:
         """Returns the SDF file of a stage."""

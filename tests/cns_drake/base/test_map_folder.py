@@ -2,6 +2,9 @@
 
 import os
 
+import pytest
+
+from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder, drive_name
 
 
@@ -29,10 +32,12 @@ def test_what_editors_leave_is_no_file_of_a_map(tmp_path):
         (tmp_path / name).mkdir()
     (tmp_path / ".#stage_01.sdf").symlink_to("me@host.1:2")
     (tmp_path / "dead.sdf").symlink_to("nowhere")
-    os.mkfifo(tmp_path / "x.y")
     for name in ("stage_01.sdf", "roads.yaml"):
         (tmp_path / name).touch()
     assert [p.name for p in folder.files()] == ["roads.yaml", "stage_01.sdf"]
+    os.mkfifo(tmp_path / "x.y")
+    with pytest.raises(InputError, match=r"x\.y: not a regular file"):
+        folder.files()
 
 
 def test_names_of_drives(tmp_path):

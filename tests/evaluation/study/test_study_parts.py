@@ -15,6 +15,7 @@ import zstandard
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.step import Reporter
+from evaluation.study import parts
 from evaluation.study.parts import MakePart, Part, decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
@@ -213,16 +214,18 @@ def test_headers_that_are_none(part, header):
         part.read()
 
 
-def test_a_part_neither_fills_the_memory_nor_waits(part):
-    bomb = zstandard.compress(bytes(1 << 28))
-    assert len(bomb) < 20_000
+def test_a_part_neither_fills_the_memory_nor_waits(part, monkeypatch):
+    monkeypatch.setattr(parts, "_ALWAYS", 1 << 16)
+    bomb = zstandard.compress(bytes(1 << 24))
+    assert len(bomb) < 2_000
     _replaced(part, data=bomb)
     tracemalloc.start()
-    with pytest.raises(InputError, match=r"damaged .*stand for 268435456"):
+    with pytest.raises(InputError, match=r"damaged .*stand for 16777216"):
         part.read()
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 5e6
+    monkeypatch.undo()
     lying = struct.pack("<Q", 2) + b"{}" + npy_header("(100000000000000,)")
     _replaced(part, data=zstandard.compress(lying))
     with pytest.raises(InputError, match="damaged"):
@@ -240,9 +243,12 @@ def npy_header(shape):
     return stream.getvalue().replace(b"(0,)", shape.encode())
 
 
-def test_a_part_of_zeros_is_read_however_small_it_could_be(tmp_path):
+def test_a_part_of_zeros_is_read_however_small_it_could_be(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(parts, "_ALWAYS", 1 << 16)
     part = Part(tmp_path / "zeros.data")
-    part.write(INPUTS, np.zeros(1 << 25))
+    part.write(INPUTS, np.zeros(1 << 20))
     assert not part.read().any()
     assert part.fits(np.ndarray)
     assert not part.fits(list[float])
