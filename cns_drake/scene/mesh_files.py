@@ -20,7 +20,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.gltf_check import GLTF, check_gltf
+from cns_drake.scene.mesh_check import GLTF, check_gltf
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 _LIMIT_BYTES = 1 << 28

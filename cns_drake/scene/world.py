@@ -27,7 +27,7 @@ from cns_drake.scene.gazebo_worlds import (
     read_xml,
     simplify_world,
 )
-from cns_drake.scene.gltf_check import GLTF, check_gltf
+from cns_drake.scene.mesh_check import unread_parts
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.perception_geometry import (
     anchored_frames,
@@ -140,8 +140,8 @@ def _parse_fault(path: Path, *texts: str) -> InputError:
     return InputError(f"{path}: cannot be parsed: {': '.join(faults)}")
 
 
-def _gltf_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
-    """Returns what is not read of the visible glTF files.
+def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
+    """Returns what is not read of the visible meshes.
 
     Raises:
         InputError: the shapes of one would be misread.
@@ -152,11 +152,10 @@ def _gltf_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
     sources = [one.source() for one in shapes if isinstance(one, Mesh | Convex)]
     notes = []
     for path in sorted({str(one.path()) for one in sources if one.is_path()}):
-        if Path(path).suffix.lower() in GLTF:
-            try:
-                notes += [f"{path}: {one}" for one in check_gltf(Path(path))]
-            except ValueError as error:
-                raise InputError(f"{path}: {error}") from error
+        try:
+            notes += [f"{path}: {one}" for one in unread_parts(Path(path))]
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
     return tuple(notes)
 
 
@@ -238,7 +237,7 @@ def load_world(
     if missing:
         raise InputError(f"{sdf}: no structure {min(missing)} to leave out")
     found = _check_visible(scene_graph, sdf, notes)
-    notes += _gltf_notes(scene_graph)
+    notes += _mesh_notes(scene_graph)
     vehicle_model = None
     if vehicle is not None:
         vehicle_model = _parse_models(parser, Path(vehicle))[0]

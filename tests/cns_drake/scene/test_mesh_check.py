@@ -1,4 +1,4 @@
-"""glTF files whose shapes would be misread, and what is not read of others."""
+"""Meshes whose shapes would be misread, and what is not read of others."""
 
 import json
 import struct
@@ -8,7 +8,7 @@ from helpers.small_map import world_text
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.gltf_check import check_gltf
+from cns_drake.scene.mesh_check import check_gltf, unread_parts
 from cns_drake.scene.world import load_world
 
 
@@ -126,3 +126,19 @@ def test_a_world_names_the_file_and_the_extension(tmp_path):
     with pytest.raises(InputError, match="KHR_mesh_quantization") as refusal:
         load_world(sdf)
     assert str(refusal.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(
+    ("element", "note"),
+    [
+        ("<instance_controller url='#c'/>", "1 skins or morphs of COLLADA"),
+        ("<animation/><animation/>", "2 animations of COLLADA"),
+        ("<lines count='1'/><linestrips/>", "2 lines of COLLADA"),
+        ("<instance_geometry url='#g'/>", None),
+    ],
+)
+def test_what_is_not_read_of_collada_is_named(tmp_path, element, note):
+    path = tmp_path / "thing.dae"
+    path.write_text(f"<COLLADA>{element}</COLLADA>")
+    expected = () if note is None else (f"{note} ignored",)
+    assert unread_parts(path) == expected

@@ -1,10 +1,11 @@
-"""Checks glTF 2.0 files for what Open3D, which reads them, would misread.
+"""Checks glTF and COLLADA for what Open3D, which reads them, would misread.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
 from collections import Counter
 from pathlib import Path
+import re
 import struct
 from typing import Any
 
@@ -26,11 +27,34 @@ _CHANGING = (
     "EXT_mesh_gpu_instancing", "EXT_instance_features", "KHR_node_visibility",
     "KHR_mesh_quantization",
 )  # fmt: skip
+# Elements of COLLADA that would move or add shapes and are not read.
+_COLLADA = {
+    re.compile(rb"<instance_controller\b"): "skins or morphs of COLLADA",
+    re.compile(rb"<animation\b"): "animations of COLLADA",
+    re.compile(rb"<(?:lines|linestrips)\b"): "lines of COLLADA",
+}
 _FLOAT = 5126
 # Kinds of primitives from 0 on that have no triangles: points and lines.
 _FIRST_TRIANGLES = 4
 _JSON = 0x4E4F534A
 _LIMIT_BYTES = 1 << 28
+
+
+def unread_parts(path: Path) -> tuple[str, ...]:
+    """Returns one line for each kind of thing in a mesh that is not read.
+
+    Raises:
+        ValueError: its shapes would be misread.
+        InputError: it cannot be read.
+    """
+    ending = path.suffix.lower()
+    if ending in GLTF:
+        return check_gltf(path)
+    if ending != ".dae":
+        return ()
+    content = read_bytes(path, _LIMIT_BYTES)
+    counts = {what: len(one.findall(content)) for one, what in _COLLADA.items()}
+    return tuple(f"{n} {what} ignored" for what, n in counts.items() if n)
 
 
 def check_gltf(path: Path) -> tuple[str, ...]:
