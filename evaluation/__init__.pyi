@@ -24,3 +24,6 @@ from evaluation.recognition.query_outcomes import QueryOutcomes as QueryOutcomes
 from evaluation.recognition.query_outcomes import judge as judge
 from evaluation.recognition.retrieval import Retrieval as Retrieval
 from evaluation.recognition.retrieval import retrieve as retrieve
+from evaluation.results.summaries import means as means
+from evaluation.results.table import QueryRows as QueryRows
+from evaluation.results.table import Results as Results

@@ -59,6 +59,13 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
     """Returns the mean for each combination of values in columns.
 
     The least and the greatest value, such as those of seeds, stand beside it.
+
+    Example:
+        from evaluation import Results, means
+
+        rows = Results.read("study/results.csv").where(metric="auc").rows
+        for mean in means(rows, "method", "gate"):
+            print(mean.key, mean.value)
     """
     groups: dict[tuple, list[float]] = {}
     for row in rows:

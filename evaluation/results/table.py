@@ -222,7 +222,14 @@ class Answers(Key):
 
 @dataclass(frozen=True)
 class Results:
-    """A table of results: the names of its factors, in order, and its rows."""
+    """A table of results: the names of its factors, in order, and its rows.
+
+    Example:
+        from evaluation import Results
+
+        results = Results.read("study/results.csv")
+        print(results.where(task="place", metric="auc").distinct("method"))
+    """
 
     factors: tuple[str, ...]
     rows: tuple[Row, ...]
@@ -234,7 +241,7 @@ class Results:
         return cls(_factor_names(rows), rows)
 
     @classmethod
-    def read(cls, path: Path) -> Results:
+    def read(cls, path: str | Path) -> Results:
         """Reads `results.csv`, or that of a folder.
 
         Columns may have any order; those that are unknown are factors.
@@ -244,6 +251,7 @@ class Results:
                 version, lacks a column, has one twice, or has a value that
                 cannot be. The line, the column and the fault are named.
         """
+        path = Path(path)
         file = path / RESULTS if path.is_dir() else path
         table = _Cells.read(file, (*KEYS, *_MEASURED))
         rows: list[Row] = []
@@ -302,7 +310,14 @@ class Results:
 
 @dataclass(frozen=True)
 class QueryRows:
-    """A table of queries: the names of its factors, and all answers."""
+    """A table of queries: the names of its factors, and all answers.
+
+    Example:
+        from evaluation import QueryRows
+
+        for one in QueryRows.read("study/queries.csv").answers:
+            print(one.method, one.outcomes.recall_at(5))
+    """
 
     factors: tuple[str, ...]
     answers: tuple[Answers, ...]
@@ -314,7 +329,7 @@ class QueryRows:
         return cls(_factor_names(answers), answers)
 
     @classmethod
-    def read(cls, path: Path) -> QueryRows:
+    def read(cls, path: str | Path) -> QueryRows:
         """Reads `queries.csv`, or that of a folder.
 
         All columns of a query but `query_frame`, `correct`, `has_match` and
@@ -323,6 +338,7 @@ class QueryRows:
         Raises:
             InputError: as `Results.read`.
         """
+        path = Path(path)
         file = path / QUERIES if path.is_dir() else path
         table = _Cells.read(file, (*KEYS, *_NEEDED_ANSWERS), tuple(_ANSWERS))
         names = [name for name in _ANSWERS if name in table.columns]

@@ -340,7 +340,7 @@ RECIPES = {
         prints=("mine ", "layered-overlap "),
     ),
     "means of a table": Recipe(
-        "from pathlib import Path\n\nfrom evaluation.results",
+        "from pathlib import Path\n\nfrom evaluation import Results, means",
         changes=(('"results.csv"', '"mine.csv"'),),
         after=("table of an entrant",),
         file="means.py",

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from cns_drake.base.elementary import cos, sin
 
@@ -487,6 +486,10 @@ class BeamCoverage:
 
     def __init__(self, d_Sset: np.ndarray):
         """Covers the cells of beams (N, 3), unit directions in S."""
+        # Imported here: the rest of the module needs no library that is slow
+        # to load.
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
         covered = np.zeros((_ROWS, _COLUMNS), np.uint8)
         covered[_cells(d_Sset)] = 1
         grown = 2 * _REACH_CELLS + 1
