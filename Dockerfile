@@ -8,7 +8,7 @@ FROM python:3.12-slim-bookworm
 # Shared libraries of the wheels of Drake and Open3D.
 RUN apt-get update -qq \
     && apt-get install -y -qq --no-install-recommends \
-      libglib2.0-0 libgl1 libx11-6 libudev1 libgomp1 \
+      libglib2.0-0 libgl1 libx11-6 libudev1 libgomp1 libusb-1.0-0 \
     && rm -rf /var/lib/apt/lists/*
 COPY --from=wheel /wheel /wheel
 RUN pip install --quiet --no-cache-dir /wheel/*.whl && rm -r /wheel

@@ -147,3 +147,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
         Falling().record(tmp_path / "two", 0.1, rates={"fast": -1})
     with pytest.raises(ValueError, match="needs one"):
         add_mcap_recorder(DiagramBuilder(), tmp_path / "three")
+    causal = Falling()
+    causal.lidars[1].causal = True
+    with pytest.raises(ValueError, match="lidars: 'fast' is causal"):
+        causal.record(tmp_path / "four", 0.1)
