@@ -850,7 +850,7 @@ NOT_RUN = {
     ".ci/drake_ends": "installs from the network; the workflow runs it",
     "npm ci": "installs from the network; `.ci/run` does it",
     ".venv/bin/mypy && .venv/bin/lint-imports": (
-        "these read this project, not an example; tests/packages runs them"
+        "these read this project, not an example; `.ci/run` runs them"
     ),
     ".venv/bin/pip install -e '.[docs]'": "installs from the network",
     ".venv/bin/pip install pre-commit": "installs from the network and changes"
