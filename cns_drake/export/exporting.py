@@ -117,7 +117,8 @@ def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
         yield note
     scan = drive.scan(0)
     if (
-        not drive.lidar_section
+        layout.has_labels  # KITTI's.
+        and not drive.lidar_section
         and "intensity" in (scan.dtype.names or ())
         and scan["intensity"].max(initial=0.0) > 1.0
     ):

@@ -125,10 +125,11 @@ class RecordedDrive:
             if path.is_dir():
                 files = sorted(p for p in path.rglob("*") if p.is_file())
             stats = [os.stat(file) for file in files]
-            print_of_inputs = path / "fingerprint.txt"
+            folder = path if path.is_dir() else path.parent
             known = None
-            if print_of_inputs.is_file():
-                known = read_bytes(print_of_inputs).decode("utf-8", "replace")
+            if (folder / "fingerprint.txt").is_file():
+                content = read_bytes(folder / "fingerprint.txt")
+                known = content.decode("utf-8", "replace")
         except OSError as error:
             raise InputError(
                 f"{self.path}: {error.strerror or error}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 import math
@@ -472,39 +473,47 @@ def make_flash_pattern(
 # Width of a cell in elevation and in azimuth [deg], and numbers of cells.
 _CELL_DEG = 0.25
 _ROWS, _COLUMNS = round(180 / _CELL_DEG), round(360 / _CELL_DEG)
-# What lies between two beams is covered if they are at most twice this apart.
-_REACH_CELLS = 12
+# Cells around one with a beam that are covered, and half of the widest gap
+# between beams within the field of view: 1.5 and 12 deg.
+_NEAR_CELLS, _GAP_CELLS = 6, 48
 
 
 class BeamCoverage:
     """The directions that the beams of a turn cover.
 
-    These are cells of 0.25 deg with a beam, those beside them, since points are
-    where their beams were up to rounding, and all between beams that are up to
-    6 deg apart: a morphological closing.
+    A beam covers what is within 1.5 deg in elevation and in azimuth, unless it
+    lies outside of the field of view. That has cells of 0.25 deg: those of the
+    beams, those beside them, since points are where their beams were up to
+    rounding, and all between beams that are up to 24 deg apart (a morphological
+    closing).
     """
 
     def __init__(self, d_Sset: np.ndarray):
-        """Covers the cells of beams (N, 3), unit directions in S."""
+        """Covers the directions about beams (N, 3), unit vectors in S."""
         # Imported here: the rest of the module needs no library that is slow
         # to load.
         from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-        covered = np.zeros((_ROWS, _COLUMNS), np.uint8)
-        covered[_cells(d_Sset)] = 1
-        grown = 2 * _REACH_CELLS + 1
-        for grow, size, beyond in (
-            (maximum_filter1d, grown, 0),
-            # Two cells less: those beside the beams stay.
-            (minimum_filter1d, grown - 2, 1),
-        ):
-            covered = grow(covered, size, axis=0, mode="constant", cval=beyond)
-            covered = grow(covered, size, axis=1, mode="wrap")
-        self._is_covered = covered.astype(bool)
+        hit = np.zeros((_ROWS, _COLUMNS), np.uint8)
+        hit[_cells(d_Sset)] = 1
+        field = _grown(hit, _GAP_CELLS, maximum_filter1d, beyond=0)
+        # One cell less: those beside the beams stay.
+        field = _grown(field, _GAP_CELLS - 1, minimum_filter1d, beyond=1)
+        near = _grown(hit, _NEAR_CELLS, maximum_filter1d, beyond=0)
+        self._is_covered = (near & field).astype(bool)
 
     def covers(self, d_Sset: np.ndarray) -> np.ndarray:
         """Returns which directions (N, 3) in S are covered, (N,) bool."""
         return self._is_covered[_cells(d_Sset)]
+
+
+def _grown(
+    cells: np.ndarray, reach: int, grow: Callable, beyond: int
+) -> np.ndarray:
+    """Returns cells after a filter over so many neighbours on each side."""
+    size = 2 * reach + 1
+    rows = grow(cells, size, axis=0, mode="constant", cval=beyond)
+    return grow(rows, size, axis=1, mode="wrap")
 
 
 def _cells(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

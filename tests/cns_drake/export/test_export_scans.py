@@ -89,7 +89,8 @@ def test_intensities_have_the_scale_of_kitti(
         section is None
     )
     # CNS has no scale of its own.
-    drive, _ = export(recording, "cns", tmp_path / "cns")
+    drive, notes = export(recording, "cns", tmp_path / "cns")
+    assert notes == []
     found = drive.scan(1)["intensity"][: len(written)]
     np.testing.assert_allclose(found, recorded, atol=1e-7)
 

@@ -37,7 +37,7 @@ def test_a_beam_covers_its_cell_and_those_around_it(
 
 @pytest.mark.parametrize("preset", LIDAR_PRESETS)
 def test_the_field_of_view_of_presets(preset):
-    """All between the beams is covered, and nothing else, but for 0.5 deg."""
+    """All near to rings is covered, and nothing 0.5 deg beyond the last."""
     field = lidar_field(preset)
     pattern = LIDAR_PRESETS[preset].pattern
     if field is None or not isinstance(pattern, SpinningPattern):
@@ -48,6 +48,8 @@ def test_the_field_of_view_of_presets(preset):
     azimuth = rng.uniform(-180.0, 180.0, 5000)
     covered = coverage.covers(np.transpose(direction(azimuth, elevation)))
     inside = (elevation > field.lowest_deg) & (elevation < field.highest_deg)
+    rings = np.rad2deg(pattern.elevations_rad)
+    inside &= np.abs(elevation[:, None] - rings).min(axis=1) < 1.5
     assert covered[inside].all()
     far = elevation < field.lowest_deg - 0.5
     far |= elevation > field.highest_deg + 0.5
@@ -86,3 +88,18 @@ def test_straight_up_and_down():
     poles = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     assert BeamCoverage(poles).covers(poles).all()
     assert not BeamCoverage(poles[:1]).covers(poles[1:]).any()
+
+
+def test_beams_far_apart_cover_as_much_between_them():
+    """Columns 10 deg apart are one field of view, and cover parts of it."""
+    beams = np.array([direction(a, 3.1) for a in np.arange(-60.0, 61.0, 10.0)])
+    coverage = BeamCoverage(beams)
+    for azimuth, is_covered in (
+        (1.4, True),
+        (-1.4, True),
+        (5.0, False),
+        (61.4, False),
+        (58.6, True),
+    ):
+        one = np.array([direction(azimuth, 3.1)])
+        assert coverage.covers(one).tolist() == [is_covered], azimuth

@@ -247,3 +247,15 @@ def test_a_folder_of_two_formats(tmp_path):
     (drive / "velodyne").mkdir()
     with pytest.raises(InputError, match=r"several formats \(Kitti.*Cns"):
         open_drive(drive)
+
+
+def test_a_viewpoint_of_the_scans_is_named(tmp_path):
+    drive, _ = write_drive(tmp_path)
+    assert open_drive(drive).notes == ()
+    for path in (drive / "pcd").iterdir():
+        data = path.read_bytes().replace(
+            b"VIEWPOINT 0 0 0 1", b"VIEWPOINT 0 0 1.6 1"
+        )
+        path.write_bytes(data)
+    (note,) = open_drive(drive).notes
+    assert "VIEWPOINT is not applied" in note

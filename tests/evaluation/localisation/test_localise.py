@@ -416,7 +416,10 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
     for arguments, *words in (
         ([*pair, *gicp, "--start", "0"], "--start: 0 m"),
         ([*pair, *gicp, "--start", "50.1"], "--start: 50.1 m"),
-        ([*pair, *gicp, "--start", "nan"], "--start: nan is not a finite number"),
+        (
+            [*pair, *gicp, "--start", "nan"],
+            "--start: nan is not a finite number",
+        ),
         ([*pair, *gicp, "--start-turn", "181"], "--start-turn: 181 deg"),
         ([*pair, *gicp, "--seed", "-1"], "--seed"),
         ([*pair, *gicp, "--query-spacing", "0"], "--query-spacing"),

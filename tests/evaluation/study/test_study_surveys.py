@@ -210,8 +210,10 @@ def test_a_copy_of_a_recording_with_a_fingerprint_is_the_same(tmp_path):
     (folder / "fingerprint.txt").write_text("0123 4567\n")
     first = RecordedDrive(folder).identity()
     (path,) = folder.glob("*.mcap")
+    of_file = RecordedDrive(path).identity()
     os.utime(path, ns=(1, 1))
     assert RecordedDrive(folder).identity() == first
+    assert RecordedDrive(path).identity() == of_file
     (folder / "fingerprint.txt").write_text("0123 4568\n")
     assert RecordedDrive(folder).identity() != first
     (folder / "fingerprint.txt").write_text("0123 4567\n")
