@@ -271,9 +271,17 @@ def _called(
     Its docstring is the text; that of the command by default.
     """
 
+    ranged = [
+        one.name
+        for one in parameters
+        for info in getattr(one.annotation, "__metadata__", ())
+        if getattr(info, "min", None) is not None
+    ]
+
     @functools.wraps(command)
     def wrapper(**values: Any) -> None:
-        terminal.check_finite(values)
+        # Others are checked where they are used.
+        terminal.check_finite({name: values[name] for name in ranged})
         run(**values)
 
     wrapper.__doc__ = text or command.__doc__
