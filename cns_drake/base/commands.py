@@ -140,9 +140,17 @@ def _called(
     Its docstring is the text; that of the command by default.
     """
 
+    ranged = [
+        one.name
+        for one in parameters
+        for info in getattr(one.annotation, "__metadata__", ())
+        if getattr(info, "min", None) is not None
+    ]
+
     @functools.wraps(command)
     def wrapper(**values: Any) -> None:
-        check_finite(values)
+        # Others are checked where they are used.
+        check_finite({name: values[name] for name in ranged if name in values})
         run(**values)
 
     wrapper.__doc__ = text or command.__doc__

@@ -226,6 +226,16 @@ def _new_part(path: Path) -> Path:
     return part_path(path)
 
 
+def open_plain(path: Path, flags: int) -> int:
+    """Returns a descriptor of a file to write; it is made if need be.
+
+    No link is followed, which may lead to a file of others, and the reader of a
+    pipe is not waited for.
+    """
+    flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+    return os.open(path, flags, 0o666)
+
+
 def write_part(path: Path, text: str) -> None:
     """Writes text under the part name of `path`, down to the disk.
 
@@ -234,6 +244,9 @@ def write_part(path: Path, text: str) -> None:
     """
     part = _new_part(path)
     # Several files must all be whole before the first gets its name.
+    with user_errors(part):
+        if not part.is_char_device():  # A device that is full says so.
+            part.unlink(missing_ok=True)
     with user_errors(part), open(part, "w", encoding="utf-8") as stream:
         stream.write(text)
         stream.flush()
@@ -327,7 +340,8 @@ def _lock(
     lock: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
 ) -> bool:
     """Locks a file; returns whether it still has its name then."""
-    stream = stack.enter_context(lock.open("w"))
+    descriptor = open_plain(lock, os.O_WRONLY)
+    stream = stack.enter_context(os.fdopen(descriptor, "w"))
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -221,6 +221,7 @@ def scan(
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
 
+        from cns_drake.base.files import check_writable
         from cns_drake.scene.surfaces import LARGEST_SIZE
         from cns_drake.scene.world import load_world
         from cns_drake.sensors.lidar.config import (
@@ -236,6 +237,7 @@ def scan(
     if max(map(abs, pose)) > LARGEST_SIZE:
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
     scanning.check_ending(output)
+    check_writable(output)
     config = make_lidar_config(lidar)
     pattern = make_pattern(config)
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+import math
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +161,8 @@ def _check(source: Path, output: Path, options: ImportOptions) -> None:
         raise InputError(
             "--grow: --years define the stages already; give one of them"
         )
+    if options.lod is not None and not math.isfinite(options.lod):
+        raise InputError(f"--lod: {options.lod} is not a finite number")
     check_new_map(output)
 
 

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import part_path, user_errors
+from cns_drake.base.files import open_plain, part_path, user_errors
 
 
 class RecordingFolder:
@@ -85,7 +85,7 @@ class PartFile(io.BufferedRandom):
             OSError: it cannot be opened or locked.
             InputError: another process is writing it.
         """
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        descriptor = open_plain(path, os.O_RDWR)
         super().__init__(io.FileIO(descriptor, "r+b"))
         try:
             self._lock(path)

@@ -253,9 +253,9 @@ def repair_mcap(
                 on_bytes(before + stream.tell(), 2 * size)
                 yield record
 
+    check_writable(output)
     # Definitions may come behind messages that need them.
     definitions = _find_definitions(read(0), path)
-    check_writable(output)
     with (
         completing(output) as part,
         user_errors(part),

@@ -83,13 +83,13 @@ def localise(
     if isinstance(source, Drive):
         source, drive = options.aligned((source, drive), align)
         check_same_world(source, drive)
+    if output is not None:
+        make_folder(output)
     surroundings = estimators.make_map(
         source, settings, terminal.track, columns, terminal.note
     )
     is_mapped = queries.mapped_frames(source, surroundings, drive)
     localiser = queries.Localiser(surroundings, estimator, settings)
-    if output is not None:
-        make_folder(output)
     values: dict = {
         "method": Path(method).stem,
         "map": source.name,

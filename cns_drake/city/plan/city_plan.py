@@ -21,6 +21,8 @@ from cns_drake.roads.road import MeshStem
 
 # A city's extent [m]: what is generated grows with its area.
 _LARGEST_SIDE = 10_000.0
+# No object is so large [m].
+_LARGEST_PARAMETER = 1000.0
 Point = tuple[float, float]
 Line = Annotated[list[Point], Field(min_length=2)]
 Area = Annotated[list[Point], Field(min_length=3)]
@@ -32,6 +34,15 @@ def _in_order(values: tuple[float, float]) -> tuple[float, float]:
     return values
 
 
+def _not_huge(value: Any) -> Any:
+    is_number = isinstance(value, int | float)
+    if is_number and not abs(value) <= _LARGEST_PARAMETER:
+        raise ValueError(f"{value} is no number up to {_LARGEST_PARAMETER:g}")
+    return value
+
+
+# Arguments of an object's builder.
+Parameters = dict[str, Annotated[Any, AfterValidator(_not_huge)]]
 # Least and greatest value of a drawn number.
 Range = Annotated[
     tuple[float, float],
@@ -182,7 +193,7 @@ class LinePlan(_Model):
     spacing: Range | None = None
     yaw_deg: float = 0.0
     kind: MeshStem | None = None
-    parameters: dict[str, Any] = Field(default_factory=dict)
+    parameters: Parameters = Field(default_factory=dict)
 
 
 class ObjectPlan(_Model):
@@ -201,7 +212,7 @@ class ObjectPlan(_Model):
     at: Point
     yaw_deg: float = 0.0
     kind: MeshStem | None = None
-    parameters: dict[str, Any] = Field(default_factory=dict)
+    parameters: Parameters = Field(default_factory=dict)
 
 
 class StreetPlan(_Model):
@@ -253,7 +264,7 @@ class DistrictPlan(_Model):
     block: Point | None = None
     area: Area | None = None
     ground: Ground = "lawn"
-    relief: float = Field(default=0.0, ge=0)
+    relief: float = Field(default=0.0, ge=0, le=100)
     relief_margin: float = Field(default=12.0, gt=0)
     patches: list[PatchPlan] = Field(default_factory=list)
     buildings: list[BuildingPlan] = Field(default_factory=list)

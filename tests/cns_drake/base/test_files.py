@@ -10,6 +10,7 @@ from cns_drake.base.files import (
     check_writable,
     complete_part,
     draft_folder,
+    exclusive,
     is_there,
     part_path,
     read_bytes,
@@ -133,6 +134,26 @@ def test_a_part_name_that_is_a_pipe_or_a_link_is_not_written_to(tmp_path):
     for name in "ab":
         write_text(tmp_path / name, "text")
         assert (tmp_path / name).read_text() == "text"
+    part_path(tmp_path / "c").symlink_to(mine)
+    os.mkfifo(part_path(tmp_path / "d"))
+    for name in "cd":
+        write_part(tmp_path / name, "text")
+        complete_part(tmp_path / name)
+        assert (tmp_path / name).read_text() == "text"
+    assert mine.read_text() == "mine"
+
+
+def test_a_lock_that_is_a_link_or_a_pipe_is_refused(tmp_path):
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+    (tmp_path / "a.lock").symlink_to(mine)
+    os.mkfifo(tmp_path / "b.lock")
+    for name in "ab":
+        with (
+            pytest.raises(InputError, match=rf"{name}\.lock: "),
+            exclusive(tmp_path / name, lambda: None),
+        ):
+            raise AssertionError("locked")
     assert mine.read_text() == "mine"
 
 

@@ -418,7 +418,7 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
         ([*pair, *gicp, "--start", "50.1"], "--start: 50.1 m"),
         (
             [*pair, *gicp, "--start", "nan"],
-            "--start: nan is not a finite number",
+            "--start: nan m",
         ),
         ([*pair, *gicp, "--start-turn", "181"], "--start-turn: 181 deg"),
         ([*pair, *gicp, "--seed", "-1"], "--seed"),
