@@ -62,6 +62,9 @@ def pytest_collection_modifyitems(items):
 
     None of them is then left for one process at the end.
     """
+    for item in items:
+        if not item.get_closest_marker("slow"):
+            item.add_marker("unit")
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(
         key=lambda item: (item.path.name not in _LONGEST, item.path not in slow)

@@ -11,7 +11,6 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
-from evaluation.clouds.bin_columns import FEWEST_COLUMNS
 
 if TYPE_CHECKING:
     from evaluation.drives import Drive
@@ -59,7 +58,7 @@ Columns = Annotated[
     typer.Option(
         "--columns",
         metavar="N",
-        min=FEWEST_COLUMNS,
+        min=3,  # x, y, z
         help="Number of float32 of a point in .bin files, x y z first; by "
         "default as their values show.",
     ),

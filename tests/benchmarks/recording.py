@@ -57,7 +57,7 @@ STEPS = {
         (OdometrySensor, "_calc_odometry"),
     ),
     "cast": ((RayCastingScene, "cast_rays"),),
-    "points": ((Lidar, "_calc_scan"),),
+    "points": ((Lidar, "_calc_measured"),),
     "messages": (
         (messages, "encode_point_cloud"),
         (messages, "make_imu"),
