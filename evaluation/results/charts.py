@@ -42,6 +42,7 @@ _PX = 1.0 / 96.0
 # [pt]; more than 12 px, on a phone of 360 px as well.
 _FONT = 10.0
 _ROW = 22.0
+_BELOW = 220.0
 # Styles of methods that are not shipped; the first are those of reports.
 _OTHERS = (
     ("#000000", "-.", "X"),
@@ -351,7 +352,8 @@ def _spread(axes: Axes, at: Sequence[float]) -> None:
 def _matrix(chart: _Chart) -> tuple[str, Figure]:
     over, strips = chart.keys["over"], chart.keys.get("strips")
     values = list(dict.fromkeys(row[over] for row in chart.rows))
-    figure, panels = chart.panels((len(values) + 4) * _ROW)
+    # Names of methods and the caption stand below.
+    figure, panels = chart.panels(_BELOW + len(values) * _ROW)
     names = list(chart.styles)
     weakest: list[tuple[float, str, str]] = []
     for axes, rows in zip(panels, chart.panes.values(), strict=True):
@@ -374,7 +376,10 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
                 )
             text = f"{100.0 * shares[-1]:.0f}"
             axes.text(x + 0.5, y + 0.5, text, ha="center", va="center")
-            weakest.append((shares[-1], names[x], _word(values[y])))
+            worst = _word(values[y])
+            if not isinstance(values[y], str):
+                worst = f"{words(over)} {worst}"
+            weakest.append((shares[-1], names[x], worst))
         axes.set(xlim=(0, len(names)), ylim=(len(values), 0))
         middles = np.arange(len(names)) + 0.5
         axes.set_xticks(middles, map(plain, names), rotation=45, ha="right")

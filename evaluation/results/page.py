@@ -180,7 +180,12 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         title += f": {heads[0]}"
         if factors:
             title += f" by {', '.join(map(drawing.words, factors))}"
-        heads = [", ".join(map(_shown, cell)) for _, *cell in columns]
+        heads = [
+            ", ".join(
+                f"{v:g}" if isinstance(v, float) else _shown(v) for v in c
+            )
+            for _, *c in columns
+        ]
     return {"name": title, "metrics": heads, "rows": lines}
 
 
