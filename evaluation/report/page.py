@@ -69,6 +69,7 @@ class Report:
             recording; drives without a page may be left out.
         repeated: results by the protocol of the published numbers, if that is
             another one.
+        made_by: what made it: version, protocol, settings of methods.
     """
 
     changes: list[ChangeResult] = field(default_factory=list)
@@ -81,6 +82,7 @@ class Report:
     illustrations: list[Illustration] = field(default_factory=list)
     costs: Sequence[Cost] = ()
     notes: Sequence[str] = ()
+    made_by: Sequence[str] = ()
     pages: Mapping[str, str] = field(default_factory=dict)
     reference: Reference = NO_REFERENCE
     repeated: list[RecognitionResult] = field(default_factory=list)

@@ -10,6 +10,7 @@ from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
+from cns_drake.base.version import __version__
 from evaluation.change.drive_change import symmetric_changes
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -122,6 +123,11 @@ class Study:
         folder = self._files.figures
         make_folder(folder)
         report = page.Report(pages=pages or {}, reference=self.reference)
+        report.made_by = [
+            f"cns-drake {__version__}",
+            *(one.key for one in self.methods if one.settings),
+            self.protocol.to_text(),
+        ]
         for city in self.cities:
             self._collect(city, report)
         if self.protocol.exclude_recent is None:

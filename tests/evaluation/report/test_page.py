@@ -180,3 +180,11 @@ def test_page_without_recognition_has_no_browser(content, tmp_path):
     # Drives are shown nevertheless, each under its own name.
     assert "<h3>metropolis_01</h3>" in text
     assert re.findall(r'<a href="#(\w+)">', text) == ["summary", "maps"]
+
+
+def test_a_page_says_what_made_it(tmp_path):
+    words = ["cns-drake 9.9", "solid rings=8 & more"]
+    content = make_content(tmp_path, made_by=words)
+    write_page(tmp_path / "report.html", content)
+    text = (tmp_path / "report.html").read_text()
+    assert "Made by cns-drake 9.9; solid rings=8 &amp; more" in text
