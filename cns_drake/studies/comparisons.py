@@ -22,6 +22,7 @@ from cns_drake.studies.experiment import (
     Changes,
     Condition,
     base_protocol,
+    merged,
 )
 from cns_drake.traffic.vehicles import room_for_vehicles
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -159,10 +160,10 @@ class PairOfDrives:
         fields: Any = {}
         for one in chosen:
             for side, values in one.items():
-                fields[side] = _joined(fields.get(side, {}), values)
+                fields[side] = merged(fields.get(side, {}), values)
         built: dict[str, Scenario] = {}
         sides = {
-            side: _joined(fields.get("both", {}), fields.get(side, {}))
+            side: merged(fields.get("both", {}), fields.get(side, {}))
             for side in ("database", "query")
         }
         # Years of cases may need the rates of all conditions.
@@ -475,16 +476,6 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
         title=f"Control: the route of {drive.name} in stage {stage}",
         driver=driver,
     )
-
-
-def _joined(fields: Any, changes: Any) -> Any:
-    """Returns nested fields with changes."""
-    if not (isinstance(fields, Mapping) and isinstance(changes, Mapping)):
-        return changes
-    return {
-        **fields,
-        **{n: _joined(fields.get(n), one) for n, one in changes.items()},
-    }
 
 
 def _ending(side: str, condition: Condition, seed: int) -> str:

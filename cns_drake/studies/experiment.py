@@ -286,10 +286,10 @@ def load_experiment(
     if quick:
         if not isinstance(values.get("quick"), dict):
             raise InputError(f"{path}: quick: no fields of a smaller one")
-        values = _merged(values, values["quick"])
+        values = merged(values, values["quick"])
     for one in overrides:
         if isinstance(one, str):
-            values = _merged(values, _override(one))
+            values = merged(values, _override(one))
         else:
             values = values | dict([one])
     experiment = validated(Experiment, values, path)
@@ -320,12 +320,13 @@ def _override(text: str) -> dict[str, Any]:
     return parsed
 
 
-def _merged(values: Any, changes: Any) -> Any:
+def merged(values: Any, changes: Any) -> Any:
     """Returns a tree with changes: mappings field by field, others whole."""
-    if not (isinstance(values, dict) and isinstance(changes, dict)):
+    if not (isinstance(values, Mapping) and isinstance(changes, Mapping)):
         return changes
-    return values | {
-        name: _merged(values.get(name), one) for name, one in changes.items()
+    return {
+        **values,
+        **{n: merged(values.get(n), one) for n, one in changes.items()},
     }
 
 
@@ -387,7 +388,7 @@ def conditions(experiment: Experiment) -> list[Condition]:
     for cell, (cause, level, members) in itertools.product(cells, cases):
         changes: dict[str, Any] = fixed
         for path, value in cell.items():
-            changes = _merged(changes, _nested(path, value))
+            changes = merged(changes, _nested(path, value))
         named = {CAUSE: cause, LEVEL: level} if experiment.cases else {}
         found.append(
             Condition(
@@ -415,7 +416,7 @@ def _factors(
         single, varied = _split(getattr(experiment, side), (side,))
         for path, value in single.items():
             if path != FRESH:
-                fixed = _merged(fixed, _nested(path, value))
+                fixed = merged(fixed, _nested(path, value))
         factors |= {n: some for n, some in varied.items() if n != FRESH}
     return fixed, factors
 
@@ -556,7 +557,7 @@ def _at_level(case: Case, level: int) -> Case:
     for path, value in _leaves(case, ()):
         if isinstance(value, _Values):
             value = value[min(level, len(value)) - 1]
-        fields = _merged(fields, _nested(path, value))
+        fields = merged(fields, _nested(path, value))
     return fields
 
 

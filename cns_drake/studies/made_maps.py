@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 import hashlib
@@ -62,11 +63,13 @@ class _MakeMap(Step):
             lambda draft: Part(draft / _PART).write(made_of, None), reporter
         )
 
+    @abc.abstractmethod
     def _make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        raise NotImplementedError
+        """Makes the folder; `finish` completes it before it gets its name."""
 
+    @abc.abstractmethod
     def _made_of(self) -> dict[str, object]:
-        raise NotImplementedError
+        """Returns all that the map depends on, ready for JSON."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,6 @@ class LocaliseTask(Task):
     """Whether scans are aligned with the map, from starts beside the truth."""
 
     name = "localise"
-    headline = "success_03m_1deg"
     defaults: ClassVar[Mapping[str, Any]] = {
         "methods": list(SHIPPED),
         "starts": [[2.0, 10.0]],

@@ -23,7 +23,6 @@ class PlaceTask(Task):
     """Which place of the database a query shows."""
 
     name = "place"
-    headline = "auc"
     asks = True
 
     def measure(self, pair: Pair, jobs: Jobs) -> Part:
@@ -58,7 +57,6 @@ class PoseTask(PlaceTask):
     """Where a query lies, by the method's own pose beside its best place."""
 
     name = "pose"
-    headline = "pose_success"
 
     def numbers(
         self, found: Outcomes, before: Outcomes | None

@@ -196,15 +196,12 @@ class Task(abc.ABC):
 
     Attributes:
         name: name of the task in files and on the command line.
-        headline: metric of which the share that is kept is computed; "" if
-            there is none.
         asks: whether it depends on how queries are asked, and on the places
             of the database; other tasks depend on the drives alone.
         defaults: settings of an experiment's file, and their values.
     """
 
     name: ClassVar[str]
-    headline: ClassVar[str] = ""
     asks: ClassVar[bool] = False
     defaults: ClassVar[Mapping[str, Any]] = {}
 
