@@ -20,6 +20,11 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("cns_drake", "evaluation")
 # Root pages are below this folder of the site.
 _PROJECT = "project"
+# Where `nav` in mkdocs.yml has the tab of the API reference.
+_API_TAB = -2
+# Blocks of code have a `span` before `code`.
+_INLINE_CODE = re.compile(r"(?<!</span>)<code>[^<]*</code>")
+_WITH_HYPHEN = re.compile(r"[^\s<>]{,40}-[^\s<>]{,40}")
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -30,9 +35,20 @@ def on_files(files: Files, config: MkDocsConfig, **_: Any) -> Files:
         src = f"{_PROJECT}/{path.name}"
         files.append(File.generated(config, src, content=text))
     for package in PACKAGES:
-        src = f"api/{package}.md"
-        files.append(File.generated(config, src, content=_reference(package)))
+        for path, text in _reference(package).items():
+            files.append(File.generated(config, f"api/{path}", content=text))
     return files
+
+
+def on_config(config: MkDocsConfig, **_: Any) -> MkDocsConfig:
+    """Lists the pages of the API reference in the menu."""
+    assert config.nav is not None
+    for package in PACKAGES:
+        own, *rooms = _reference(package)
+        entries: list[Any] = [f"api/{own}"]
+        entries += [{Path(room).stem: f"api/{room}"} for room in sorted(rooms)]
+        config.nav[_API_TAB]["Python"].append({package: entries})
+    return config
 
 
 def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
@@ -60,6 +76,16 @@ def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
     return _LINK.sub(moved, markdown)
 
 
+def on_page_content(html: str, **_: Any) -> str:
+    """Keeps names and options in inline code from breaking at hyphens."""
+    return _INLINE_CODE.sub(
+        lambda code: _WITH_HYPHEN.sub(
+            r'<span class="whole">\g<0></span>', code[0]
+        ),
+        html,
+    )
+
+
 def _in_repository(src: str) -> str:
     """Returns the path in the repository of a page of the site."""
     own = src.removeprefix(f"{_PROJECT}/")
@@ -72,8 +98,12 @@ def _in_site(path: str) -> str:
     return own if own != path else f"{_PROJECT}/{path}"
 
 
-def _reference(package: str) -> str:
-    """Returns a page that has mkdocstrings explain the public names."""
+def _reference(package: str) -> dict[str, str]:
+    """Returns the pages that explain the public names, one for each room.
+
+    The key is the page's path below `api/`. The first page is the package's
+    own: it lists the names of all rooms.
+    """
     folder = ROOT / package
     text = (folder / "__init__.py").read_text(encoding="utf-8")
     stub = (folder / "__init__.pyi").read_text(encoding="utf-8")
@@ -82,14 +112,19 @@ def _reference(package: str) -> str:
         for node in ast.parse(stub).body
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
+        if alias.name != "__version__"
     }
-    lines = [f"# {package}", "", ast.get_docstring(ast.parse(text)) or ""]
-    for name in sorted({*homes} - {"__version__"}, key=str.lower):
+    pages: dict[str, str] = {}
+    rows = []
+    for name in sorted(homes, key=str.lower):
         home = homes[name]
-        if home.startswith("cns_drake") and package != "cns_drake":
+        room = ".".join(home.split(".")[:2])
+        path = room.replace(".", "/") + ".md"
+        rows.append(f"| [{name}]({path}#{home}.{name}) | `{room}` |")
+        if room.startswith(package):
             # A name has one place in the site.
-            link = f"[{name} of cns_drake](cns_drake.md#{home}.{name})"
-            lines += ["", f"## {name}", "", f"See {link}."]
-        else:
-            lines += ["", f"::: {home}.{name}"]
-    return "\n".join([*lines, ""])
+            pages.setdefault(path, f"# {room}\n")
+            pages[path] += f"\n::: {home}.{name}\n"
+    lines = [f"# {package}", "", ast.get_docstring(ast.parse(text)) or "", ""]
+    lines += ["| name | room |", "|---|---|", *rows, ""]
+    return {f"{package}.md": "\n".join(lines), **pages}

@@ -86,20 +86,33 @@ def test_every_page_is_in_it(site):
 
 
 def test_every_public_name_is_explained(site):
-    explained = set()
-    for package in (cns_drake, evaluation):
-        path = site / f"api/{package.__name__}.html"
+    explained, examples = set(), 0
+    pages = sorted((site / "api").rglob("*.html"))
+    for path in pages:
         explained |= {str(a).rpartition(".")[2] for a in Links(path).anchors}
         # Examples are blocks of code.
-        assert re.search(
-            r"<summary>Example</summary>\s*<div class=.highlight",
-            path.read_text(),
+        examples += bool(
+            re.search(
+                r"<summary>Example</summary>\s*<div class=.highlight",
+                path.read_text(),
+            )
         )
     names = {*cns_drake.__all__, *evaluation.__all__} - {"__version__"}
     assert names <= explained
+    assert examples > 2
+    # One page for each room, all of them in the menu.
+    menu = (site / "api/cns_drake/sensors.html").read_text()
+    assert len(pages) > 10
+    for path in pages:
+        link = os.path.relpath(path, site / "api/cns_drake")
+        assert f'href="{link}"' in menu, link
 
 
-def test_search_finds_methods_and_names(site):
+def test_search_finds_methods_names_and_other_words(site):
     index = json.loads((site / "search/search_index.json").read_text())
     titles = {entry["title"] for entry in index["docs"]}
     assert {"add_lidar", "Layered overlap", "Tutorial"} <= titles
+    # The words that others use for what this project calls otherwise.
+    text = json.dumps(index).lower()
+    for word in ("leaderboard", "localization", "benchmark"):
+        assert word in text, word
