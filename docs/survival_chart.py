@@ -1,83 +1,104 @@
-"""Draws the chart of the README from the table of the results.
+"""Draws the chart of the README from the tables that the package ships.
 
 python docs/survival_chart.py docs/pictures/survival.png
 """
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
-import re
 import sys
 
-import matplotlib
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 import numpy as np
 
-PAGE = Path(__file__).with_name("results.md")
-_CELL = re.compile(r"([\d.]*)→([\d.]+)(?:, (\d+) ?%)?")
+TABLES = Path(__file__).parents[1] / "evaluation/results/baselines"
+NAMES = {
+    "ring++": "RING++",
+    "btc": "BTC",
+    "scan-context++": "Scan Context++",
+    "solid": "SOLiD",
+    "layered-overlap": "layered overlap",
+    "learned": "learned",
+}
+_NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six")
+# A method survives if the median pair keeps this share of its AUC.
+SURVIVES = 0.95
 
 
-def read_table(text: str) -> tuple[list[str], list[str], np.ndarray]:
-    """Reads the table below `## What survives`.
+def kept_shares(table: str) -> dict[str, list[float]]:
+    """Returns the shares of AUC that each method keeps, one for each pair.
 
     Args:
-        text: the page.
-
-    Returns:
-        Methods; pairs of stages; (P, M, 3) AUC with the change, the kept part,
-        NaN where there is none, and 1 where the field is bold, else 0.
+        table: `stages` or `fresh`, a shipped table.
     """
-    _, _, section = text.partition("\n## What survives\n")
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in section.partition("\n## ")[0].splitlines()
-        if line.startswith("|")
-    ]
-    methods = [re.sub(r"\[(.+)\]\(.+\)", r"\1", cell) for cell in rows[0][2:]]
-    pairs = [f"{row[0]} {row[1].replace(', ', ' → ')}" for row in rows[2:]]
-    values = np.full((len(pairs), len(methods), 3), np.nan)
-    for p, row in enumerate(rows[2:]):
-        for m, cell in enumerate(row[2:]):
-            _, changed, kept = _CELL.search(cell.replace("**", "")).groups()
-            share = float(kept or "nan") / 100.0
-            values[p, m] = float(changed), share, "**" in cell
-    return methods, pairs, values
+    found: dict[str, list[float]] = {name: [] for name in NAMES}
+    path = TABLES / f"{table}.csv"
+    with path.open(newline="", encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            if (row["metric"], row["gate"]) == ("kept", "0"):
+                found[row["method"]].append(float(row["value"]))
+    return found
 
 
 def draw(
-    methods: list[str], pairs: list[str], values: np.ndarray, path: Path
-) -> None:
-    """Draws a field for each pair and method; bold ones stay bold."""
-    figure = Figure(figsize=(9.2, 4.6), layout="constrained")
-    axes = figure.subplots()
-    colours = matplotlib.colormaps["viridis"].with_extremes(bad="#d8d8d8")
-    image = axes.imshow(
-        values[:, :, 1], cmap=colours, vmin=0.0, vmax=1.0, aspect="auto"
+    shipped: dict[str, list[float]], fresh: dict[str, list[float]], path: Path
+) -> str:
+    """Draws a row for each method, and returns the title, which is the finding.
+
+    Args:
+        shipped, fresh: shares kept, by method, of pairs of shipped cities and
+            of cities drawn anew, which no method has seen.
+        path: the picture, in the format that its name says.
+    """
+    order = sorted(shipped, key=lambda name: np.median(shipped[name]))
+    survive = sum(
+        min(np.median(shipped[name]), np.median(fresh[name])) >= SURVIVES
+        for name in order
     )
-    for p, m in np.ndindex(values.shape[:2]):
-        auc, kept, is_bold = values[p, m]
-        share = "" if np.isnan(kept) else f"   {100 * kept:.0f} %"
-        dark = kept < 0.55  # On yellow and grey, black is legible.
-        axes.text(
-            m, p, f"{auc:.2f}{share}", ha="center", va="center",
-            color="white" if dark else "black",
-            fontweight="bold" if is_bold else "normal",
+    title = (
+        f"{_NUMBERS[survive]} of {_NUMBERS[len(order)].lower()} methods "
+        "survive a rebuilt city"
+    )
+    with rc_context({"font.size": 15, "svg.hashsalt": "survival"}):
+        figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+        axes = figure.subplots()
+        for y, name in enumerate(order):
+            for shares, offset, style in (
+                (shipped[name], 0.16, {"c": "#17324d"}),
+                (fresh[name], -0.16, {"ec": "#c46a00", "fc": "none"}),
+            ):
+                heights = np.full(len(shares), y + offset)
+                axes.scatter(100 * np.array(shares), heights, s=34, **style)
+                axes.plot(
+                    [100 * np.median(shares)] * 2,
+                    [y + offset - 0.15, y + offset + 0.15],
+                    color="#17324d" if offset > 0 else "#c46a00",
+                    linewidth=3.5,
+                )
+        axes.set_yticks(range(len(order)), [NAMES[name] for name in order])
+        axes.tick_params(axis="y", length=0)
+        axes.set_xlim(0.0, 112.0)
+        axes.axvline(100.0, color="#888888", linewidth=1, zorder=0)
+        axes.grid(axis="x", color="#dddddd")
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right", "left"]].set_visible(False)
+        axes.set_xlabel("AUC kept when the city is rebuilt [%]")
+        counts = len(next(iter(shipped.values()))), len(fresh[order[0]])
+        figure.suptitle(
+            title, fontsize=19, fontweight="bold", x=0.02, ha="left"
+        )
+        axes.set_title(
+            f"● {counts[0]} pairs of shipped cities   "
+            f"○ {counts[1]} of redrawn cities   ┃ median",
+            fontsize=13.5, loc="left", x=-0.32,
         )  # fmt: skip
-    axes.set_xticks(range(len(methods)), methods)
-    axes.set_yticks(range(len(pairs)), pairs)
-    axes.xaxis.tick_top()
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
-    axes.set_xticks(np.arange(len(methods) - 1) + 0.5, minor=True)
-    axes.set_yticks(np.arange(len(pairs) - 1) + 0.5, minor=True)
-    axes.grid(which="minor", color="white", linewidth=2)
-    axes.tick_params(which="minor", length=0)
-    bar = figure.colorbar(image, ax=axes, shrink=0.9)
-    bar.set_label("part of the AUC that is kept (grey: not measured)")
-    figure.savefig(path, dpi=120)
+        figure.savefig(path, dpi=150)
+    return title
 
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit(__doc__)
-    draw(*read_table(PAGE.read_text(encoding="utf-8")), Path(sys.argv[1]))
+    draw(kept_shares("stages"), kept_shares("fresh"), Path(sys.argv[1]))

@@ -1,7 +1,8 @@
-"""The chart of the README shows what the table of the results says."""
+"""The table of results, and the README's chart, show the shipped tables."""
 
 import csv
 import itertools
+import re
 
 from helpers import documents
 import numpy as np
@@ -25,20 +26,66 @@ PAGE = """# Results
 """
 
 
-def test_numbers_are_those_of_the_table(tmp_path):
-    methods, pairs, values = survival_chart.read_table(PAGE)
+_CELL = re.compile(r"([\d.]*)→([\d.]+)(?:, (\d+) ?%)?")
+
+
+def read_table(text):
+    """Reads the table below `## What survives`.
+
+    Returns methods, pairs, and (P, M, 3): the AUC with the change, the kept
+    part, NaN where there is none, and 1 where the field is bold, else 0.
+    """
+    _, _, section = text.partition("\n## What survives\n")
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in section.partition("\n## ")[0].splitlines()
+        if line.startswith("|")
+    ]
+    methods = [re.sub(r"\[(.+)\]\(.+\)", r"\1", cell) for cell in rows[0][2:]]
+    pairs = [f"{row[0]} {row[1].replace(', ', ' → ')}" for row in rows[2:]]
+    values = np.full((len(pairs), len(methods), 3), np.nan)
+    for p, row in enumerate(rows[2:]):
+        for m, cell in enumerate(row[2:]):
+            _, changed, kept = _CELL.search(cell.replace("**", "")).groups()
+            share = float(kept or "nan") / 100.0
+            values[p, m] = float(changed), share, "**" in cell
+    return methods, pairs, values
+
+
+def test_numbers_are_those_of_the_table():
+    methods, pairs, values = read_table(PAGE)
     assert methods == ["RING++", "ours"]
     assert pairs == ["old town 01 → 04", "old town 02 → 04"]
     np.testing.assert_array_equal(values[:, :, 0], [[0.84, 0.88], [0.05, 0.52]])
     np.testing.assert_allclose(values[:, :, 1], [[0.91, np.nan], [0.05, 1.09]])
     assert values[:, :, 2].tolist() == [[0, 0], [1, 0]]
-    survival_chart.draw(methods, pairs, values, tmp_path / "chart.png")
+
+
+def test_the_chart_shows_the_shares_of_the_table(tmp_path):
+    methods, pairs, values = read_table(documents.read("docs/results.md").text)
+    shipped = survival_chart.kept_shares("stages")
+    fresh = survival_chart.kept_shares("fresh")
+    keys = {name: key for key, name in survival_chart.NAMES.items()}
+    rows = [p for p, pair in enumerate(pairs) if "fresh" not in pair]
+    for m, name in enumerate(methods):
+        shown = sorted(shipped[keys[name]])
+        # Cells are rounded to a per cent.
+        np.testing.assert_allclose(
+            shown, sorted(values[rows, m, 1]), atol=0.00501
+        )
+        assert len(fresh[keys[name]]) == 40
+    title = survival_chart.draw(shipped, fresh, tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 1000
+    survivors = sum(
+        min(np.median(shipped[key]), np.median(fresh[key])) >= 0.95
+        for key in shipped
+    )
+    assert (survivors, title.split()[0]) == (2, "Two")
 
 
 def test_the_page_has_all_pairs_and_methods():
     page = documents.read("docs/results.md")
-    methods, pairs, values = survival_chart.read_table(page.text)
+    methods, pairs, values = read_table(page.text)
     assert (len(methods), len(pairs)) == (6, 18)
     assert np.isfinite(values[:, :, 0]).all()
     assert values[:, :, 0].max() == pytest.approx(1.0, abs=0.2)
@@ -56,7 +103,7 @@ def test_fresh_rows_are_those_of_the_five_versions():
             values = float(row["auc"]), float(row["auc_unchanged"])
             found.setdefault((pair, row["method"]), []).append(values)
     page = documents.read("docs/results.md")
-    methods, pairs, values = survival_chart.read_table(page.text)
+    methods, pairs, values = read_table(page.text)
     names = [name.lower().replace(" ", "-") for name in methods]
     names = ["scan-context++" if "scan" in name else name for name in names]
     rows = [p for p, pair in enumerate(pairs) if "fresh" in pair]
