@@ -85,7 +85,7 @@ class Command(TyperCommand):
         # Others are checked where they are used.
         check_finite(
             {
-                one.name: ctx.params[one.name]
+                str(one.name): ctx.params[str(one.name)]
                 for one in self.params
                 if getattr(one.type, "min", None) is not None
             }
