@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 import functools
 import inspect
+import re
 import textwrap
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from cns_drake.base.terminal import check_finite
 
@@ -60,33 +62,35 @@ Costs = Annotated[
 Options = Mapping[str, tuple[Any, Any]]
 
 
-def explained(command: Callable[..., None]) -> Callable[..., None]:
-    """Returns a command whose docstring explains its options to the user.
+class Command(TyperCommand):
+    """A command whose docstring explains its options to the user.
 
-    Args:
-        command: the section `Args` of its docstring has the help of options
-            and arguments; those without an entry have one already.
+    The section `Args` of the docstring has the help of options and arguments;
+    those without an entry have one already.
     """
-    text, _, entries = inspect.getdoc(command).partition("\n\nArgs:\n")  # type: ignore[union-attr]  # Each command has one.
-    helps: dict[str, str] = {}
-    for line in textwrap.dedent(entries).splitlines():
-        if not line.startswith(" "):
-            name, _, line = line.partition(": ")
-            helps[name] = line
-        else:
-            helps[name] += f" {line.strip()}"
-    parameters = []
-    for one in _parameters(command):
-        if one.name in helps:
-            is_required = one.default is inspect.Parameter.empty
-            info: Any = typer.Argument() if is_required else typer.Option()
-            kind = one.annotation
-            if hasattr(kind, "__metadata__"):
-                kind, info = get_args(kind)
-            info.help = helps[one.name]
-            one = one.replace(annotation=Annotated[kind, info])
-        parameters.append(one)
-    return _called(command, command, parameters, text)
+
+    def __init__(self, *args: Any, help: str, params: list, **settings: Any):
+        """Gives each parameter its help."""
+        text, _, entries = help.partition("\n\nArgs:\n")
+        helps = {}
+        for entry in re.split(r"\n(?! )", textwrap.dedent(entries)):
+            name, _, meaning = entry.partition(": ")
+            helps[name] = " ".join(meaning.split())
+        for one in params:
+            one.help = helps.get(one.name, one.help)
+        super().__init__(*args, help=text, params=params, **settings)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Runs the command, unless a number within bounds is none."""
+        # Others are checked where they are used.
+        check_finite(
+            {
+                str(one.name): ctx.params[str(one.name)]
+                for one in self.params
+                if getattr(one.type, "min", None) is not None
+            }
+        )
+        return super().invoke(ctx)
 
 
 def with_options(
@@ -110,50 +114,22 @@ def with_options(
     ]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
         def run(**values: Any) -> None:
             chosen = {name: values.pop(name) for name in options}
             command(**values, **{keyword: make(**chosen)})
 
-        own = [
-            one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-            for one in _parameters(command)
-            if one.name != keyword
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        parameters = [
+            *(
+                one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+                for one in own
+                if one.name != keyword
+            ),
+            *added,
         ]
-        return _called(command, run, [*own, *added])
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {one.name: one.annotation for one in parameters}
+        return run
 
     return decorate
-
-
-def _parameters(command: Callable[..., None]) -> list[inspect.Parameter]:
-    signature = inspect.signature(command, eval_str=True)
-    return list(signature.parameters.values())
-
-
-def _called(
-    command: Callable[..., None],
-    run: Callable[..., None],
-    parameters: Sequence[inspect.Parameter],
-    text: str | None = None,
-) -> Callable[..., None]:
-    """Returns a command as another function runs it, with its parameters.
-
-    Its docstring is the text; that of the command by default.
-    """
-
-    ranged = [
-        one.name
-        for one in parameters
-        for info in getattr(one.annotation, "__metadata__", ())
-        if getattr(info, "min", None) is not None
-    ]
-
-    @functools.wraps(command)
-    def wrapper(**values: Any) -> None:
-        # Others are checked where they are used.
-        check_finite({name: values[name] for name in ranged if name in values})
-        run(**values)
-
-    wrapper.__doc__ = text or command.__doc__
-    wrapper.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    wrapper.__annotations__ = {one.name: one.annotation for one in parameters}
-    return wrapper

@@ -7,7 +7,7 @@ at once. Interrupts wait during imports.
 from collections.abc import Callable
 
 from cns_drake.base import terminal
-from cns_drake.base.commands import explained
+from cns_drake.base.commands import Command
 from cns_drake.base.terminal import example
 from cns_drake.command_line import learning, simulating, studying
 from cns_drake.command_line.maps import age, city, import_city, list_drives
@@ -81,10 +81,11 @@ app = terminal.make_program(
 for _command, (_first, *_rest) in _EXAMPLES.items():
     app.command(
         _NAMES.get(_command),
+        cls=Command,
         epilog=example(f"cns-drake {_first}", *_rest),
         # Years before today look like options.
         context_settings={"ignore_unknown_options": _command is age},
-    )(explained(_command))
+    )(_command)
 
 
 def main() -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,9 @@ from pydrake.math import BsplineBasis
 from pydrake.trajectories import BsplineTrajectory
 
 from cns_drake.base.elementary import arctan2
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 # Quintic: four continuous derivatives, as the accelerations of steered
 # wheels need.
@@ -60,9 +64,9 @@ class SplineDerivatives:
         return [spline.vector_values(parameter).T for spline in self._splines]
 
 
-# Distance of the places at which bends are measured, far below that of the
-# knots between which curvature changes [m].
-_BEND_STEP = 0.1
+# Distance of the places at which bends are measured and functions are taken,
+# far below that of the knots between which curvature changes [m].
+_STEP = 0.1
 
 
 @dataclass(frozen=True)
@@ -95,35 +99,6 @@ class PathJet:
     turn: np.ndarray
     dturn: np.ndarray
     ddturn: np.ndarray
-
-    def rows(self, which: slice) -> PathJet:
-        """Returns the values at some of the parameters."""
-        values = (getattr(self, field.name) for field in fields(self))
-        return PathJet(*(value[which] for value in values))
-
-
-@dataclass(frozen=True)
-class PathSection:
-    """The path from the last knot before each of N parameters up to it.
-
-    `knot` has the (N,) numbers of the knots, `length` the (N,) parameters since
-    them, and `jet` the path at the nodes of Gauss and Legendre's quadrature,
-    those of the first section first.
-    """
-
-    knot: np.ndarray
-    length: np.ndarray
-    jet: PathJet
-
-    # The error is far below a micrometre in a section, where the path is a
-    # polynomial.
-    NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
-
-    def integrate(self, values: np.ndarray) -> np.ndarray:
-        """Returns the (N,) integrals of values at the nodes."""
-        values = values.reshape(-1, len(self.WEIGHTS))
-        # In a fixed order: a matrix product rounds by N.
-        return sum(values.T * self.WEIGHTS[:, None]) * self.length / 2
 
 
 class SmoothPath:
@@ -203,64 +178,29 @@ class SmoothPath:
 
     def tightest_bend(self) -> tuple[float, np.ndarray]:
         """Returns the least radius [m] and the (3,) place that has it."""
-        steps = int(np.ceil(self.end / _BEND_STEP))
-        jet = self.evaluate(np.linspace(0.0, self.end, steps + 1))
+        jet = self.evaluate(self._places())
         curvature = np.abs(jet.turn) / jet.speed
         at = int(curvature.argmax())
         return float(1 / max(curvature[at], 1e-12)), jet.p[at]
 
-    def evaluate_with_section(
-        self, u: ArrayLike
-    ) -> tuple[PathJet, PathSection]:
-        """Returns the path at (N,) parameters u, and the sections before them.
+    def integral(self, integrand: Callable[[PathJet], np.ndarray]) -> PPoly:
+        """Returns the integral from 0 to u of a function along the path.
 
-        One evaluation costs little more than that of one parameter.
+        Its error is far below a micrometre where the function changes as
+        smoothly as the path.
         """
-        wanted = np.atleast_1d(np.asarray(u, dtype=float))
-        wanted = np.clip(wanted, 0.0, self.end)
-        last = round(self.end / self.spacing) - 1
-        knot = (wanted / self.spacing).astype(int).clip(0, last)
-        length = wanted - knot * self.spacing
-        jet = self.evaluate(np.concatenate([wanted, self._nodes(knot, length)]))
-        num = len(wanted)
-        section = PathSection(knot, length, jet.rows(slice(num, None)))
-        return jet.rows(slice(num)), section
+        # Slow to import.
+        from scipy.interpolate import CubicSpline
 
-    def intervals(self) -> PathSection:
-        """Returns the whole path, from each knot to the next."""
-        knot = np.arange(round(self.end / self.spacing))
-        length = np.full(len(knot), self.spacing)
-        jet = self.evaluate(self._nodes(knot, length))
-        return PathSection(knot, length, jet)
+        u = self._places()
+        return CubicSpline(u, integrand(self.evaluate(u))).antiderivative()
 
-    def _nodes(self, knot: np.ndarray, length: np.ndarray) -> np.ndarray:
-        start = knot * self.spacing
-        along = (PathSection.NODES + 1) / 2
-        return (start[:, None] + length[:, None] * along).ravel()
+    def _places(self) -> np.ndarray:
+        steps = int(np.ceil(self.end / _STEP))
+        return np.linspace(0.0, self.end, steps + 1)
 
     def _count_turns(self, u: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns yaw plus the full turns made so far."""
         index = np.rint(np.clip(u, 0.0, self.end) / self.spacing).astype(int)
         nearby = self._knot_yaw[index.clip(0, len(self._knot_yaw) - 1)]
         return yaw + 2 * np.pi * np.rint((nearby - yaw) / (2 * np.pi))
-
-
-class PathIntegral:
-    """The integral from 0 to u of a function along a path."""
-
-    def __init__(
-        self, path: SmoothPath, integrand: Callable[[PathJet], np.ndarray]
-    ):
-        """Tabulates the integral at the knots."""
-        self._integrand = integrand
-        whole = path.intervals()
-        steps = whole.integrate(integrand(whole.jet))
-        self._table = np.concatenate([[0.0], np.cumsum(steps)])
-        # The integral over the whole path.
-        self.total = float(self._table[-1])
-
-    def evaluate(self, section: PathSection) -> np.ndarray:
-        """Returns the (N,) integrals up to the ends of N sections."""
-        return self._table[section.knot] + section.integrate(
-            self._integrand(section.jet)
-        )

@@ -169,15 +169,14 @@ class Moments(NamedTuple):
     """The path at N times; all motion is computed from it.
 
     It has (N,) path parameters u, their rates [1/s] and accelerations [1/s^2],
-    the path there, and the sections of path before them, for integrals. `ride`
-    is the motion of the body against the path; None if it is rigid.
+    and the path there. `ride` is the motion of the body against the path; None
+    if it is rigid.
     """
 
     u: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
     jet: path_geometry.PathJet
-    section: path_geometry.PathSection
     ride: RideMoments | None
 
 
@@ -204,9 +203,7 @@ class Trajectory:
             ),
             2,
         )
-        self._travelled = path_geometry.PathIntegral(
-            self.path, lambda jet: jet.speed
-        )
+        self._travelled = self.path.integral(lambda jet: jet.speed)
         self._ride: BodyRide | None = None
 
     def with_positions(self, positions: np.ndarray) -> Trajectory:
@@ -231,7 +228,7 @@ class Trajectory:
     @property
     def length(self) -> float:
         """The length of the path [m]."""
-        return self._travelled.total
+        return float(self._travelled(self.path.end))
 
     def path_parameter(self, t: ArrayLike) -> list[np.ndarray]:
         """Returns the path parameter u and its rates u', u'' at (N,) times."""
@@ -241,9 +238,8 @@ class Trajectory:
     def at(self, t: ArrayLike) -> Moments:
         """Returns the path at (N,) times."""
         u, rate, acceleration = self.path_parameter(t)
-        jet, section = self.path.evaluate_with_section(u)
         ride = None if self._ride is None else self._ride.at(t)
-        return Moments(u, rate, acceleration, jet, section, ride)
+        return Moments(u, rate, acceleration, self.path.evaluate(u), ride)
 
     def path_motion(self, t: ArrayLike) -> FrameMotion:
         """Returns the path frame F's motion in the world at (N,) times."""
@@ -259,7 +255,7 @@ class Trajectory:
 
     def travelled(self, t: ArrayLike) -> np.ndarray:
         """Returns the (N,) distances travelled at (N,) times [m]."""
-        return self._travelled.evaluate(self.at(t).section)
+        return self._travelled(self.path_parameter(t)[0])
 
     def positions(self, t: ArrayLike) -> np.ndarray:
         """Returns the (N, 3) positions p_WF on the path at (N,) times [m]."""

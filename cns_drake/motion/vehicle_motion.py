@@ -25,7 +25,7 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake.base.elementary import arctan2, product, rotated
-from cns_drake.motion.path_geometry import PathIntegral, PathJet
+from cns_drake.motion.path_geometry import PathJet
 from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
 
 # States computed at a time.
@@ -61,8 +61,8 @@ class WheelMotion:
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
         """Prepares the wheel, whose centre is at p_BC [m]."""
         self._x, self._y, self._radius = p_BC
-        self._rolled = PathIntegral(
-            trajectory.path, lambda jet: np.hypot(*self._ground_velocity(jet))
+        self._rolled = trajectory.path.integral(
+            lambda jet: np.hypot(*self._ground_velocity(jet))
         )
 
     def _ground_velocity(self, jet: PathJet) -> tuple[np.ndarray, np.ndarray]:
@@ -87,12 +87,12 @@ class WheelMotion:
 
         It is positive forwards and zero at the start.
         """
-        rate, acceleration, jet, section = moments[1:5]
+        u, rate, acceleration, jet = moments[:4]
         a, b, da, db, _, _ = self._ground_motion(jet)
         g = np.hypot(a, b)
         dg = (a * da + b * db) / g
         return JointMotion(
-            position=self._rolled.evaluate(section) / self._radius,
+            position=self._rolled(u) / self._radius,
             rate=g * rate / self._radius,
             acceleration=(dg * rate**2 + g * acceleration) / self._radius,
         )

@@ -6,12 +6,12 @@ meanwhile.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
-import queue
-import threading
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-# Number of messages that may wait, each with the small ones before it: two
+# Number of batches that may wait, each with the small ones before it: two
 # frames with one LiDAR and traffic, so that the next frame does not wait for
 # the last one. A killed process loses them, at most eight frames.
 _WAITING = 8
@@ -25,30 +25,26 @@ class BackgroundWriter:
     """A context manager that passes messages on, in order, in a thread.
 
     Leaving it waits until everything is written; leaving it by an exception
-    drops waiting messages. An error of the thread is raised by the next
-    `write`, or on leaving.
+    drops waiting messages. An error of the thread is raised by a later `write`,
+    or on leaving; nothing is written after it.
     """
 
     def __init__(self, write: Callable[..., None]):
         """Starts nothing yet; `write` is called in a thread of its own."""
         self._write = write
-        self._messages: queue.Queue = queue.Queue(_WAITING)
+        self._thread = ThreadPoolExecutor(1)
+        self._batches: deque[Future] = deque()
         self._held: list[tuple[Any, ...]] = []
-        self._error: BaseException | None = None
-        self._dropping = False
-        self._thread = threading.Thread(target=self._run, daemon=True)
 
     def __enter__(self) -> BackgroundWriter:
-        self._thread.start()
         return self
 
     def __exit__(self, exception_type: type | None, *_: object) -> None:
-        self._dropping = exception_type is not None
-        self._messages.put(self._held)
-        self._messages.put(None)
-        self._thread.join()
-        if exception_type is None:
-            self._raise_error()
+        try:
+            if exception_type is None:
+                self._hand_over(0)
+        finally:
+            self._thread.shutdown(cancel_futures=True)
 
     def write(self, *message: Any) -> None:
         """Hands a message over; waits while too many are waiting.
@@ -56,25 +52,23 @@ class BackgroundWriter:
         Raises:
             Whatever writing an earlier message raised.
         """
-        self._raise_error()
         self._held.append(message)
         size = sum([len(one) for one in message if isinstance(one, bytes)])
-        if 0 < size < _SMALL_BYTES and len(self._held) < _MOST_HELD:
-            return
-        self._messages.put(self._held)
+        if not 0 < size < _SMALL_BYTES or len(self._held) >= _MOST_HELD:
+            self._hand_over(_WAITING)
+
+    def _hand_over(self, waiting: int) -> None:
+        """Hands over what is held, and waits until so few batches wait."""
+        before = self._batches[-1] if self._batches else None
+        self._batches.append(
+            self._thread.submit(self._write_batch, self._held, before)
+        )
         self._held = []
+        while len(self._batches) > waiting:
+            self._batches.popleft().result()
 
-    def _raise_error(self) -> None:
-        if self._error is not None:
-            raise self._error
-
-    def _run(self) -> None:
-        # After an error messages are still taken from the queue, so that no
-        # caller waits for room for ever.
-        while (messages := self._messages.get()) is not None:
-            for message in messages:
-                if self._error is None and not self._dropping:
-                    try:
-                        self._write(*message)
-                    except BaseException as error:
-                        self._error = error
+    def _write_batch(self, batch: list[tuple], before: Future | None) -> None:
+        if before is not None:
+            before.result()  # It is done; its error is that of this one.
+        for message in batch:
+            self._write(*message)

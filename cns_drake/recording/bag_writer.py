@@ -22,12 +22,12 @@ from mcap.writer import CompressionType, Writer
 
 from cns_drake.base import files
 from cns_drake.base.drives import ros_types
+from cns_drake.base.drives.mcap_records import Fault, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.version import __version__
 from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.recording_folder import PartFile, RecordingFolder
-from cns_drake.recording.repair import Fault, read_records
 from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
 from cns_drake.recording.schedule import START_NS, Schedule
 

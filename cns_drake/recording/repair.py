@@ -1,26 +1,15 @@
-"""Repair: writes the readable part of a damaged MCAP file as a whole file.
-
-The readers of the `mcap` package need an intact file and trust the sizes that
-it declares. The reader of this module starts at the beginning without any
-index. It checks every size against the file and a limit before it reserves
-memory, checks every checksum, and finds the next intact chunk behind damage."""
+"""Repair: writes the readable part of a damaged MCAP file as a whole file."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 import itertools
-import os
 from pathlib import Path
-import re
-import struct
 from typing import BinaryIO, NamedTuple
 
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     Channel,
-    Chunk,
     Header,
     McapRecord,
     Message,
@@ -28,174 +17,18 @@ from mcap.records import (
     Schema,
 )
 from mcap.writer import CompressionType, Writer
-import zstandard
 
-from cns_drake.base.drives import mcap_file
-from cns_drake.base.drives.mcap_file import MAGIC, RECORD_HEADER, RecordContent
+from cns_drake.base.drives.mcap_records import Fault, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, completing, user_errors
 from cns_drake.base.version import __version__
 from cns_drake.recording import rosbag2_metadata
 
-_LAST_OPCODE = max(Opcode)
-# The beginning of a chunk: the record's opcode and length, two times, size and
-# checksum of the content, compression, length of the compressed content. A
-# lookahead, so that a false beginning hides no true one.
-_CHUNK_START = re.compile(
-    rb"(?=\x06(?P<length>.{8}).{28}"
-    rb"(?P<compression>\x04\0{3}zstd|\x03\0{3}lz4|\0{4})"
-    rb"(?P<content_length>.{8}))",
-    re.DOTALL,
-)
-_LONGEST_CHUNK_START = 9 + 28 + 8 + 8
-_FIRST_SEARCH_BLOCK = 4096
-_LAST_SEARCH_BLOCK = 4 * 1024 * 1024
-# Bytes that look like a chunk are read in vain. A hostile file could keep a
-# reader busy for days, hence a limit, in sizes of the file.
-_MOST_READ = 16
-_FAULTS = (
-    McapError,
-    ValueError,
-    RuntimeError,
-    struct.error,
-    zstandard.ZstdError,
-)
-# Opcode -> what reads the content of a record; those of chunks first.
-_IN_CHUNKS: dict[int, Callable[[bytes], McapRecord]] = {
-    Opcode.MESSAGE: lambda content: Message.read(
-        RecordContent(content), len(content)
-    ),
-    Opcode.SCHEMA: lambda content: Schema.read(RecordContent(content)),
-    Opcode.CHANNEL: lambda content: Channel.read(RecordContent(content)),
-}
-_READERS = {
-    **_IN_CHUNKS,
-    Opcode.HEADER: lambda content: Header.read(RecordContent(content)),
-    Opcode.METADATA: lambda content: Metadata.read(RecordContent(content)),
-    Opcode.ATTACHMENT: mcap_file.parse_attachment,
-}
 # Schemas and channels are kept in memory; more of them is no recording.
 _DEFINITIONS_LIMIT = 64 * 1024 * 1024
 _ROSBAG2 = "rosbag2"
 # Reports how many bytes of how many are done.
 BytesCallback = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class Fault:
-    """What is wrong where a file cannot be read, from an offset on [bytes]."""
-
-    offset: int
-    text: str
-
-    def __str__(self) -> str:
-        return f"byte {self.offset}: {self.text}"
-
-
-def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
-    """Yields the readable records of an MCAP file, in the file's order.
-
-    Those are header, schemas, channels, messages, attachments and metadata;
-    chunks are opened, indexes left out. A Fault stands for each part that
-    cannot be read, also for a missing end. The stream may be moved between two
-    records.
-    """
-    size = stream.seek(0, os.SEEK_END)
-    stream.seek(0)
-    position: int | None = len(MAGIC)
-    if stream.read(len(MAGIC)) != MAGIC:
-        yield Fault(0, "does not begin like an MCAP file")
-        position = _next_chunk(stream, 0, size)
-    budget = _MOST_READ * size
-    while position is not None:
-        end = None
-        try:
-            opcode, end = _read_header(stream, position, size)
-            budget -= end - position
-            if budget < 0:
-                yield Fault(position, "too much damage, the rest is not read")
-                return
-            start = position + RECORD_HEADER.size
-            if end - start > mcap_file.CHUNK_LIMIT_BYTES:
-                raise _DamageError(
-                    f"a record of {end - start} bytes is too large"
-                )
-            yield from _parse(opcode, stream.read(end - start))
-        except _FAULTS as error:
-            text = " ".join(str(error).split())
-            yield Fault(position, text or type(error).__name__)
-            if end is None or not _begins_record(stream, end, size):
-                end = _next_chunk(stream, position + 1, size)
-        else:
-            if opcode == Opcode.FOOTER:
-                return
-        position = end
-
-
-class _DamageError(McapError):
-    """Bytes that cannot be a record."""
-
-
-def _read_header(stream: BinaryIO, position: int, size: int) -> tuple[int, int]:
-    """Returns opcode and end of the record at a position."""
-    stream.seek(position)
-    header = stream.read(RECORD_HEADER.size)
-    if len(header) < RECORD_HEADER.size:
-        raise _DamageError("the file ends too early")
-    opcode, length = RECORD_HEADER.unpack(header)
-    end = position + RECORD_HEADER.size + length
-    if end > size:
-        raise _DamageError("a record reaches beyond the end of the file")
-    if opcode == 0:
-        raise _DamageError("there is no record")
-    return opcode, end
-
-
-def _begins_record(stream: BinaryIO, position: int, size: int) -> bool:
-    try:
-        opcode, _ = _read_header(stream, position, size)
-    except _DamageError:
-        return False
-    return opcode <= _LAST_OPCODE
-
-
-def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
-    """Returns the position of the next bytes that look like a chunk."""
-    block_size = _FIRST_SEARCH_BLOCK
-    while start < size:
-        stream.seek(start)
-        # The overlap lets no chunk hide on the border of two blocks.
-        block = stream.read(block_size + _LONGEST_CHUNK_START)
-        for match in _CHUNK_START.finditer(block):
-            length, compression, content_length = map(
-                match.group, ("length", "compression", "content_length")
-            )
-            # The record ends with the chunk's content.
-            fields = 28 + len(compression) + 8
-            if (
-                int.from_bytes(length, "little")
-                == int.from_bytes(content_length, "little") + fields
-                and match.start() < block_size
-            ):
-                return start + match.start()
-        start += block_size
-        block_size = min(2 * block_size, _LAST_SEARCH_BLOCK)
-    return None
-
-
-def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
-    """Yields the records of interest that a record is or contains."""
-    if opcode == Opcode.CHUNK:
-        chunk = Chunk.read(RecordContent(content))
-        inner = RecordContent(mcap_file.uncompress(chunk))
-        while inner.left:
-            header = inner.read(RECORD_HEADER.size)
-            opcode, length = RECORD_HEADER.unpack(header)
-            content = inner.read(length)
-            if opcode in _IN_CHUNKS:
-                yield _IN_CHUNKS[opcode](content)
-    elif opcode in _READERS:
-        yield _READERS[opcode](content)
 
 
 @dataclass(frozen=True)

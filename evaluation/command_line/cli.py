@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cns_drake.base import commands, terminal
-from cns_drake.base.commands import explained
+from cns_drake.base.commands import Command
 from cns_drake.base.terminal import example, number
 from evaluation.command_line import options
 from evaluation.command_line.localising import localise
@@ -53,9 +53,9 @@ app = terminal.make_program(
 
 
 @app.command(
-    epilog=example("cns-eval tcr drives/metropolis_01 drives/metropolis_04")
+    cls=Command,
+    epilog=example("cns-eval tcr drives/metropolis_01 drives/metropolis_04"),
 )
-@explained
 def tcr(
     source: Annotated[Path, typer.Argument(metavar="A")],
     target: Annotated[Path, typer.Argument(metavar="B")],
@@ -100,18 +100,18 @@ def tcr(
     options.show(report.to_json(), _change_rows(report), json=json)
 
 
-app.command(epilog=example("cns-eval drives drives/riverside_01 mine"))(
-    explained(drives)
-)
+app.command(
+    cls=Command, epilog=example("cns-eval drives drives/riverside_01 mine")
+)(drives)
 
 
 @app.command(
+    cls=Command,
     epilog=example(
         "cns-eval pr drives/metropolis_01 drives/metropolis_04 \\",
         "    --method scan-context++",
-    )
+    ),
 )
-@explained
 @with_protocol
 def pr(
     database: Annotated[Path, typer.Argument(metavar="DATABASE")],
@@ -230,13 +230,13 @@ def pr(
 
 
 @app.command(
+    cls=Command,
     epilog=example(
         "cns-eval scores --method solid --output scores.csv \\",
         "    --database kitti/sequences/01/velodyne \\",
         "    --query kitti/sequences/04/velodyne",
-    )
+    ),
 )
-@explained
 def scores(
     method: options.MethodName,
     database: Annotated[Path, typer.Option()],
@@ -285,15 +285,17 @@ def scores(
 
 
 app.command(
+    cls=Command,
     epilog=example(
         "cns-eval localise drives/metropolis_01 \\",
         "    drives/metropolis_04 --method gicp --start 1",
-    )
-)(explained(localise))
+    ),
+)(localise)
 
 
-@app.command(epilog=example("cns-eval report drives --output report"))
-@explained
+@app.command(
+    cls=Command, epilog=example("cns-eval report drives --output report")
+)
 @with_named_protocol
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
@@ -335,8 +337,7 @@ def report(
     print(path)
 
 
-@app.command(epilog=example("cns-eval compare mine/results.csv"))
-@explained
+@app.command(cls=Command, epilog=example("cns-eval compare mine/results.csv"))
 def compare(
     tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
     metric: str = "auc",
@@ -396,21 +397,23 @@ def compare(
 
 
 app.command(
+    cls=Command,
     epilog=example(
         "cns-eval trajectory drives/metropolis_04 \\",
         "    results/latest/metropolis_04_poses_tum.txt",
-    )
-)(explained(trajectory))
+    ),
+)(trajectory)
 
-app.command(epilog=example("cns-eval map-update maps --baseline distance"))(
-    explained(map_update)
-)
 app.command(
+    cls=Command, epilog=example("cns-eval map-update maps --baseline distance")
+)(map_update)
+app.command(
+    cls=Command,
     epilog=example(
         "cns-eval map-sessions mulran/KAIST01 mulran/KAIST02 \\",
         "    --output kaist",
-    )
-)(explained(map_sessions))
+    ),
+)(map_sessions)
 
 
 def main() -> None:

@@ -14,33 +14,42 @@ from collections.abc import Iterator
 import contextlib
 from dataclasses import dataclass, field
 import functools
-import io
 import os
 from pathlib import Path
 import struct
 from typing import BinaryIO
 import zlib
 
-import lz4.frame
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, Schema, Statistics
+from mcap.records import (
+    Attachment,
+    Channel,
+    Chunk,
+    Message,
+    Schema,
+    Statistics,
+)
 from mcap.summary import Summary
 import numpy as np
 import zstandard
 
+from cns_drake.base.drives.mcap_records import (
+    CHUNK_LIMIT_BYTES,
+    MAGIC,
+    RECORD_HEADER,
+    Fault,
+    RecordContent,
+    locate_records,
+    parse_attachment,
+    uncompress,
+)
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
 
-MAGIC = b"\x89MCAP0\r\n"
-# Opcode and length.
-RECORD_HEADER = struct.Struct("<BQ")
-# A broken or hostile length must not be taken for the size of a buffer. A
-# chunk holds a few scans; an index or a table of structures a few megabytes,
-# of which Python makes a hundred times as much.
-CHUNK_LIMIT_BYTES = 1 << 26
+# An index or a table of structures has a few megabytes, of which Python makes a
+# hundred times as much.
 SUMMARY_LIMIT_BYTES = 1 << 25
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
 # Size of a chunk's record without its data.
@@ -74,42 +83,6 @@ _HOLDING = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL)
 _REPAIR = "(cns-drake repair saves what is whole)"
 
 
-def parse_attachment(body: bytes) -> Attachment:
-    """Returns the attachment whose record has this content.
-
-    Raises:
-        ValueError: if its checksum is wrong, or a field is cut off.
-    """
-    # The checksum of all that precedes it ends the record; 0 is none.
-    checksum = int.from_bytes(body[-4:], "little")
-    if checksum not in (0, zlib.crc32(body[:-4])):
-        raise ValueError("the checksum of an attachment is wrong")
-    return Attachment.read(RecordContent(body))
-
-
-class RecordContent(ReadDataStream):
-    """The content of one record; reads beyond its end are refused.
-
-    Attributes:
-        left: how much of it is still to be read [bytes].
-    """
-
-    def __init__(self, content: bytes):
-        super().__init__(io.BytesIO(content))
-        self.left = len(content)
-
-    def read(self, length: int) -> bytes:
-        """Returns the next bytes.
-
-        Raises:
-            ValueError: if there are fewer.
-        """
-        if not 0 <= length <= self.left:
-            raise ValueError("a field reaches beyond the end of its record")
-        self.left -= length
-        return super().read(length)
-
-
 def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
     """Returns the content of the record at the stream's position."""
     _, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
@@ -121,52 +94,6 @@ def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
     return body
 
 
-def uncompress(chunk: Chunk) -> bytes:
-    """Returns a chunk's records; a small file cannot fill the memory.
-
-    Raises:
-        ValueError: if it is damaged, too large or of unknown compression.
-        RuntimeError: if lz4 finds it damaged.
-        zstandard.ZstdError: likewise.
-    """
-    size = chunk.uncompressed_size
-    if size > CHUNK_LIMIT_BYTES:
-        raise ValueError(f"a chunk of {size} bytes")
-    if chunk.compression == "zstd":
-        # The library reserves the size that the data claim.
-        claimed = zstandard.frame_content_size(chunk.data)
-        if claimed not in (-1, size):
-            raise ValueError(f"a chunk of {claimed} instead of {size} bytes")
-        data = zstandard.decompress(chunk.data, size)
-    elif chunk.compression == "lz4":
-        unpacker = lz4.frame.LZ4FrameDecompressor()
-        data = unpacker.decompress(chunk.data, max_length=size)
-        if not unpacker.eof:
-            raise ValueError(f"a chunk of more than {size} bytes")
-    elif chunk.compression == "":
-        data = chunk.data
-    else:
-        raise ValueError(f"unknown compression {chunk.compression!r}")
-    if len(data) != size:
-        raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
-    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise ValueError("the checksum of a chunk is wrong")
-    return data
-
-
-@dataclass(frozen=True)
-class _Block:
-    """A record that holds messages: a chunk, or a message outside of chunks.
-
-    Attributes:
-        chunk_start_offset: where it begins in the file [bytes].
-        uncompressed_size: of a chunk [bytes]; None for a message.
-    """
-
-    chunk_start_offset: int
-    uncompressed_size: int | None
-
-
 @dataclass
 class _Contents:
     """What a file holds.
@@ -174,7 +101,8 @@ class _Contents:
     Attributes:
         schemas: by id.
         channels: likewise.
-        blocks: in the order of the file.
+        blocks: where each chunk, or message outside of chunks, begins in the
+            file [bytes], in its order.
         indexes: for each block, channel id -> where its message index begins.
         attachments: (name, where it begins) of each.
         found: channel id -> (block, offset in it, log time [ns]) of each
@@ -184,7 +112,7 @@ class _Contents:
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    blocks: list[_Block] = field(default_factory=list)
+    blocks: list[int] = field(default_factory=list)
     indexes: list[dict[int, int]] = field(default_factory=list)
     attachments: list[tuple[str, int]] = field(default_factory=list)
     found: dict[int, list[tuple[int, int, int]]] | None = None
@@ -199,10 +127,7 @@ class _Contents:
         return cls(
             summary.schemas,
             summary.channels,
-            [
-                _Block(chunk.chunk_start_offset, chunk.uncompressed_size)
-                for chunk in chunks
-            ],
+            [chunk.chunk_start_offset for chunk in chunks],
             [chunk.message_index_offsets for chunk in chunks],
             [(one.name, one.offset) for one in summary.attachment_indexes],
             None,
@@ -228,21 +153,6 @@ class _Contents:
             True,
             counts.message_count,
         )
-
-    def add(self, opcode: int, body: bytes, block: int, offset: int) -> None:
-        """Adds a schema, channel or message at an offset in a block."""
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(RecordContent(body))
-            self.schemas.setdefault(schema.id, schema)
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(RecordContent(body))
-            self.channels.setdefault(channel.id, channel)
-        elif opcode == Opcode.MESSAGE:
-            assert self.found is not None
-            number, _, log_time_ns, _ = _MESSAGE_HEADER.unpack_from(body)
-            self.found.setdefault(number, []).append(
-                (block, offset, log_time_ns)
-            )
 
 
 class McapFile:
@@ -418,74 +328,40 @@ class McapFile:
         contents = _Contents(
             dict(self._contents.schemas),
             dict(self._contents.channels),
-            found={},
             statistics=told,
         )
-        assert contents.found is not None
+        found: dict[int, list[tuple[int, int, int]]] = {}
+        contents.found = found
+        there = 0
         with self._reading() as stream:
             size = stream.seek(0, os.SEEK_END)
-            offset = len(MAGIC)
-            while True:
-                stream.seek(offset)
-                opcode, length = RECORD_HEADER.unpack(
-                    stream.read(RECORD_HEADER.size)
-                )
-                end = offset + RECORD_HEADER.size + length
-                if opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                    break
-                if end > size:
-                    raise EOFError("a record ends behind the file")
-                if (
-                    opcode == Opcode.ATTACHMENT
-                    and length <= _ATTACHMENT_LIMIT_BYTES
-                ):
-                    stream.seek(offset)
-                    body = _read_body(
-                        stream, _ATTACHMENT_LIMIT_BYTES, "an attachment"
+            for start, offset, record in locate_records(stream):
+                if isinstance(record, Fault):
+                    raise ValueError(record)
+                if isinstance(record, Schema):
+                    contents.schemas.setdefault(record.id, record)
+                elif isinstance(record, Channel):
+                    contents.channels.setdefault(record.id, record)
+                elif isinstance(record, Attachment):
+                    contents.attachments.append((record.name, start))
+                elif isinstance(record, Message):
+                    if contents.blocks[-1:] != [start]:
+                        contents.blocks.append(start)
+                    found.setdefault(record.channel_id, []).append(
+                        (len(contents.blocks) - 1, offset, record.log_time)
                     )
-                    name = parse_attachment(body).name
-                    contents.attachments.append((name, offset))
-                elif opcode in _HOLDING:
-                    self._add_block(stream, opcode, offset, contents)
+                    there += 1
                     # A few compressed bytes can hold any number of messages.
-                    if sum(map(len, contents.found.values())) > size:
+                    if there > size:
                         raise ValueError("more messages than bytes")
-                offset = end
-            unknown = contents.found.keys() - contents.channels.keys()
+            unknown = found.keys() - contents.channels.keys()
             if unknown:
                 raise ValueError(f"channel {min(unknown)} is defined nowhere")
-            there = sum(map(len, contents.found.values()))
             if told is not None and there != told.message_count:
                 raise ValueError(
                     f"{there} of {told.message_count} messages are there"
                 )
         return contents
-
-    @staticmethod
-    def _add_block(
-        stream: BinaryIO, opcode: int, offset: int, contents: _Contents
-    ) -> None:
-        """Adds what a record at an offset of the file defines and holds."""
-        stream.seek(offset)
-        body = _read_body(stream, _RECORD_LIMIT_BYTES, "a record")
-        number = len(contents.blocks)
-        if opcode != Opcode.CHUNK:
-            contents.add(opcode, body, number, 0)
-            if opcode == Opcode.MESSAGE:
-                contents.blocks.append(_Block(offset, None))
-            return
-        chunk = Chunk.read(RecordContent(body))
-        contents.blocks.append(_Block(offset, chunk.uncompressed_size))
-        records = uncompress(chunk)
-        start = 0
-        while start < len(records):
-            opcode, length = RECORD_HEADER.unpack_from(records, start)
-            begin = start + RECORD_HEADER.size
-            if begin + length > len(records):
-                raise EOFError("a message ends behind its chunk")
-            inner = records[begin : begin + length]
-            contents.add(opcode, inner, number, start)
-            start = begin + length
 
     @staticmethod
     def _read_index(stream: BinaryIO, offset: int, left: int) -> np.ndarray:
@@ -502,20 +378,14 @@ class McapFile:
 
     def _unpack(self, number: int) -> memoryview:
         """Reads and uncompresses a chunk whose checksum is right."""
-        block = self._contents.blocks[number]
         with self._reading() as stream:
-            stream.seek(block.chunk_start_offset)
+            start = stream.seek(self._contents.blocks[number])
+            opcode = stream.read(1)[0]
+            stream.seek(start)
             body = _read_body(stream, _RECORD_LIMIT_BYTES, "a chunk")
-            if block.uncompressed_size is None:
-                header = RECORD_HEADER.pack(Opcode.MESSAGE, len(body))
-                return memoryview(header + body)
-            chunk = Chunk.read(RecordContent(body))
-            if chunk.uncompressed_size != block.uncompressed_size:
-                raise ValueError(
-                    f"a chunk of {chunk.uncompressed_size} bytes, of"
-                    f" {block.uncompressed_size} by the index"
-                )
-            return memoryview(uncompress(chunk))
+            if opcode == Opcode.MESSAGE:
+                return memoryview(RECORD_HEADER.pack(opcode, len(body)) + body)
+            return memoryview(uncompress(Chunk.read(RecordContent(body))))
 
     def _message(self, chunk: memoryview, location: np.void) -> memoryview:
         _, offset, expected_time_ns, expected_channel_id = location.item()

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from cns_drake.motion.path_geometry import (
-    PathIntegral,
     SmoothPath,
     make_uniform_spline,
 )
@@ -159,17 +158,15 @@ def test_bounds_hold_on_hills_and_where_limits_drop():
 
 def test_path_integrals():
     path = SmoothPath(helix_points(25.0, 0.0, 60), SPACING)
-    travelled = PathIntegral(path, lambda jet: jet.speed)
+    travelled = path.integral(lambda jet: jet.speed)
     # Inside the bend the curve is a circle; its ends are not.
     u = np.array([20.0, 20.0 + 1e-9, 31.7, 90.0])
     arc = (u - 20.0) * smoothed_radius(25.0) / 25.0
-    jet, section = path.evaluate_with_section(u)
-    np.testing.assert_array_equal(jet.ddyaw, path.evaluate(u).ddyaw)
-    length = travelled.evaluate(section)
+    length = travelled(u)
     np.testing.assert_allclose(length - length[0], arc, atol=1e-9)
     fine = path.evaluate(np.linspace(0, path.end, 40001)).p
     chords = np.linalg.norm(np.diff(fine, axis=0), axis=1).sum()
-    assert travelled.total == pytest.approx(chords, abs=1e-6)
+    assert travelled(path.end) == pytest.approx(chords, abs=1e-6)
 
 
 def test_wheels_of_a_steady_bend_roll_on_circles():

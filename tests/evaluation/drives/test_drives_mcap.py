@@ -344,7 +344,7 @@ def tamper(path, change):
     """Replaces the record of the first chunk by the result of `change`."""
     data = path.read_bytes()
     stream = open_drive(path)._file
-    start = stream._contents.blocks[0].chunk_start_offset
+    start = stream._contents.blocks[0]
     (length,) = struct.unpack_from("<Q", data, start + 1)
     body = bytearray(data[start + 9 : start + 9 + length])
     change(body)

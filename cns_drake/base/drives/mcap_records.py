@@ -1,0 +1,282 @@
+"""The records of an MCAP file, from its beginning on, without any index.
+
+The readers of the `mcap` package need an intact file and trust the sizes that
+it declares. Here every size is checked against the file and a limit before
+memory is reserved, and every checksum is checked. The reader finds the next
+intact chunk behind damage."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+import io
+import os
+import re
+import struct
+from typing import BinaryIO
+import zlib
+
+import lz4.frame
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    Channel,
+    Chunk,
+    Header,
+    McapRecord,
+    Message,
+    Metadata,
+    Schema,
+)
+import zstandard
+
+MAGIC = b"\x89MCAP0\r\n"
+# Opcode and length.
+RECORD_HEADER = struct.Struct("<BQ")
+# A broken or hostile length must not be taken for the size of a buffer. A
+# chunk holds a few scans.
+CHUNK_LIMIT_BYTES = 1 << 26
+_LAST_OPCODE = max(Opcode)
+# The beginning of a chunk: the record's opcode and length, two times, size and
+# checksum of the content, compression, length of the compressed content. A
+# lookahead, so that a false beginning hides no true one.
+_CHUNK_START = re.compile(
+    rb"(?=\x06(?P<length>.{8}).{28}"
+    rb"(?P<compression>\x04\0{3}zstd|\x03\0{3}lz4|\0{4})"
+    rb"(?P<content_length>.{8}))",
+    re.DOTALL,
+)
+_LONGEST_CHUNK_START = 9 + 28 + 8 + 8
+_FIRST_SEARCH_BLOCK = 4096
+_LAST_SEARCH_BLOCK = 4 * 1024 * 1024
+# Bytes that look like a chunk are read in vain. A hostile file could keep a
+# reader busy for days, hence a limit, in sizes of the file.
+_MOST_READ = 16
+_FAULTS = (
+    McapError,
+    ValueError,
+    RuntimeError,
+    struct.error,
+    zstandard.ZstdError,
+)
+
+
+def parse_attachment(body: bytes) -> Attachment:
+    """Returns the attachment whose record has this content.
+
+    Raises:
+        ValueError: if its checksum is wrong, or a field is cut off.
+    """
+    # The checksum of all that precedes it ends the record; 0 is none.
+    checksum = int.from_bytes(body[-4:], "little")
+    if checksum not in (0, zlib.crc32(body[:-4])):
+        raise ValueError("the checksum of an attachment is wrong")
+    return Attachment.read(RecordContent(body))
+
+
+class RecordContent(ReadDataStream):
+    """The content of one record; reads beyond its end are refused.
+
+    Attributes:
+        left: how much of it is still to be read [bytes].
+    """
+
+    def __init__(self, content: bytes):
+        super().__init__(io.BytesIO(content))
+        self.left = len(content)
+
+    def read(self, length: int) -> bytes:
+        """Returns the next bytes.
+
+        Raises:
+            ValueError: if there are fewer.
+        """
+        if not 0 <= length <= self.left:
+            raise ValueError("a field reaches beyond the end of its record")
+        self.left -= length
+        return super().read(length)
+
+
+def uncompress(chunk: Chunk) -> bytes:
+    """Returns a chunk's records; a small file cannot fill the memory.
+
+    Raises:
+        ValueError: if it is damaged, too large or of unknown compression.
+        RuntimeError: if lz4 finds it damaged.
+        zstandard.ZstdError: likewise.
+    """
+    size = chunk.uncompressed_size
+    if size > CHUNK_LIMIT_BYTES:
+        raise ValueError(f"a chunk of {size} bytes")
+    if chunk.compression == "zstd":
+        # The library reserves the size that the data claim.
+        claimed = zstandard.frame_content_size(chunk.data)
+        if claimed not in (-1, size):
+            raise ValueError(f"a chunk of {claimed} instead of {size} bytes")
+        data = zstandard.decompress(chunk.data, size)
+    elif chunk.compression == "lz4":
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        data = unpacker.decompress(chunk.data, max_length=size)
+        if not unpacker.eof:
+            raise ValueError(f"a chunk of more than {size} bytes")
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise ValueError(f"unknown compression {chunk.compression!r}")
+    if len(data) != size:
+        raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
+    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+        raise ValueError("the checksum of a chunk is wrong")
+    return data
+
+
+# Opcode -> what reads the content of a record; those of chunks first.
+_IN_CHUNKS: dict[int, Callable[[bytes], McapRecord]] = {
+    Opcode.MESSAGE: lambda content: Message.read(
+        RecordContent(content), len(content)
+    ),
+    Opcode.SCHEMA: lambda content: Schema.read(RecordContent(content)),
+    Opcode.CHANNEL: lambda content: Channel.read(RecordContent(content)),
+}
+_READERS = {
+    **_IN_CHUNKS,
+    Opcode.HEADER: lambda content: Header.read(RecordContent(content)),
+    Opcode.METADATA: lambda content: Metadata.read(RecordContent(content)),
+    Opcode.ATTACHMENT: parse_attachment,
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong where a file cannot be read, from an offset on [bytes]."""
+
+    offset: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"byte {self.offset}: {self.text}"
+
+
+def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
+    """Yields the readable records of an MCAP file, in the file's order.
+
+    Those are header, schemas, channels, messages, attachments and metadata;
+    chunks are opened, indexes left out. A Fault stands for each part that
+    cannot be read, also for a missing end. The stream may be moved between two
+    records.
+    """
+    return (record for _, _, record in locate_records(stream))
+
+
+def locate_records(
+    stream: BinaryIO,
+) -> Iterator[tuple[int, int, McapRecord | Fault]]:
+    """Yields records like `read_records`, each with its place.
+
+    Yields:
+        The offset of a chunk in the file and that of a record in the
+        uncompressed chunk, or the offset of a record in the file and 0 [bytes];
+        and the record.
+    """
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(0)
+    position: int | None = len(MAGIC)
+    if stream.read(len(MAGIC)) != MAGIC:
+        yield 0, 0, Fault(0, "does not begin like an MCAP file")
+        position = _next_chunk(stream, 0, size)
+    budget = _MOST_READ * size
+    while position is not None:
+        end = None
+        try:
+            opcode, end = _read_header(stream, position, size)
+            budget -= end - position
+            if budget < 0:
+                fault = "too much damage, the rest is not read"
+                yield position, 0, Fault(position, fault)
+                return
+            start = position + RECORD_HEADER.size
+            if end - start > CHUNK_LIMIT_BYTES:
+                raise _DamageError(
+                    f"a record of {end - start} bytes is too large"
+                )
+            for offset, record in _parse(opcode, stream.read(end - start)):
+                yield position, offset, record
+        except _FAULTS as error:
+            text = " ".join(str(error).split()) or type(error).__name__
+            yield position, 0, Fault(position, text)
+            if end is None or not _begins_record(stream, end, size):
+                end = _next_chunk(stream, position + 1, size)
+        else:
+            if opcode == Opcode.FOOTER:
+                return
+        position = end
+
+
+class _DamageError(McapError):
+    """Bytes that cannot be a record."""
+
+
+def _read_header(stream: BinaryIO, position: int, size: int) -> tuple[int, int]:
+    """Returns opcode and end of the record at a position."""
+    stream.seek(position)
+    header = stream.read(RECORD_HEADER.size)
+    if len(header) < RECORD_HEADER.size:
+        raise _DamageError("the file ends too early")
+    opcode, length = RECORD_HEADER.unpack(header)
+    end = position + RECORD_HEADER.size + length
+    if end > size:
+        raise _DamageError("a record reaches beyond the end of the file")
+    if opcode == 0:
+        raise _DamageError("there is no record")
+    return opcode, end
+
+
+def _begins_record(stream: BinaryIO, position: int, size: int) -> bool:
+    try:
+        opcode, _ = _read_header(stream, position, size)
+    except _DamageError:
+        return False
+    return opcode <= _LAST_OPCODE
+
+
+def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
+    """Returns the position of the next bytes that look like a chunk."""
+    block_size = _FIRST_SEARCH_BLOCK
+    while start < size:
+        stream.seek(start)
+        # The overlap lets no chunk hide on the border of two blocks.
+        block = stream.read(block_size + _LONGEST_CHUNK_START)
+        for match in _CHUNK_START.finditer(block):
+            length, compression, content_length = map(
+                match.group, ("length", "compression", "content_length")
+            )
+            # The record ends with the chunk's content.
+            fields = 28 + len(compression) + 8
+            if (
+                int.from_bytes(length, "little")
+                == int.from_bytes(content_length, "little") + fields
+                and match.start() < block_size
+            ):
+                return start + match.start()
+        start += block_size
+        block_size = min(2 * block_size, _LAST_SEARCH_BLOCK)
+    return None
+
+
+def _parse(opcode: int, content: bytes) -> Iterator[tuple[int, McapRecord]]:
+    """Yields the records of interest that a record is or contains.
+
+    Each comes with its offset in an uncompressed chunk [bytes].
+    """
+    if opcode == Opcode.CHUNK:
+        chunk = Chunk.read(RecordContent(content))
+        inner = RecordContent(uncompress(chunk))
+        while inner.left:
+            offset = chunk.uncompressed_size - inner.left
+            header = inner.read(RECORD_HEADER.size)
+            opcode, length = RECORD_HEADER.unpack(header)
+            content = inner.read(length)
+            if opcode in _IN_CHUNKS:
+                yield offset, _IN_CHUNKS[opcode](content)
+    elif opcode in _READERS:
+        yield 0, _READERS[opcode](content)
