@@ -186,7 +186,7 @@ class OldWorld:
         if not is_there(self.folder.roads):
             return {}
         network = load_road_network(self.folder.roads)
-        return {n: network.junction_area(n) for n in sorted(network.junctions)}
+        return dict(sorted(network.junction_areas.items()))
 
 
 _PUBLIC = re.compile(

@@ -1,15 +1,9 @@
-"""Casting rays on a SceneGraph's geometry.
-
-Only this module depends on the ray-casting library: Embree, or Open3D on
-platforms without a wheel of Embree.
-"""
+"""Casting rays on a SceneGraph's geometry."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-import importlib.util
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import FrameId
@@ -17,21 +11,15 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting import moving_groups
+from cns_drake.ray_casting.embree_hierarchy import EmbreeScene
 from cns_drake.ray_casting.ray_groups import (
     Motion,
-    RayGroup,
     group_geometries,
     serves,
 )
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 
-if TYPE_CHECKING:
-    from cns_drake.ray_casting.embree_hierarchy import EmbreeScene
-    from cns_drake.ray_casting.open3d_scene import Open3dScene
-
-# The package whose wheel holds Embree's C library.
-_EMBREE_PACKAGE = "embreex"
 _IDENTITY = np.eye(3)
 _AT_ONCE = np.zeros(1, np.float32)
 
@@ -92,14 +80,13 @@ class RayCastingScene:
             enumerate(geometries),
             anchored_frames,
             calc_X_WF,
-            may_share=_has_embree(),
             p_WS=p_WS,
         )
         for group in self._groups:
             group.place(self._p_WO, calc_X_WF)
         solid = [group for group in self._groups if not group.is_half_space]
         self._planes = dict(list(enumerate(self._groups))[len(solid) :])
-        self._scene: EmbreeScene | Open3dScene = _make_scene(
+        self._scene: EmbreeScene = EmbreeScene(
             solid, num_threads, None if previous is None else previous._scene
         )
         self._moving = moving_groups.MovingGroups(self._groups, self._p_WO)
@@ -311,22 +298,3 @@ def _take_planes(
             hits.owner[ray], hits.group[ray] = owners[row], row
             for axis in range(hits.normals.shape[1]):
                 hits.normals[ray, axis] = axis == 2
-
-
-def _has_embree() -> bool:
-    return importlib.util.find_spec(_EMBREE_PACKAGE) is not None
-
-
-def _make_scene(
-    groups: Sequence[RayGroup],
-    num_threads: int,
-    previous: EmbreeScene | Open3dScene | None,
-) -> EmbreeScene | Open3dScene:
-    if _has_embree():
-        from cns_drake.ray_casting.embree_hierarchy import EmbreeScene
-
-        assert previous is None or isinstance(previous, EmbreeScene)
-        return EmbreeScene(groups, num_threads, previous)
-    from cns_drake.ray_casting.open3d_scene import Open3dScene
-
-    return Open3dScene(groups, num_threads)

@@ -143,18 +143,17 @@ def group_geometries(
     anchored_frames: Collection[FrameId],
     calc_X_WF: Callable[[FrameId], RigidTransform],
     *,
-    may_share: bool = True,
     p_WS: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[RayGroup]]:
     """Returns p_WO, and the groups of geometries, given with their indices.
 
-    The world's is the first if there is one; half spaces are the last. If they
-    may share, large surfaces with many copies get a group for each copy, all
-    with the same surface. Where a sensor at p_WS is far from the middle of the
-    world's geometry, O is in the middle of the cube with the sensor.
+    The world's is the first if there is one; half spaces are the last. Large
+    surfaces with many copies get a group for each copy, all with the same
+    surface. Where a sensor at p_WS is far from the middle of the world's
+    geometry, O is in the middle of the cube with the sensor.
     """
     geometries = list(geometries)
-    shared = _find_shared(geometries) if may_share else frozenset()
+    shared = _find_shared(geometries)
     by_frame: dict[FrameId | None, list[Member]] = {}
     half_spaces = []
     for index, geometry in geometries:

@@ -1,7 +1,7 @@
 """Areas of a road network: carriageway, sidewalks, medians, bays, lanes."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import itertools
 import math
 
@@ -31,13 +31,23 @@ _BAY_CLEARANCE = 3.0
 
 @dataclass(frozen=True)
 class Areas:
-    """The areas that `RoadNetwork` exposes by the same names."""
+    """The areas of streets in the world [m].
+
+    Attributes:
+        carriageway: the area between the kerbs, where vehicles drive or park.
+        lane_area: the carriageway without parking bays.
+        sidewalks: areas beside the road and round all corners, a kerb higher.
+        medians: kerbed strips between the directions.
+        parking_bays: bays by (road, "left" or "right" of `forward`).
+    """
 
     carriageway: MultiPolygon
     lane_area: MultiPolygon
     sidewalks: MultiPolygon
     medians: MultiPolygon
-    parking_bays: dict[tuple[str, str], BaseGeometry]
+    parking_bays: Mapping[tuple[str, str], BaseGeometry] = field(
+        default_factory=dict
+    )
 
 
 def corner_setback(

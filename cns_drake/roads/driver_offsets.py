@@ -42,7 +42,7 @@ def kerbs(network: RoadNetwork) -> STRtree:
 
     They are pieces of a few metres.
     """
-    outline = np.asarray(shapely.get_parts(network.lane_area().boundary))
+    outline = np.asarray(shapely.get_parts(network.areas.lane_area.boundary))
     corners, line = shapely.get_coordinates(outline, return_index=True)
     pairs = np.stack([corners[:-1], corners[1:]], axis=1)
     return STRtree(shapely.linestrings(pairs[line[:-1] == line[1:]]))

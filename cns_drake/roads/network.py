@@ -9,7 +9,6 @@ from typing import Literal
 
 import numpy as np
 from shapely import STRtree
-from shapely.geometry import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.angles import wrapped
@@ -176,39 +175,21 @@ class RoadNetwork:
         return [way for way in ways if self.is_legal(way)]
 
     @cached_property
-    def _junction_areas(self) -> dict[str, BaseGeometry]:
+    def junction_areas(self) -> dict[str, BaseGeometry]:
+        """The areas of junctions between the roads' ends and the kerbs."""
         return {
             name: carriageway.junction_area(self.roads, junction)
             for name, junction in self.junctions.items()
         }
 
     @cached_property
-    def _areas(self) -> carriageway.Areas:
-        return carriageway.make_areas(self.roads, self._junction_areas)
+    def areas(self) -> carriageway.Areas:
+        """The areas of all streets.
 
-    def junction_area(self, junction: str) -> BaseGeometry:
-        """Returns a junction's area between the roads' ends and the kerbs."""
-        return self._junction_areas[junction]
-
-    def carriageway(self) -> MultiPolygon:
-        """Returns the area between the kerbs, parking bays included."""
-        return self._areas.carriageway
-
-    def sidewalks(self) -> MultiPolygon:
-        """Returns the sidewalks along all roads and round all corners."""
-        return self._areas.sidewalks
-
-    def medians(self) -> MultiPolygon:
-        """Returns the kerbed strips between the directions."""
-        return self._areas.medians
-
-    def parking_bays(self) -> dict[tuple[str, str], BaseGeometry]:
-        """Returns the bays by (road, "left" or "right" of `forward`)."""
-        return self._areas.parking_bays
-
-    def lane_area(self) -> MultiPolygon:
-        """Returns the area of lanes: the carriageway without the bays."""
-        return self._areas.lane_area
+        Raises:
+            ValueError: the outline of a road or junction crosses itself.
+        """
+        return carriageway.make_areas(self.roads, self.junction_areas)
 
 
 def _turn_deg(a: _Pose, b: _Pose) -> float:

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, Strict
 
 from cns_drake.base.elementary import cos, sin
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.centreline import Centreline, sample_stations
 
@@ -117,13 +117,7 @@ def read_roads_file(path: Path | str) -> RoadsFile:
             key, a missing one or a value of the wrong type.
     """
     path = Path(path)
-    content = read_yaml(path)
-    try:
-        return RoadsFile.model_validate(_with_defaults(content))
-    except ValidationError as error:
-        raise InputError(
-            describe_validation_error(path, error, RoadsFile)
-        ) from error
+    return validated(RoadsFile, _with_defaults(read_yaml(path)), path)
 
 
 def _with_defaults(content: Any) -> Any:

@@ -272,7 +272,7 @@ def _turn_round(
         farthest = road.length + beyond
         nearest = max(start, road.length - _TURNING_LENGTH)
         centres = np.arange(farthest, nearest, -_TURNING_STEP)
-    loop = find_loop(lanes_at, centres, network.lane_area())
+    loop = find_loop(lanes_at, centres, network.areas.lane_area)
     x, y, heading = lanes_at(loop.begin)[0]
     ahead = (loop.points[:, 0] - x) * math.cos(heading)
     ahead += (loop.points[:, 1] - y) * math.sin(heading)

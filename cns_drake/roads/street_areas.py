@@ -1,4 +1,4 @@
-"""Areas of streets, and heights of their surface."""
+"""Heights of the surface of streets."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -6,26 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
-from shapely.geometry import MultiPolygon
 
 from cns_drake.roads.network import RoadNetwork
-
-
-class StreetAreas(Protocol):
-    """The areas of streets in the world [m]."""
-
-    def carriageway(self) -> MultiPolygon:
-        """Returns the carriageway: the area where vehicles drive or park."""
-
-    def lane_area(self) -> MultiPolygon:
-        """Returns the carriageway without parking bays."""
-
-    def sidewalks(self) -> MultiPolygon:
-        """Returns the sidewalks: areas beside the road, a kerb higher."""
-
-    def medians(self) -> MultiPolygon:
-        """Returns the medians: areas between the directions, a kerb higher."""
-
 
 # Returns the (N,) heights of sidewalks above the road at (N, 2) places [m].
 KerbMap = Callable[[np.ndarray], np.ndarray]

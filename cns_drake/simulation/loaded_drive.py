@@ -177,7 +177,7 @@ def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
     roads = scenario_files.map_folder(scenario).roads
     if scenario.map is None or not roads.is_file():
         return driven
-    return driven.union(load_road_network(roads).lane_area())
+    return driven.union(load_road_network(roads).areas.lane_area)
 
 
 def plan_scenario_traffic(

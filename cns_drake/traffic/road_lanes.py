@@ -267,7 +267,7 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                     Walkway(line, _CROSSING_HALF_WIDTH, left, right, k)
                 )
     # At unusual junctions, not every corner has a sidewalk.
-    lanes = network.lane_area()
+    lanes = network.areas.lane_area
     shapely.prepare(lanes)
     return [
         way

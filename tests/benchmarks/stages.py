@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-import contextlib
 from dataclasses import dataclass
-import io
 import time
 
 import numpy as np
@@ -13,7 +11,6 @@ import open3d
 from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.ray_casting.open3d_scene import Open3dScene
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
 from cns_drake.scenarios.planning import plan_drive
@@ -22,7 +19,11 @@ from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     read_perception_geometry,
 )
-from cns_drake.scene.surfaces import TriangleSurface
+from cns_drake.scene.surfaces import (
+    TriangleSurface,
+    merge_triangles,
+    tessellate,
+)
 from cns_drake.scene.world import load_world
 
 
@@ -65,9 +66,14 @@ class Open3dStage:
         )
         for group in groups:
             group.place(self._p_WO, still)
-        # It would say that it stands in for Embree.
-        with contextlib.redirect_stderr(io.StringIO()):
-            self.scene = Open3dScene(groups[:1], num_threads=1)._scenes[0]
+        surface, _ = merge_triangles(
+            [(k, X, tessellate(one, 128)) for k, X, one in groups[0].members]
+        )
+        self.scene = open3d.t.geometry.RaycastingScene(nthreads=1)
+        self.scene.add_triangles(
+            open3d.core.Tensor(surface.p_GVset.astype(np.float32)),
+            open3d.core.Tensor(surface.triangles.astype(np.uint32)),
+        )
 
     def rays(self, X_WS: RigidTransform, d_Sset) -> open3d.core.Tensor:
         """Returns the rays of (N, 3) beams from a sensor's pose."""

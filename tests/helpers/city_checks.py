@@ -24,7 +24,7 @@ def check_no_structure_stands_in_another(standing):
 
 
 def check_no_structure_stands_in_a_lane(standing, network):
-    lanes = network.lane_area()
+    lanes = network.areas.lane_area
     shapely.prepare(lanes)
     for structure in standing:
         footprint = structure.footprint_W.buffer(-0.01)
@@ -88,7 +88,7 @@ def check_nothing_low_reaches_far_out_of_its_footprint(standing, network):
     Triangles that cross head height are cut there; only vertices and these cuts
     are compared.
     """
-    lanes = network.lane_area()
+    lanes = network.areas.lane_area
     shapely.prepare(lanes)
     for structure in standing:
         low = [

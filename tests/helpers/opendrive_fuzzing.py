@@ -55,4 +55,4 @@ def read_opendrive(folder: Path) -> None:
     streets = ImportedStreets(split_levels(bands)[0])
     find_lane_drives(bands)
     for one in roads:
-        list(thing_structures(one, streets.lane_area(), faults))
+        list(thing_structures(one, streets.areas.lane_area, faults))

@@ -36,6 +36,7 @@ from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import furnish
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads import street_areas
+from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
 
 
@@ -60,7 +61,7 @@ class Streets(NamedTuple):
     `park` parks cars in them, last of all.
     """
 
-    areas: street_areas.StreetAreas
+    areas: Areas
     surface: street_areas.SurfaceHeights
     kerb_height: float
     junctions: BaseGeometry
@@ -99,7 +100,7 @@ def make_city(world: Path) -> City:
     roads = MapFolder(world).roads
     network = load_road_network(roads)
     try:
-        network.carriageway()
+        _ = network.areas
     except ValueError as error:
         raise InputError(f"{roads}: {error}") from error
     source = MapFolder(world).plan
@@ -119,12 +120,10 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         InputError: if the plan names something unknown or impossible.
     """
     streets = Streets(
-        network,
+        network.areas,
         street_areas.RoadSurface(network),
         kerb_height(network),
-        unary_union(
-            [network.junction_area(name) for name in network.junctions]
-        ),
+        unary_union(list(network.junction_areas.values())),
         Polygon(),
         Polygon(),
         (*street_structures(network), marking_structure(network)),

@@ -21,9 +21,9 @@ from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
+from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import draw_route
-from cns_drake.roads.street_areas import StreetAreas
 
 # The world reaches this far beyond the roads [m].
 _MARGIN = 45.0
@@ -78,7 +78,7 @@ def start_city(
     write(
         plan_file.name,
         "The districts: the blocks between the roads.",
-        lambda: starter_plan(network, seed),
+        lambda: starter_plan(network.areas, seed),
     )
 
     def stages() -> dict:
@@ -107,12 +107,12 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
     }
 
 
-def starter_plan(areas: StreetAreas, seed: int) -> dict:
+def starter_plan(areas: Areas, seed: int) -> dict:
     """Returns a plan for `CityPlan`, where each block has its own character."""
     folder = resources.files("cns_drake.city.generation")
     text = folder.joinpath("characters.yaml").read_text(encoding="utf-8")
     templates = yaml.safe_load(text)
-    parts = [areas.carriageway(), areas.sidewalks(), areas.medians()]
+    parts = [areas.carriageway, areas.sidewalks, areas.medians]
     streets = unary_union(parts)
     x0, y0, x1, y1 = streets.bounds
     bounds = (

@@ -21,6 +21,7 @@ from cns_drake.city.geometry.polygons import (
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
 from cns_drake.roads import street_areas
+from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.centreline import sample_stations
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import ENDS, Direction, End, Road
@@ -106,9 +107,9 @@ def parking_bays(area: BaseGeometry) -> Covering:
 
 def street_structures(network: RoadNetwork) -> list[Structure]:
     """Returns the ground of all streets, true to the heights of the roads."""
-    bays = unary_union(list(network.parking_bays().values()))
+    bays = unary_union(list(network.areas.parking_bays.values()))
     return street_surfaces(
-        network,
+        network.areas,
         street_areas.RoadSurface(network),
         kerb_height(network),
         [parking_bays(bays)],
@@ -116,7 +117,7 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
 
 
 def street_surfaces(
-    areas: street_areas.StreetAreas,
+    areas: Areas,
     surface: street_areas.SurfaceHeights,
     kerb: float | street_areas.KerbMap,
     coverings: Sequence[Covering],
@@ -129,13 +130,13 @@ def street_surfaces(
     of. Where streets lead onto bridges, an area in W is `kerbless` [m].
     """
     road, walk = _heights(surface, kerb)
-    medians = snap(areas.medians())
-    paved = snap(areas.carriageway()).difference(medians)
+    medians = snap(areas.medians)
+    paved = snap(areas.carriageway).difference(medians)
     covered = unary_union([one.area for one in coverings])
     kerbs = kerb_area(paved)
     if kerbless is not None:
         kerbs = MultiPolygon(polygons_of(snap(kerbs.difference(kerbless))))
-    sidewalks = snap(areas.sidewalks()).difference(kerbs)
+    sidewalks = snap(areas.sidewalks).difference(kerbs)
     outer = unary_union([paved, kerbs, sidewalks, medians]).boundary
     road_part, green = paved.difference(covered), medians.difference(kerbs)
     walks = Covering("sidewalks", "sidewalk", sidewalks, _SIDEWALK_RGB)
@@ -288,7 +289,7 @@ def marking_structure(network: RoadNetwork) -> Structure:
                 strips += _end_marks(road, end)
         if road.length > _LEAST_LENGTH and strips:
             pieces[name] = merge_meshes(*(_strip(road, *s) for s in strips))
-    ground = Covering("markings", "road", network.lane_area(), _RGB)
+    ground = Covering("markings", "road", network.areas.lane_area, _RGB)
     return ground.structure(pieces)
 
 

@@ -18,7 +18,7 @@ from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plants.vegetation import SPECIES
-from cns_drake.roads.street_areas import StreetAreas
+from cns_drake.roads.carriageway import Areas
 
 # Objects of one class that share one word in everyday use.
 _WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
@@ -50,13 +50,13 @@ class Draft:
 
     def __init__(
         self,
-        areas: StreetAreas,
+        areas: Areas,
         kerb_height: float,
         plan: CityPlan,
         source: str,
     ):
         self.areas, self.plan, self.source = areas, plan, source
-        parts = [areas.carriageway(), areas.sidewalks(), areas.medians()]
+        parts = [areas.carriageway, areas.sidewalks, areas.medians]
         self.streets: BaseGeometry = snap(unary_union(parts))
         self.frontage = self.streets
         self.base: Ground = LevelGround(kerb_height)
@@ -66,7 +66,7 @@ class Draft:
         self._walls = Occupancy()
         self._occupancy = Occupancy()
         self._lanes = Occupancy()
-        self._lanes.add(areas.lane_area())
+        self._lanes.add(areas.lane_area)
 
     def rng(self, *words: str | int) -> np.random.Generator:
         """Returns the random generator of one task, by its name.

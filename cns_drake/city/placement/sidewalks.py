@@ -41,7 +41,7 @@ def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
 def _furnish_arm(
     draft: Draft, road: Road, junction: Junction, arm: Arm, rng: Generator
 ) -> None:
-    carriageway = draft.areas.carriageway()
+    carriageway = draft.areas.carriageway
     starts = arm.end == "start"
     incoming: Direction = "backward" if starts else "forward"
     outgoing: Direction = "forward" if starts else "backward"
@@ -106,7 +106,7 @@ def furnish_sidewalks(
     for task, distance in _FROM_KERB_OF.items():
         keep_off = junctions.buffer(_JUNCTION_CLEARANCE[task])
         lines = lines_along(
-            draft.areas.carriageway(), draft.areas.sidewalks(), distance
+            draft.areas.carriageway, draft.areas.sidewalks, distance
         )
         for index, line in enumerate(lines):
             draft.open_range()
@@ -116,7 +116,7 @@ def furnish_sidewalks(
 
 def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
     """Parks cars in the bays at the sides of the roads."""
-    for (name, side), bay in network.parking_bays().items():
+    for (name, side), bay in network.areas.parking_bays.items():
         draft.open_range()
         road = network.roads[name]
         rng = draft.rng("bays", name, side)
@@ -137,7 +137,7 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
 def plant_medians(draft: Draft) -> None:
     """Plants the strips between the directions, and lights them."""
     plan = draft.plan.medians or draft.plan.street
-    for index, median in enumerate(draft.areas.medians().geoms):
+    for index, median in enumerate(draft.areas.medians.geoms):
         draft.open_range()
         rng = draft.rng("median", index)
         line = _middle_line(median)

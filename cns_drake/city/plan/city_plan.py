@@ -10,12 +10,11 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    ValidationError,
     field_validator,
     model_validator,
 )
 
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.road import MeshStem
 
@@ -333,10 +332,4 @@ def load_plan(path: Path) -> CityPlan:
     Raises:
         InputError: if it cannot be read or has a wrong key or type.
     """
-    content = read_yaml(path)
-    try:
-        return CityPlan.model_validate(content)
-    except ValidationError as error:
-        raise InputError(
-            describe_validation_error(path, error, CityPlan)
-        ) from error
+    return validated(CityPlan, read_yaml(path), path)

@@ -5,9 +5,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.errors import InputError, validated
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 
 LotUse = Literal["car_park", "market", "garden", "yard", "empty"]
@@ -145,12 +145,7 @@ def load_stages(
             unknown or absent twice, or a pattern matches nothing.
     """
     content = read_yaml(path) if text is None else parse_yaml(text)
-    try:
-        stages = Stages.model_validate(content)
-    except ValidationError as error:
-        raise InputError(
-            describe_validation_error(path, error, Stages)
-        ) from error
+    stages = validated(Stages, content, path)
     _check(stages, path)
     stages = _resolved(stages, _Names(path, structures))
     _check_absent_once(stages, path)

@@ -24,6 +24,7 @@ from cns_drake.city.ground.streets import (
 )
 from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_class
+from cns_drake.roads.carriageway import Areas
 
 # Smallest and largest step, and least length of the kerb before it [m].
 _STEP = (0.02, 2.0)
@@ -134,9 +135,11 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
 class ImportedStreets:
     """Areas of lanes on the ground, by kind [m].
 
-    Where two overlap, road comes before parking, that before other ground, and
-    sidewalks last. Coverings are parts of the carriageway that are not road,
-    and margins are lanes without a use, which stay free.
+    `areas` are those of the lanes at the height of the road, of the lanes that
+    are road, and of what has a kerb. Where two overlap, road comes before
+    parking, that before other ground, and sidewalks last. Coverings are parts
+    of the carriageway that are not road, and margins are lanes without a use,
+    which stay free.
     """
 
     def __init__(
@@ -178,42 +181,26 @@ class ImportedStreets:
         whole = _closed([paved, other])
         tapers = kerb_tapers(whole)
         whole = _closed([whole, *tapers])
-        self._carriageway = _cut_at_tiles(_multi(whole))
-        self._lanes = _multi(road)
+        carriageway = _cut_at_tiles(_multi(whole))
         medians = _simple(shapely.union_all(alike["median"]))
-        self._medians = _multi(medians.difference(self._carriageway))
+        medians = _multi(medians.difference(carriageway))
         walks = _simple(shapely.union_all(alike["walk"]))
-        taken = self._carriageway.union(self._medians)
+        taken = carriageway.union(medians)
         # Where a carriageway has no sidewalk, as in junctions, its kerb takes
         # ground as well.
-        kerbs = kerb_area(self._carriageway.difference(self._medians))
+        kerbs = kerb_area(carriageway.difference(medians))
         walks = walks.union(snap(kerbs.difference(kerbless)))
-        self._sidewalks = _multi(snap(walks.difference(taken)))
+        sidewalks = _multi(snap(walks.difference(taken)))
+        self.areas = Areas(carriageway, _multi(road), sidewalks, medians)
         self.junctions = shapely.union_all([junctions, *gaps])
         self.coverings = [
             parking_bays(parking),
             Covering("paths", "sidewalk", snap(path), _PATH_RGB),
             Covering("islands", "other-ground", snap(other), _ISLAND_RGB),
         ]
-        taken = taken.union(self._sidewalks)
+        taken = taken.union(sidewalks)
         margins = shapely.union_all(alike["margins"]).difference(taken)
         self.margins = _multi(snap(margins))
-
-    def carriageway(self) -> MultiPolygon:
-        """Returns the area of all lanes at the height of the road."""
-        return self._carriageway
-
-    def lane_area(self) -> MultiPolygon:
-        """Returns the area of the lanes that are road."""
-        return self._lanes
-
-    def sidewalks(self) -> MultiPolygon:
-        """Returns the sidewalks, a kerb above the road."""
-        return self._sidewalks
-
-    def medians(self) -> MultiPolygon:
-        """Returns the medians that have a kerb in the file."""
-        return self._medians
 
 
 def lane_polygon(band: LaneBand) -> BaseGeometry:

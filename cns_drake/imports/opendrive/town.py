@@ -125,9 +125,9 @@ def _build(
             faults.add("kerb on a bridge, level with its road", band.road.name)
     ends = imported_streets.bridge_ends(raised)
     streets = ImportedStreets(ground, ends)
-    if streets.carriageway().is_empty:
+    if streets.areas.carriageway.is_empty:
         raise InputError(f"{source}: no lane in it has an area")
-    x0, y0, x1, y1 = streets.carriageway().bounds
+    x0, y0, x1, y1 = streets.areas.carriageway.bounds
     sides = x1 - x0, y1 - y0
     if sides[0] * sides[1] > _LARGEST_AREA or max(sides) > _LONGEST_SIDE:
         raise InputError(
@@ -135,8 +135,8 @@ def _build(
             f" a piece of at most {_LARGEST_AREA / 1e6:.0f} km^2 and"
             f" {_LONGEST_SIDE / 1000:.0f} km"
         )
-    plan = CityPlan.model_validate(starter_plan(streets, seed))
-    lanes = streets.lane_area()
+    plan = CityPlan.model_validate(starter_plan(streets.areas, seed))
+    lanes = streets.areas.lane_area
     things = [
         one
         for road in roads.roads
@@ -150,7 +150,7 @@ def _build(
     if dressed:
         _count_spans(roads, {band.road.name for band in raised}, faults)
         marks += road_marks(
-            "marks", ground, surface.heights, streets.carriageway()
+            "marks", ground, surface.heights, streets.areas.carriageway
         )
         marks += road_marks("bridge_marks", raised)
     progress(
@@ -159,7 +159,7 @@ def _build(
     )
     city = build_along(
         Streets(
-            areas=streets,
+            areas=streets.areas,
             surface=surface,
             kerb_height=kerb,
             kerbs=kerbs if kerbs.differ else None,
@@ -173,7 +173,7 @@ def _build(
             ),
             structures=(
                 *street_surfaces(
-                    streets,
+                    streets.areas,
                     surface,
                     kerbs if kerbs.differ else kerb,
                     streets.coverings,

@@ -109,7 +109,7 @@ def test_paint_lies_on_the_ramps(name):
 
 
 def test_no_ground_hangs_over_the_carriageway():
-    lanes = network().lane_area()
+    lanes = network().areas.lane_area
     x0, y0, x1, y1 = lanes.bounds
     rng = np.random.default_rng(4)
     p = rng.uniform((x0, y0), (x1, y1), (12000, 2))
@@ -123,7 +123,7 @@ def test_no_ground_hangs_over_the_carriageway():
 def test_the_ground_meets_the_sidewalks():
     """The edge of the streets has no slit and no step."""
     edge = shapely.union_all(
-        [network().carriageway(), network().sidewalks()]
+        [network().areas.carriageway, network().areas.sidewalks]
     ).boundary
     surface, kerb = RoadSurface(network()), kerb_height(network())
     p = shapely.get_coordinates(shapely.segmentize(edge, 2.5))
@@ -148,7 +148,7 @@ def test_buildings_stand_on_level_ground():
     for building in buildings:
         rim = building.footprint_W.exterior.buffer(0.25).exterior
         p = shapely.get_coordinates(shapely.segmentize(rim, 1.0))
-        beside = ~shapely.contains_xy(network().sidewalks(), *p.T)
+        beside = ~shapely.contains_xy(network().areas.sidewalks, *p.T)
         z = ground().heights(p[beside])
         # Some buildings stand at the city's rim.
         off = z[np.isfinite(z)] - building.xyz[2]

@@ -49,7 +49,7 @@ def roads(tmp_path_factory):
 
 
 def streets_of(roads):
-    return shapely.union_all([roads.carriageway(), roads.sidewalks()])
+    return shapely.union_all([roads.areas.carriageway, roads.areas.sidewalks])
 
 
 def ground_of(roads, pads=()):

@@ -131,7 +131,7 @@ def test_parapets_stand_on_both_sides_of_the_street_bridges(x):
         for s in structures().values()
         if s.semantic_class == "fence" and "river" in s.tags
     ]
-    lanes = network().lane_area()
+    lanes = network().areas.lane_area
     for left, right in ((x - 8.5, x - 4.5), (x + 4.5, x + 8.5)):
         strip = box(left, RIVER[0], right, RIVER[1])
         beside = [wall for wall in walls if strip.contains(wall)]
@@ -159,12 +159,12 @@ def test_the_river_runs_from_bound_to_bound_below_its_banks():
 
 
 def test_cars_park_in_bays_and_on_drives_but_in_no_lane():
-    lanes = network().lane_area()
+    lanes = network().areas.lane_area
     shapely.prepare(lanes)
     cars = [s for s in structures().values() if s.semantic_class == "car"]
     for car in cars:
         assert not lanes.intersects(car.footprint_W), car.name
-    bays = network().parking_bays()
+    bays = network().areas.parking_bays
     in_bays = [car for car in cars if car.tags[0] == "bay"]
     assert {car.tags[1] for car in in_bays} == {name for name, _ in bays}
     for car in in_bays:

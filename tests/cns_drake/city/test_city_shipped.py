@@ -89,7 +89,7 @@ def test_things_of_all_stages_stand_on_the_ground(name):
 
 
 def test_signs_stand_off_the_carriageway(standing, network):
-    carriageway = network.carriageway()
+    carriageway = network.areas.carriageway
     shapely.prepare(carriageway)
     for structure in standing:
         if structure.semantic_class not in ("car", "truck"):

@@ -61,7 +61,7 @@ def test_the_plan_has_a_district_for_each_block(town):
     blocks = [d for d in plan.districts if d.block is not None]
     assert len(blocks) == 2
     for district in blocks:
-        assert not network.carriageway().contains(Point(district.block))
+        assert not network.areas.carriageway.contains(Point(district.block))
     assert plan.districts[-1].name == "outskirts"
 
 

@@ -74,13 +74,13 @@ def is_plant(structure) -> bool:
 
 
 def test_cars_stand_outside_the_lanes_in_bays_and_drives():
-    lanes = network().lane_area()
+    lanes = network().areas.lane_area
     shapely.prepare(lanes)
     cars = [s for s in structures().values() if s.semantic_class == "car"]
     assert len(cars) > 60
     for car in cars:
         assert not lanes.intersects(car.footprint_W), car.name
-    bays = network().parking_bays()
+    bays = network().areas.parking_bays
     roads = {s.tags[1] for s in cars if s.tags[0] == "bay"}
     assert roads == {name for name, _ in bays}
     for car in cars:

@@ -34,7 +34,7 @@ def test_a_shoulder_that_ends_is_tapered(tmp_path):
         straight("2", 0, 0, 40, 0, lanes=LANES, junction="9"),
         straight("3", 40, 0, 80, 0, lanes=WITH_SHOULDERS),
     )
-    carriageway = ImportedStreets(read(path)).carriageway()
+    carriageway = ImportedStreets(read(path)).areas.carriageway
     # Four tapers are ten times as long as the shoulders are wide.
     expected = 7.0 * 120.0 + 4 * 0.3 * 40.0 + 4 * 0.3 * 3.0 / 2.0
     assert carriageway.area == pytest.approx(expected, abs=0.05)
@@ -57,7 +57,7 @@ def test_no_kerb_turns_sharply_where_a_lane_bends(tmp_path, heading, angle):
         turn("2", 0, 0, heading, 12.0, angle),
     )
     bands = read(path)
-    carriageway = ImportedStreets(bands).carriageway()
+    carriageway = ImportedStreets(bands).areas.carriageway
     lanes = [lane_polygon(b) for b in bands if b.kind != "sidewalk"]
     assert shapely.union_all(lanes).difference(carriageway).area < 0.05
     # About a triangle of 0.3 by 3 m is added.

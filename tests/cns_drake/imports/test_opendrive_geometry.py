@@ -239,7 +239,11 @@ def check_surface(path):
     streets = ImportedStreets(bands)
     surface = RoadHeights(bands)
     whole = shapely.union_all(
-        [streets.carriageway(), streets.sidewalks(), streets.medians()]
+        [
+            streets.areas.carriageway,
+            streets.areas.sidewalks,
+            streets.areas.medians,
+        ]
     )
     areas, places = [], []
     for _, _, kind, inner, outer in sampled_lanes(path, 1.0):

@@ -134,7 +134,7 @@ def bands_of(path):
 
 def test_junctions_have_no_holes(source):
     streets = ImportedStreets(bands_of(source))
-    carriageway = streets.carriageway()
+    carriageway = streets.areas.carriageway
     for x, y in ((0, 0), (100, 0), (100, 100), (200, 0)):
         around = Point(x, y).buffer(ARM)
         for part in shapely.get_parts(carriageway.intersection(around)):
@@ -146,9 +146,9 @@ def test_junctions_have_no_holes(source):
     assert across.intersection(carriageway).length == pytest.approx(
         7.0, abs=0.02
     )
-    walks = streets.sidewalks().intersection(across)
+    walks = streets.areas.sidewalks.intersection(across)
     assert walks.length == pytest.approx(4.0, abs=0.02)
-    assert streets.sidewalks().intersection(carriageway).area < 1e-6
+    assert streets.areas.sidewalks.intersection(carriageway).area < 1e-6
 
 
 def test_what_lanes_of_a_junction_enclose_is_road(tmp_path):
@@ -164,7 +164,7 @@ def test_what_lanes_of_a_junction_enclose_is_road(tmp_path):
     bands = bands_of(path)
     middle = Point(7, 3)
     assert all(lane_polygon(band).disjoint(middle) for band in bands)
-    assert ImportedStreets(bands).carriageway().contains(middle)
+    assert ImportedStreets(bands).areas.carriageway.contains(middle)
 
 
 def test_buildings_stand_apart_from_streets_and_each_other(source, town):
@@ -288,7 +288,7 @@ def test_kerbs_are_closed_where_a_slope_begins(tmp_path):
         normals = np.cross(b - a, c - a) / 2.0
         areas = np.linalg.norm(normals, axis=1)
         upright += areas[np.abs(normals[:, 2]) < 1e-3 * areas].sum()
-    rim = built.streets.carriageway().length
+    rim = built.streets.areas.carriageway.length
     assert upright == pytest.approx(0.1 * rim, rel=2e-3)
 
 
@@ -484,7 +484,7 @@ def test_a_raised_lane_keeps_its_class(tmp_path, kind):
         tmp_path / "a.xodr", straight("1", 0, 0, 60, 0, lanes=lanes)
     )
     streets = ImportedStreets(bands_of(path))
-    assert streets.carriageway().contains(Point(30.0, -5.0))
+    assert streets.areas.carriageway.contains(Point(30.0, -5.0))
     surface = RoadHeights(bands_of(path))
     for y, z in ((1.75, 0.0), (-1.75, 0.0), (-5.25, 0.1)):
         assert surface.heights((30.2, y))[0] == pytest.approx(z, abs=0.005)

@@ -56,12 +56,12 @@ def test_lanes_leave_room_for_a_median(load, cross):
     assert road.half_width == 8.0
     assert road.lane_offset("forward", 1) == pytest.approx(-3.5)
     assert road.lane_offset("backward", 2) == pytest.approx(6.5)
-    median = network.medians()
+    median = network.areas.medians
     assert median.area == pytest.approx(4 * (road.length - 4) + 4 * np.pi, 1e-3)
     # Its noses touch the ends of the road.
     ends = road.centreline()[[0, -1], 0]
     np.testing.assert_allclose(median.bounds, [ends[0], -2, ends[1], 2])
-    assert median.intersection(network.carriageway()).area < 1e-6
+    assert median.intersection(network.areas.carriageway).area < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_lanes_that_do_not_meet_are_refused(load, cross):
 
 
 def test_kerb_corners_are_arcs(load, cross):
-    carriageway = load(cross).carriageway()
+    carriageway = load(cross).areas.carriageway
     # The corner between e and n: centre of the arc, 6 m from both kerbs.
     centre = np.array([3 + 6, 6 + 6.0])
     towards_corner = -np.array([1, 1]) / np.sqrt(2)
@@ -160,7 +160,7 @@ def test_kerb_corners_are_arcs(load, cross):
 def test_areas_tile_without_overlap(load, cross):
     cross["roads"]["w"]["parking"] = 1.0
     network = load(cross)
-    carriageway, sidewalks = network.carriageway(), network.sidewalks()
+    carriageway, sidewalks = network.areas.carriageway, network.areas.sidewalks
     assert carriageway.is_valid
     assert sidewalks.is_valid
     assert carriageway.intersection(sidewalks).area < 1e-6
@@ -170,12 +170,12 @@ def test_areas_tile_without_overlap(load, cross):
     assert sidewalks.contains(Point(40, 7.95))
     assert not sidewalks.contains(Point(40, 8.05))
     # Bays are carriageway, but not where vehicles drive.
-    bays = network.parking_bays()
+    bays = network.areas.parking_bays
     assert set(bays) == {("w", "left"), ("w", "right")}
     for side, y in (("left", 6.5), ("right", -6.5)):
         assert bays["w", side].contains(Point(-40, y))
         assert carriageway.contains(Point(-40, y))
-        assert not network.lane_area().contains(Point(-40, y))
+        assert not network.areas.lane_area.contains(Point(-40, y))
     assert sidewalks.contains(Point(-40, 7.05))
     assert not sidewalks.contains(Point(-40, 8.05))
 
@@ -263,7 +263,7 @@ def test_a_dead_end_is_a_disc(load, cross):
     network = load(cross)
     assert len(network.junctions["yard"].arms) == 1
     assert network.connections("yard") == []
-    area = network.junction_area("yard")
+    area = network.junction_areas["yard"]
     # The disc, and up to the road's end the corners beside the road.
     assert area.area == pytest.approx(9**2 * np.pi, rel=0.04)
     disc = Point(0, 130).buffer(8.9)

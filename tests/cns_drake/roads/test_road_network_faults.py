@@ -145,10 +145,11 @@ def test_a_bend_beside_a_junction_has_a_carriageway(tmp_path):
     assert text != ROADS
     path.write_text(text)
     network = load_road_network(path)
-    for area in (network.carriageway, network.sidewalks, network.medians):
-        assert area().is_valid
+    found = network.areas
+    for area in (found.carriageway, found.sidewalks, found.medians):
+        assert area.is_valid
     roads = unary_union([road_strip(one) for one in network.roads.values()])
-    assert roads.difference(network.carriageway()).area < 0.1
+    assert roads.difference(network.areas.carriageway).area < 0.1
 
 
 @pytest.mark.filterwarnings("error")

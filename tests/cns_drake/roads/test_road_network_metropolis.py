@@ -50,7 +50,7 @@ def test_metropolis_has_the_junctions_of_town10(metropolis):
     for name, (centre, arms, size) in expected.items():
         junction = metropolis.junctions[name]
         assert len(junction.arms) == arms
-        box = metropolis.junction_area(name).bounds
+        box = metropolis.junction_areas[name].bounds
         found = np.array([box[2] - box[0], box[3] - box[1]])
         # The reference bounds lane paths, not kerbs: up to a lane and its
         # shoulder of difference on each side.
@@ -79,7 +79,7 @@ def test_metropolis_centrelines_pass_through_town10(metropolis):
 
 
 def test_every_legal_way_of_metropolis_stays_on_the_carriageway(metropolis):
-    area = metropolis.lane_area().buffer(0.02)
+    area = metropolis.areas.lane_area.buffer(0.02)
     for junction in metropolis.junctions:
         for way in metropolis.connections(junction):
             swept = LineString(way.points[:, :2]).buffer(1.0, cap_style="flat")
@@ -88,11 +88,11 @@ def test_every_legal_way_of_metropolis_stays_on_the_carriageway(metropolis):
 
 def test_metropolis_blocks_and_sidewalks(metropolis):
     # Nine arms' worth of streets enclose seven blocks, and three medians.
-    assert len(metropolis.medians().geoms) == 3
-    (carriageway,) = metropolis.carriageway().geoms
+    assert len(metropolis.areas.medians.geoms) == 3
+    (carriageway,) = metropolis.areas.carriageway.geoms
     blocks = len(carriageway.interiors) - 3
     assert blocks == 6
     # One sidewalk round each block and one outside the ring.
-    assert len(metropolis.sidewalks().geoms) == blocks + 1
+    assert len(metropolis.areas.sidewalks.geoms) == blocks + 1
     for road in metropolis.roads.values():
         assert (road.sidewalk, road.lane_width) == (6.0, 3.5)

@@ -123,7 +123,7 @@ def test_centrelines_pass_through_the_original_ones(networks, town):
 @pytest.mark.parametrize("town", FACTS)
 def test_every_legal_way_stays_on_the_carriageway(networks, town):
     network = networks[town]
-    area = network.lane_area().buffer(0.02)
+    area = network.areas.lane_area.buffer(0.02)
     for junction in network.junctions:
         for way in network.connections(junction):
             swept = LineString(way.points[:, :2]).buffer(1.0, cap_style="flat")
@@ -151,9 +151,9 @@ def test_every_lane_comes_from_somewhere_and_leads_on(networks, town):
 @pytest.mark.parametrize("town", FACTS)
 def test_streets_are_one_piece_and_sidewalks_line_them(networks, town):
     network = networks[town]
-    (carriageway,) = network.carriageway().geoms
+    (carriageway,) = network.areas.carriageway.geoms
     assert carriageway.is_valid
-    assert network.sidewalks().intersection(carriageway).area < 1e-6
+    assert network.areas.sidewalks.intersection(carriageway).area < 1e-6
     # The area has no slit, and no island too small for a sign.
     filled = carriageway.buffer(0.2, join_style="mitre").buffer(
         -0.2, join_style="mitre"
@@ -168,7 +168,7 @@ def test_streets_are_one_piece_and_sidewalks_line_them(networks, town):
         for side in (-1, 1):
             offset = side * (road.half_width + road.parking + 0.1)
             x, y = road.evaluate(middle, offset)[0, :2]
-            assert network.sidewalks().contains(Point(x, y)), road.name
+            assert network.areas.sidewalks.contains(Point(x, y)), road.name
 
 
 def test_towns_without_hills_are_flat(networks):
@@ -278,7 +278,7 @@ def test_the_roundabout_turns_one_way(downtown):
 def test_downtown_has_its_special_places(downtown):
     five = downtown.junctions["five_ways"]
     assert len(five.arms) == 5
-    box = downtown.junction_area("five_ways").bounds
+    box = downtown.junction_areas["five_ways"].bounds
     middle = (np.array(box[:2]) + box[2:]) / 2
     np.testing.assert_allclose(middle, [-83.3, -6.7], atol=4.0)
     loop = downtown.roads["close_loop"]

@@ -156,7 +156,7 @@ def test_the_car_turns_round_on_the_carriageway(tmp_path, where):
     # The whole car stays between the kerbs at every time.
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     moving = places[np.concatenate([[True], steps > 1e-4])]
-    outside = swept_area(moving).difference(network.lane_area())
+    outside = swept_area(moving).difference(network.areas.lane_area)
     assert outside.area < 0.01
     for point, one, end in (
         (places[0], legs[0], "entry"),

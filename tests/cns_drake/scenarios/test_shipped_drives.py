@@ -140,7 +140,7 @@ def test_the_vehicle_stays_in_its_lane(drives, name):
     corners = jet.p[:, None, :2] + (
         body[None, :, :1] * ahead[:, None] + body[None, :, 1:] * left[:, None]
     )
-    area = load_road_network(map_folder(scenario).roads).lane_area()
+    area = load_road_network(map_folder(scenario).roads).areas.lane_area
     prepare(area)
     assert contains(area, polygons(corners)).all()
 

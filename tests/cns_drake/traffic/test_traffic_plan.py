@@ -185,10 +185,10 @@ def test_a_trial_given_up_early_changes_no_plan(monkeypatch):
 
 def test_keeps_to_lanes_and_walkways(short):
     network = roads("metropolis")[0]
-    lanes = network.lane_area().buffer(0.2)
+    lanes = network.areas.lane_area.buffer(0.2)
     wheels = short.vehicles.values[::10, :, :2].reshape(-1, 2)
     assert shapely.contains_xy(lanes, *wheels.T).all()
-    walked = network.sidewalks().union(
+    walked = network.areas.sidewalks.union(
         shapely.union_all([c.area for c in roads("metropolis")[1].crossings])
     )
     feet = short.walkers.values[::10, :, :2].reshape(-1, 2)
