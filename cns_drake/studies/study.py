@@ -589,13 +589,9 @@ class Study:
             for task in self._measuring(one):
                 found = one.parts[task.name].read()
                 for number in task.numbers(found, base.get(task.name)):
-                    yield Row(
+                    yield Row.of(
+                        number,
                         **self._key(one, task.name, number.method, number.gate),
-                        metric=number.metric,
-                        value=number.value,
-                        low=number.interval.low,
-                        high=number.interval.high,
-                        n=number.n,
                     )
 
     def _answers(self, measured: Iterable[_Measured]) -> Iterator[Answers]:

@@ -27,7 +27,7 @@ from evaluation.report.reference import (
     Reference,
 )
 from evaluation.report.result_tables import recognition_table
-from evaluation.report.tables import Cell, in_table_order, title
+from evaluation.results.table_forms import Cell, in_table_order, title
 
 _TITLE = "the paper “The City that Never Settles”"
 # The drives through a real city, in the tables of the paper.

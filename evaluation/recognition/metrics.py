@@ -21,6 +21,7 @@ among their N best places.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 from typing import Literal
 
@@ -243,6 +244,31 @@ def resampled_metrics(
     return areas, recalls, stricts
 
 
+@lru_cache(maxsize=1024)
+def own_samples(
+    outcomes: QueryOutcomes, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns `resampled_metrics` of one or more queries, in their own blocks.
+
+    They are drawn once, whatever they are compared with.
+    """
+    weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
+    return resampled_metrics(outcomes, weights)
+
+
+def paired_samples(
+    outcomes: QueryOutcomes, other: QueryOutcomes
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns `resampled_metrics` in the blocks that `own_samples` draws.
+
+    Those are of the other's queries, which are as many.
+    """
+    if np.array_equal(outcomes.own_blocks, other.own_blocks):
+        return own_samples(outcomes)
+    weights = resampled_weights(len(other), blocks=other.blocks)
+    return resampled_metrics(outcomes, weights)
+
+
 def percentile_interval(samples: np.ndarray) -> Interval:
     """Returns the interval of 95 % of the samples; NaN do not count."""
     known = samples[~np.isnan(samples)]
@@ -259,8 +285,7 @@ def bootstrap_intervals(
     """Returns percentile intervals of AUC and R@1 over resampled blocks."""
     if len(outcomes) == 0:
         return UNKNOWN, UNKNOWN
-    weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
-    areas, recalls, _ = resampled_metrics(outcomes, weights)
+    areas, recalls, _ = own_samples(outcomes, seed)
     return percentile_interval(areas), percentile_interval(recalls)
 
 
@@ -319,16 +344,11 @@ def mean_auc_difference(
     value, variance, freedom = 0.0, 0.0, 0
     for first, second in pairs:
         value += (pr_curve(first).auc - pr_curve(second).auc) / len(pairs)
-        blocks = first.blocks
-        number = len(first) if blocks is None else len(np.unique(blocks))
+        number = len(np.unique(first.own_blocks))
         if number < 2:
             variance = math.nan
             continue
-        weights = resampled_weights(len(first), blocks=blocks)
-        samples = (
-            resampled_metrics(first, weights)[0]
-            - resampled_metrics(second, weights)[0]
-        )
+        samples = own_samples(first)[0] - paired_samples(second, first)[0]
         spread = float(samples.std()) * math.sqrt(number / (number - 1))
         variance += spread**2
         freedom += number - 1

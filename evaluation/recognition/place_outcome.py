@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,15 +13,14 @@ from evaluation.recognition.fault_kinds import NEARLY
 from evaluation.recognition.metrics import (
     UNKNOWN,
     Interval,
+    own_samples,
+    paired_samples,
     percentile_interval,
     pr_curve,
-    resampled_metrics,
-    resampled_weights,
 )
-from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.pose_errors import PoseErrors, pose_success
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.recognition.survival import kept_share
 
 # Kinds of wrong best places, in order of precedence.
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
@@ -109,6 +110,19 @@ class PlaceOutcome:
             radius=radius,
         )
 
+    def number(
+        self,
+        metric: str,
+        value: float,
+        interval: Interval = UNKNOWN,
+        n: int | None = None,
+    ) -> Number:
+        """Returns a number of it, by default of all queries."""
+        count = len(self.outcomes) if n is None else n
+        return Number(
+            self.method, self.is_gated, metric, value, interval, count
+        )
+
     @property
     def num_hidden(self) -> int:
         """Number of wrong answers to queries with little overlap.
@@ -164,10 +178,31 @@ class PlaceOutcome:
         }
 
 
+class Number(NamedTuple):
+    """A number that a task found.
+
+    Attributes:
+        method: method, estimator or baseline; "" if there is none. For a place
+            recognition method it is the `key` of its choice.
+        gate: whether the gate was used.
+        metric: name of the number.
+        value: the number itself.
+        interval: its 95 % interval.
+        n: number of queries, or other things, that count.
+    """
+
+    method: str
+    gate: bool
+    metric: str
+    value: float
+    interval: Interval = UNKNOWN
+    n: int = 0
+
+
 def place_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
-) -> Iterator[tuple[str, float, Interval]]:
-    """Yields name, value and 95 % interval of the numbers of a method.
+) -> Iterator[Number]:
+    """Yields the numbers of a method.
 
     Intervals are by bootstrap over blocks of the route; a sample has the same
     ones in the baseline.
@@ -177,41 +212,83 @@ def place_numbers(
         before: its outcome in the baseline, for what is kept, lost and found.
     """
     outcomes = now.outcomes
-    curve = pr_curve(outcomes)
-    with_match = int(outcomes.has_match.sum())
-    strict = curve.strict_auc(with_match)
-    weights = resampled_weights(len(outcomes), blocks=outcomes.blocks)
-    areas, recalls, stricts = resampled_metrics(outcomes, weights)
-    interval = percentile_interval
-    yield "auc", curve.auc, interval(areas)
-    yield "auc_strict", strict, interval(stricts)
-    yield "r1", outcomes.recall_at(1), interval(recalls)
+    values = _areas(outcomes)
+    samples = own_samples(outcomes)
+    for (name, value), drawn in zip(values.items(), samples, strict=True):
+        yield now.number(name, value, percentile_interval(drawn))
     if before is not None:
-        then = pr_curve(before.outcomes)
-        strict_then = then.strict_auc(int(before.outcomes.has_match.sum()))
-        shares = [UNKNOWN] * 2
+        drawn_then: Sequence[np.ndarray | float] = [math.nan] * len(samples)
         if is_paired := len(before.outcomes) == len(outcomes):
-            drawn = resampled_metrics(before.outcomes, weights)
-            drawn_auc, _, drawn_strict = drawn
-            shares = [
-                interval(kept_share(one, other))
-                for one, other in (
-                    (areas, drawn_auc),
-                    (stricts, drawn_strict),
-                )
-            ]
-        yield "kept", float(kept_share(curve.auc, then.auc)), shares[0]
-        yield "kept_strict", float(kept_share(strict, strict_then)), shares[1]
+            drawn_then = paired_samples(before.outcomes, outcomes)
+        for name, then, today, drawn, other in zip(
+            ("kept", "kept_r1", "kept_strict"),
+            _areas(before.outcomes).values(),
+            values.values(),
+            samples,
+            drawn_then,
+            strict=True,
+        ):
+            interval = percentile_interval(kept_share(drawn, other))
+            yield now.number(name, float(kept_share(today, then)), interval)
         if is_paired:
             right, was = outcomes.is_right, before.outcomes.is_right
-            yield "lost", float((was & ~right).sum()), UNKNOWN
-            yield "found", float((right & ~was).sum()), UNKNOWN
-    yield "with_match", float(with_match), UNKNOWN
-    yield "places", float(outcomes.num_places), UNKNOWN
+            yield now.number("lost", float((was & ~right).sum()))
+            yield now.number("found", float((right & ~was).sum()))
+    yield now.number("with_match", float(outcomes.has_match.sum()))
+    yield now.number("places", float(outcomes.num_places))
+    yield now.number(
+        "recall_at_full_precision", pr_curve(outcomes).recall_at_full_precision
+    )
     why = now.faults()
     for name in FAULTS:
-        yield name, float(why.count(name)), UNKNOWN
-    yield "hidden", float(now.num_hidden), UNKNOWN
+        yield now.number(name, float(why.count(name)))
+    yield now.number("hidden", float(now.num_hidden))
     known = now.overlaps[~np.isnan(now.overlaps)]
     if len(known):
-        yield "visible_change", 1.0 - float(known.mean()), UNKNOWN
+        yield now.number("visible_change", 1.0 - float(known.mean()))
+
+
+def pose_numbers(
+    now: PlaceOutcome, before: PlaceOutcome | None
+) -> Iterator[Number]:
+    """Yields the numbers of a method's poses; none if it estimates no pose.
+
+    Args:
+        now: its outcome in a condition.
+        before: its outcome in the baseline, for what is kept.
+    """
+    errors = now.pose_errors
+    value = pose_success(errors, now.outcomes)
+    if math.isnan(value):
+        return
+    number = int(now.outcomes.has_match.sum())
+    yield now.number("pose_success", value, n=number)
+    if before is not None:
+        then = pose_success(before.pose_errors, before.outcomes)
+        yield now.number("kept", float(kept_share(value, then)), n=number)
+    known = ~np.isnan(errors.translation)
+    for name, some in (
+        ("translation_median", errors.translation[known]),
+        ("rotation_median_deg", errors.rotation_deg[known]),
+    ):
+        if len(some):
+            yield now.number(name, float(np.median(some)), n=number)
+
+
+def kept_share(
+    changed: np.ndarray | float, unchanged: np.ndarray | float
+) -> np.ndarray:
+    """Returns changed over unchanged; NaN where the latter is 0 or NaN."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.divide(changed, unchanged)
+    return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
+
+
+def _areas(outcomes: QueryOutcomes) -> dict[str, float]:
+    """Returns the numbers of which `own_samples` has samples."""
+    curve = pr_curve(outcomes)
+    return {
+        "auc": curve.auc,
+        "r1": outcomes.recall_at(1),
+        "auc_strict": curve.strict_auc(int(outcomes.has_match.sum())),
+    }

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class QueryOutcomes:
     """The outcomes of Q queries.
 
@@ -48,6 +48,11 @@ class QueryOutcomes:
             self.num_places,
             None if self.blocks is None else self.blocks[kept],
         )
+
+    @property
+    def own_blocks(self) -> np.ndarray:
+        """(Q,) the blocks; each query by itself without any."""
+        return np.arange(len(self)) if self.blocks is None else self.blocks
 
     @property
     def known_ranks(self) -> list[int | None]:

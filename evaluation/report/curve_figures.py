@@ -1,6 +1,6 @@
-"""Figures of numbers: precision and recall, AUC over change, a track."""
+"""Figures of numbers: precision and recall, a track."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -11,12 +11,8 @@ from evaluation.localisation.localise import RIGHT_TRANSLATION
 from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.report.drawing import method_entry, method_style, plain, save
-from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.tables import in_table_order, title
-
-# The least number of points that a line is fitted through.
-_LEAST_POINTS = 5
+from evaluation.results.drawing import method_style, plain, save
+from evaluation.results.table_forms import in_table_order, title
 
 
 def draw_pr_curves(
@@ -48,58 +44,6 @@ def draw_pr_curves(
     save(figure, stem)
 
 
-def draw_auc_over_change(
-    results: Sequence[RecognitionResult],
-    changes: Mapping[tuple[str, str, str], float],
-    stem: Path,
-    reference: Reference = NO_REFERENCE,
-) -> None:
-    """Draws AUC against TCR_sym, with 95 % intervals.
-
-    The left panel counts all queries, the next one those with a match. Right of
-    them are the reference's values, if there are any.
-    """
-    methods = in_table_order(result.method for result in results)
-    with_reference = any(map(reference.auc_over_change, methods))
-    count = len(MODES) + with_reference
-    figure = Figure(figsize=(3.4 * count, 3.7), layout="constrained")
-    panels = figure.subplots(1, count, sharex=True, sharey=True)
-    with_line = set()
-    for axes, mode in zip(panels, MODES, strict=False):
-        for index, method in enumerate(methods):
-            points = [
-                (changes[r.pair], r.metrics[mode])
-                for r in results
-                if r.method == method and r.pair in changes
-            ]
-            # Side by side, so that the intervals of one pair do not hide each
-            # other.
-            shift = 0.0008 * (index - 0.5 * (len(methods) - 1))
-            if _draw_points(axes, method, points, shift):
-                with_line.add(method)
-        axes.set_title(f"this report, {mode} queries", fontsize=9)
-    if with_reference:
-        for method in methods:
-            _draw_published(
-                panels[-1], method, reference.auc_over_change(method)
-            )
-        panels[-1].set_title(reference.counting[1], fontsize=9)
-    for axes in panels:
-        axes.tick_params(labelleft=True)
-        axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylim=(0.0, 1.02))
-        axes.grid(alpha=0.3)
-    panels[0].set_ylabel("AUC")
-    panels[0].legend(
-        handles=[
-            method_entry(method, with_line=method in with_line)
-            for method in methods
-        ],
-        fontsize=7,
-        framealpha=0.8,
-    )
-    save(figure, stem)
-
-
 def _draw_curve(
     axes: Axes, method: str, metrics: PlaceRecognitionMetrics
 ) -> None:
@@ -120,62 +64,6 @@ def _draw_curve(
         markevery=0.2,
         label=plain(f"{title(method)} {metrics.auc:.3f}"),
     )
-
-
-def _draw_points(
-    axes: Axes,
-    method: str,
-    points: Sequence[tuple[float, PlaceRecognitionMetrics]],
-    shift: float,
-) -> bool:
-    """Draws a method's points; returns whether there is a line, too."""
-    if not points:
-        return False
-    colour, style, marker = method_style(method)
-    points = sorted(points, key=lambda point: point[0])
-    x = np.array([change for change, _ in points]) + shift
-    y = np.array([metrics.auc for _, metrics in points])
-    below = [m.auc - m.auc_interval.low for _, m in points]
-    above = [m.auc_interval.high - m.auc for _, m in points]
-    # A percentile interval rarely leaves out the value itself.
-    lengths = np.maximum([below, above], 0.0)
-    axes.errorbar(
-        x,
-        y,
-        yerr=lengths,
-        color=colour,
-        marker=marker,
-        markersize=5,
-        linestyle="none",
-        capsize=2,
-        linewidth=1.0,
-    )
-    return _draw_line(axes, x, y, colour, style)
-
-
-def _draw_published(
-    axes: Axes, method: str, values: Sequence[tuple[float, float]]
-) -> None:
-    if not values:
-        return
-    colour, style, marker = method_style(method)
-    x, y = np.array(sorted(values)).T
-    axes.plot(x, y, marker, color=colour, markersize=5, fillstyle="none")
-    _draw_line(axes, x, y, colour, style)
-
-
-def _draw_line(
-    axes: Axes, x: np.ndarray, y: np.ndarray, colour: str, style: str
-) -> bool:
-    """Draws the least-squares line; False if there are too few points."""
-    if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
-        return False
-    slope, offset = np.polyfit(x, y, 1)
-    ends = np.array([x.min(), x.max()])
-    axes.plot(
-        ends, slope * ends + offset, color=colour, linestyle=style, alpha=0.7
-    )
-    return True
 
 
 def draw_track(rows: np.ndarray, stem: Path) -> None:

@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from evaluation.change.drive_change import ChangeResult
 from evaluation.change.tcr import TAU, in_convex_hull
 from evaluation.maps.voxel_maps import VoxelMap
-from evaluation.report.drawing import PIXELS, Legend, plain, save, unit
+from evaluation.results.drawing import PIXELS, Legend, plain, save, unit
 
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)

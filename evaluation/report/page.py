@@ -26,12 +26,18 @@ from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_recognition import RecognitionResult
-from evaluation.recognition.survival import Survival
 from evaluation.report import result_tables, survival
 from evaluation.report.figures import ROUTE_COLOURS
 from evaluation.report.page_data import Illustration, PageDrive, browser_data
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.tables import MISSING, Table, escape_markdown, title
+from evaluation.report.rows import Controlled, change_rows, place_rows
+from evaluation.results.table import RESULTS, Results
+from evaluation.results.table_forms import (
+    MISSING,
+    Table,
+    escape_markdown,
+    title,
+)
 
 _TEMPLATES = "page_template"
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
@@ -60,7 +66,7 @@ class Report:
     """What a report is made of.
 
     Attributes:
-        survivals: place recognition of all pairs, with their controls.
+        pairs: place recognition of all pairs, each with its control.
         recognitions: the same results without controls, and those of drives
             compared with themselves.
         evidence: (database, query) -> evidence why best places are wrong.
@@ -73,7 +79,7 @@ class Report:
     """
 
     changes: list[ChangeResult] = field(default_factory=list)
-    survivals: list[Survival] = field(default_factory=list)
+    pairs: list[Controlled] = field(default_factory=list)
     recognitions: list[RecognitionResult] = field(default_factory=list)
     differences: Sequence[result_tables.MethodDifference] = ()
     evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
@@ -86,6 +92,30 @@ class Report:
     pages: Mapping[str, str] = field(default_factory=dict)
     reference: Reference = NO_REFERENCE
     repeated: list[RecognitionResult] = field(default_factory=list)
+
+    @functools.cached_property
+    def results(self) -> Results:
+        """The table of the pairs and of their controls."""
+        return Results.of(
+            [
+                *place_rows(self.pairs, self.tracks, self.evidence),
+                *change_rows(self.pairs, self.changes),
+            ]
+        )
+
+    @functools.cached_property
+    def survivals(self) -> list[survival.Survival]:
+        """What is left on each pair."""
+        stages = {
+            name: stage
+            for one, _ in self.pairs
+            for name, stage in zip(
+                (one.outcome.database, one.outcome.query),
+                one.stages,
+                strict=True,
+            )
+        }
+        return survival.survivals(self.results.rows, stages)
 
     @property
     def compared(self) -> list[RecognitionResult]:
@@ -100,7 +130,7 @@ def write_report(report: Report, folder: Path) -> Path:
     Raises:
         InputError: a file cannot be written.
     """
-    results, controls = report.recognitions, report.survivals
+    results = report.recognitions
     tables = _shown_tables(report)
     every = [*results, *report.repeated]
     asked = [(one.pair, one) for one in results]
@@ -123,13 +153,14 @@ def write_report(report: Report, folder: Path) -> Path:
             + result_tables.query_table(again, report.tracks, {}).rows,
         ),
         "queries_unchanged": result_tables.query_table(
-            [(one.pair, one.unchanged) for one in controls if one.unchanged],
+            [(one.pair, control) for one, control in report.pairs if control],
             report.tracks,
             {},
         ),
     }
     if report.costs:
         numbers["costs"] = result_tables.cost_numbers(report.costs)
+    report.results.write_csv(folder / RESULTS)
     for name, table in numbers.items():
         table.write_csv(folder / f"{name}.csv")
         if name not in ("why", "differences") and name in tables:

@@ -17,9 +17,9 @@ from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.scoring import ranking
-from evaluation.report.drawing import Legend
 from evaluation.report.figures import Picture
-from evaluation.report.tables import in_table_order, title
+from evaluation.results.drawing import Legend
+from evaluation.results.table_forms import in_table_order, title
 
 # Points in all scans of a page. At some 3 bytes each they leave room for the
 # figures within 25 MB.

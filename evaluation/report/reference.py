@@ -7,6 +7,7 @@ from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.metrics import Mode
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.table import Results, Row
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,22 @@ class Reference:
             if name == method
             and (change := self.change(city, stages)) is not None
         ]
+
+    def to_results(self) -> Results:
+        """Returns the published AUC and TCR_sym of all pairs as a table."""
+        rows = []
+        for key, value in self.recognitions.items():
+            city, *stages, method, _ = key
+            change = self.change(city, stages)
+            for task, name, metric, number in (
+                ("place", method, "auc", value.auc),
+                ("change", "", "tcr_sym", change),
+            ):
+                if number is not None:
+                    pair = city, *stages
+                    where = (self.title, *pair, 0, {}, task, name, False, "")
+                    rows.append(Row(*where, metric, number))
+        return Results.of(rows)
 
     def _ran(self, result: RecognitionResult) -> bool:
         """Returns whether the source ran the method by the same protocol."""

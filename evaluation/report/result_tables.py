@@ -36,7 +36,7 @@ from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
-from evaluation.report.tables import (
+from evaluation.results.table_forms import (
     CAPTIONS,
     Columns,
     Table,

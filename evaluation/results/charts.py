@@ -16,6 +16,7 @@ title is what the chart shows, in words.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
@@ -31,10 +32,11 @@ from matplotlib.patches import Rectangle
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from evaluation.report.drawing import METHOD_STYLES, plain
-from evaluation.report.tables import in_table_order, title
+from evaluation.recognition.place_outcome import kept_share
+from evaluation.results.drawing import METHOD_STYLES, plain
 from evaluation.results.summaries import correlations, means, paired_values
 from evaluation.results.table import Results, Row
+from evaluation.results.table_forms import in_table_order, title
 
 # Widths [px] on a screen and on a phone.
 WIDE, NARROW = 860, 358
@@ -68,6 +70,8 @@ _COLOURS = LinearSegmentedColormap.from_list(
 _BANDWIDTH = 0.15
 _RESAMPLES = 1000
 _LEAST_POINTS = 5
+# Columns that say which drives are compared.
+_PAIR = ("map", "database", "query")
 _GRID = 60
 # Beyond this ratio of its values, an axis is logarithmic.
 _WIDE_RANGE = 50.0
@@ -102,10 +106,6 @@ class _Chart:
     @property
     def metric(self) -> str:
         return self.keys.get("metric", self.keys.get("y", ""))
-
-    @property
-    def maps(self) -> list[str]:
-        return list(dict.fromkeys(row.map for row in self.rows))
 
     @property
     def panes(self) -> dict[str, list[Row]]:
@@ -234,24 +234,33 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
     before, after = values[0], values[-1]
     found = {
         (titled(one.key[0]), *one.key[1:]): one.value
-        for one in means(chart.rows, "label", "map", over)
+        for one in means(chart.rows, "label", *_PAIR, over)
     }
+    ends_of = [
+        {key[1:4]: None for key in found if key[4] == v}
+        for v in (before, after)
+    ]
+    pairs = [pair for pair in ends_of[0] if pair in ends_of[1]]
+    of_map = Counter(name for name, *_ in pairs)
     places: list[tuple[str, float]] = []
-    figure = chart.figure(
-        (len(chart.styles) * (len(chart.maps) + 1) + 3) * _ROW
-    )
+    figure = chart.figure((len(chart.styles) * (len(pairs) + 1) + 3) * _ROW)
     axes = figure.subplots()
     for name, (colour, _, marker) in chart.styles.items():
         places.append((name, len(places)))
-        for one in chart.maps:
+        for pair in pairs:
             y = float(len(places))
-            places.append((one, y))
+            label = pair[0] if of_map[pair[0]] == 1 else " → ".join(pair[1:])
+            places.append((label, y))
             ends = [
-                found.get((name, one, v), math.nan) for v in (before, after)
+                found.get((name, *pair, v), math.nan) for v in (before, after)
             ]
             axes.plot(ends, [y, y], color=colour, lw=2.5, alpha=0.5)
             axes.plot(ends[0], y, marker, color=colour, mfc="white", ms=7)
             axes.plot(ends[1], y, marker, color=colour, ms=7)
+            if ends[0] > 0.0 and not math.isnan(ends[1]):
+                share = f"{100.0 * ends[1] / ends[0]:.0f} %"
+                side = axes.get_yaxis_transform()
+                axes.text(1.02, y, share, transform=side, va="center")
     axes.set_yticks([y for _, y in places], [plain(one) for one, _ in places])
     for label in axes.get_yticklabels():
         if label.get_text() in map(plain, chart.styles):
@@ -268,11 +277,11 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
     shares = {}
     for name in chart.styles:
         both = [
-            np.mean([found.get((name, one, v), math.nan) for one in chart.maps])
+            np.mean([found.get((name, *pair, v), math.nan) for pair in pairs])
             for v in (before, after)
         ]
         shares[name] = (
-            float(both[1] / both[0]),
+            float(kept_share(both[1], both[0])),
             f"{both[1]:.2f} of {both[0]:.2f}",
         )
     best, worst = _ends(shares)

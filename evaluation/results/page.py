@@ -16,11 +16,11 @@ from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
-from evaluation.report.drawing import save
-from evaluation.report.tables import in_table_order
 from evaluation.results import charts as drawing
+from evaluation.results.drawing import save
 from evaluation.results.summaries import Summary, means, summarised
 from evaluation.results.table import KEYS, SETTINGS, QueryRows, Results
+from evaluation.results.table_forms import in_table_order
 
 _TASKS = {
     "place": "Place recognition",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import rankdata
@@ -19,27 +19,18 @@ from cns_drake.base.errors import InputError
 from evaluation.recognition.metrics import (
     UNKNOWN,
     Interval,
+    paired_samples,
     percentile_interval,
     pr_curve,
-    resampled_metrics,
     resampled_weights,
 )
-from evaluation.recognition.survival import kept_share
+from evaluation.recognition.place_outcome import kept_share
 from evaluation.results.table import Answers, Key, QueryRows, Results, Row
 
-# Task and metric -> the metric of the share of it that is kept.
-KEPT = {
-    ("place", "auc"): "kept",
-    ("place", "auc_strict"): "kept_strict",
-    ("pose", "pose_success"): "kept",
-    ("localise", "success_03m_1deg"): "kept",
-}
-CAUSE, LEVEL = "cause", "level"
+CAUSE, LEVEL, NO_CAUSE = "cause", "level", "none"
 # Joins the names of causes that come together.
 _AND = "+"
 _SAMPLES = 1000
-
-_Keyed = TypeVar("_Keyed", bound=Key)
 
 
 class Mean(NamedTuple):
@@ -85,112 +76,13 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
     ]
 
 
-class _Conditions(Generic[_Keyed]):
-    """Rows or answers by condition, and by seed or with all seeds joined."""
-
-    def __init__(self, keys: Iterable[_Keyed], *, pooled: bool) -> None:
-        self.groups: dict[tuple, list[_Keyed]] = {}
-        self._first: dict[tuple, list[_Keyed]] = {}
-        for key in keys:
-            name = key.but("seed"), getattr(key, "metric", None)
-            seed = None if pooled else key.seed
-            group = self.groups.setdefault((name, seed), [])
-            group.append(key)
-            self._first.setdefault(name, group)
-
-    def at(
-        self,
-        key: Key,
-        values: Mapping[str, object] | None = None,
-        metric: str | None = None,
-    ) -> list[_Keyed]:
-        """Returns those of a condition with other values of some factors.
-
-        They have the seed of the key; or the first one, without that.
-        """
-        moved = replace(key, factors={**key.factors, **(values or {})})
-        name = moved.but("seed"), metric
-        return self.groups.get((name, key.seed), self._first.get(name, []))
-
-
-def kept_rows(
-    results: Results,
-    baseline: Mapping[str, object],
-    queries: QueryRows | None = None,
-    *,
-    pooled: bool = False,
-) -> list[Row]:
-    """Returns the shares of AUC, or of successes, that conditions leave.
-
-    Args:
-        results: the table.
-        baseline: factor -> its value in the condition that has all; the other
-            factors stay. The seed does so, too, or is the first one.
-        queries: they give the 95 % intervals of shares of AUC.
-        pooled: whether seeds are joined. The share is then one of means over
-            seeds, and the row has the first seed.
-
-    Returns:
-        A row for each row of a metric in `KEPT`. Its value is NaN if the table
-        has no baseline, or one of 0; its interval is NaN if the numbers of
-        queries differ.
-    """
-    measured = [row for row in results.rows if (row.task, row.metric) in KEPT]
-    rows = _Conditions(measured, pooled=pooled)
-    answers = _Conditions(queries.answers if queries else (), pooled=pooled)
-    found = []
-    for some in rows.groups.values():
-        one = some[0]
-        none = rows.at(one, baseline, one.metric)
-        share, interval = math.nan, UNKNOWN
-        if none:
-            share = float(kept_share(_mean(some), _mean(none)))
-        if one.metric == "auc":
-            interval = kept_interval(answers.at(one, baseline), answers.at(one))
-        metric = KEPT[one.task, one.metric]
-        kept = replace(one, metric=metric, value=share)
-        found.append(replace(kept, low=interval.low, high=interval.high))
-    return found
-
-
-def _mean(rows: Iterable[Row]) -> float:
-    return float(np.mean([row.value for row in rows]))
-
-
-def kept_interval(
-    unchanged: Sequence[Answers], changed: Sequence[Answers]
-) -> Interval:
-    """Returns the 95 % interval of the share of AUC that is kept.
-
-    The answers are those of several seeds, to the same queries.
-    """
-    lengths = {len(one.outcomes) for one in (*unchanged, *changed)}
-    if not (unchanged and changed) or len(lengths) > 1 or 0 in lengths:
-        return UNKNOWN
-    before, after = _sampled(changed[0], unchanged, changed)
-    return percentile_interval(kept_share(after, before))
-
-
-def _sampled(blocks: Answers, *groups: Sequence[Answers]) -> list[np.ndarray]:
-    """Returns the mean AUC (B,) of each group, of the same samples."""
-    outcomes = blocks.outcomes
-    weights = resampled_weights(len(outcomes), blocks=outcomes.blocks)
-    return [
-        np.mean(
-            [resampled_metrics(one.outcomes, weights)[0] for one in group],
-            axis=0,
-        )
-        for group in groups
-    ]
-
-
 @dataclass(frozen=True)
 class Excess:
-    """A method under two changes at once, and under each alone.
+    """A method under two causes at once, and under each alone.
 
     Attributes:
         answers: under both, with the first seed.
-        names: names of the two causes, or of the two factors.
+        names: names of the two causes.
         kept: shares of the baseline's AUC: under the first, under the second,
             under both.
         value: what both cost beyond the product of what each leaves, as a
@@ -205,39 +97,32 @@ class Excess:
     interval: Interval
 
 
-def excesses(
-    queries: QueryRows, baseline: Mapping[str, object]
-) -> list[Excess]:
-    """Returns what two changes cost together, for all pairs of changes.
+def excesses(queries: QueryRows) -> list[Excess]:
+    """Returns what two causes cost together, for all pairs of causes.
 
     A pair is a cause whose name joins two by "+", each of which is also there
-    alone (at its strongest level), or a condition that differs from the
-    baseline in two factors. Seeds are joined.
+    alone (at its strongest level). Seeds are joined.
     """
-    conditions = _Conditions(queries.answers, pooled=True)
+    conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}
     for one in queries.answers:
+        conditions.setdefault(one.but("seed"), []).append(one)
         name = one.map, one[CAUSE]
         levels[name] = max(one[LEVEL] or 0, levels.get(name, 0))
     found = []
-    for both in conditions.groups.values():
+    for both in conditions.values():
         key = both[0]
         names = str(key[CAUSE]).split(_AND)
-        none = {n: baseline[n] for n in (CAUSE, LEVEL) if n in baseline}
-        alone = [{CAUSE: n, LEVEL: levels.get((key.map, n))} for n in names]
-        if len(names) != 2:
-            names = [n for n, v in baseline.items() if key[n] != v]
-            names = [name for name in names if name != LEVEL]
-            # The first is alone where the second is as in the baseline.
-            alone = [
-                {n: baseline[n], **(none if n == CAUSE else {})}
-                for n in reversed(names)
-            ]
-            none = dict(baseline)
-        groups = [conditions.at(key, values) for values in (none, *alone)]
-        if len(names) != 2:
-            continue
-        if not all(groups):
+        alone = [(NO_CAUSE, 0), *((n, levels.get((key.map, n))) for n in names)]
+        moved = (
+            {**key.factors, CAUSE: cause, LEVEL: level}
+            for cause, level in alone
+        )
+        groups = [
+            conditions.get(replace(key, factors=one).but("seed"), [])
+            for one in moved
+        ]
+        if len(names) != 2 or not all(groups):
             continue
         all_of_it, *kept = (
             float(np.mean([pr_curve(one.outcomes).auc for one in group]))
@@ -248,7 +133,13 @@ def excesses(
         )
         interval = UNKNOWN
         if len({len(g[0].outcomes) for g in (*groups, both)}) == 1:
-            base, *samples = _sampled(key, *groups, both)
+            base, *samples = (
+                np.mean(
+                    [paired_samples(a.outcomes, key.outcomes)[0] for a in some],
+                    axis=0,
+                )
+                for some in (*groups, both)
+            )
             a, b, ab = (kept_share(one, base) for one in samples)
             interval = percentile_interval(a * b - ab)
         found.append(
@@ -613,7 +504,6 @@ def summarised(
                 for one in growths(results, x, metric)
                 if not math.isnan(one.exponent)
             ]
-    none = {CAUSE: "none", LEVEL: 0}
     if queries is not None and CAUSE in queries.factors:
         found += [
             Summary(
@@ -621,7 +511,7 @@ def summarised(
                 *_named(one.answers),
                 *(one.value, one.interval.low, one.interval.high),
             )
-            for one in excesses(queries, none)
+            for one in excesses(queries)
         ]
     return found
 

@@ -25,6 +25,7 @@ import numpy as np
 from cns_drake.base.csv_files import csv_text
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes, write_text
+from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
@@ -187,6 +188,19 @@ class Row(Key):
     low: float = math.nan
     high: float = math.nan
     n: int | None = None
+
+    @classmethod
+    def of(cls, number: Number, **key: Any) -> Row:
+        """Returns the row of a task's number; the key is all that it lacks."""
+        named = {"method": number.method, "gate": number.gate, **key}
+        return cls(
+            **named,
+            metric=number.metric,
+            value=number.value,
+            low=number.interval.low,
+            high=number.interval.high,
+            n=number.n,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,15 +11,12 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Steps
 from cns_drake.base.version import __version__
-from evaluation.change.drive_change import symmetric_changes
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.survival import Survival
 from evaluation.report import page, result_tables
-from evaluation.report.curve_figures import draw_auc_over_change, draw_pr_curves
+from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.report.survival import draw_survival
-from evaluation.results.table import RESULTS
+from evaluation.report.rows import Controlled
 from evaluation.study import figures, measurements
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
@@ -32,7 +29,6 @@ from evaluation.study.collection import (
 )
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.parts import MakePart, StudyFiles
-from evaluation.study.report_rows import report_rows
 from evaluation.study.surveys import Further, Survey
 
 # Expected seconds: for the maps of a drive of 3000 scans, for its places or
@@ -137,22 +133,10 @@ class Study:
         report.differences = result_tables.method_differences(
             report.recognitions
         )
-        if report.recognitions:
-            known = self.reference if report.compared else NO_REFERENCE
-            shown = figures.auc_illustration(folder, known.title)
-            changes = symmetric_changes(report.changes)
-            draw_auc_over_change(
-                report.recognitions, changes, shown.stem, known
-            )
-            report.illustrations.insert(0, shown)
-        if any(one.unchanged is not None for one in report.survivals):
-            shown = figures.survival_illustration(folder)
-            behind = result_tables.beaten(report.differences)
-            draw_survival(report.survivals, shown.stem, behind)
+        for shown in figures.chart_illustrations(report, folder):
             report.illustrations.insert(0, shown)
         if self._costed_pairs:
             report.costs = self._files.part("costs", "costs").read()
-        report_rows(report).write_csv(self.output / RESULTS)
         return page.write_report(report, self.output)
 
     def _pairs(self, city: City) -> list[Pair]:
@@ -345,7 +329,8 @@ class Study:
         for earlier, later in city.change_pairs():
             change = files.part("changes", earlier.name, later.name).read()
             report.changes.append(change)
-        survivals, closures = [], []
+        pairs: list[Controlled] = []
+        closures = []
         for pair in self._pairs(city):
             control = city.unchanged_pair(*pair)
             results = files.recognition(*(one.name for one in pair))
@@ -359,7 +344,7 @@ class Study:
                 if control is not None:
                     beside = files.recognition(*(one.name for one in control))
                     unchanged = beside.result(method.key).read()
-                survivals.append(Survival.of(changed, unchanged))
+                pairs.append((changed, unchanged))
             for again in city.repetitions(pair, self.methods, self.protocol):
                 report.repeated.append(results.result(again.key).read())
             evidence = results.evidence.read()
@@ -371,11 +356,11 @@ class Study:
                     report.tracks[drive.name] = result_tables.DriveTrack(
                         survey.stamps_ns, survey.X_WS
                     )
-        compared = [*(one.changed for one in survivals), *closures]
+        compared = [*(changed for changed, _ in pairs), *closures]
         if compared:
             stem = files.figures / figures.curves_stem(city)
             draw_pr_curves(city.name, compared, stem)
-        report.survivals += survivals
+        report.pairs += pairs
         report.recognitions += compared
         report.drives.update(files.part("pages", city.name).read())
         report.illustrations += figures.illustrations(city, files.figures)

@@ -13,11 +13,11 @@ from evaluation.recognition.place_recognition import (
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.recognition.survival import Survival
 from evaluation.report.figures import top_view
 from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, make_drive
 from evaluation.report.reference import Finding, Judgement, Reference
+from evaluation.report.result_tables import DriveTrack
 
 PLACES = 5.0 * np.arange(10)
 QUERIES = np.array([0.0, 10.0, 20.0, 30.0, 100.0])
@@ -76,10 +76,14 @@ def make_content(folder, **changed):
             Illustration(folder / "survival", "kept", "svg", "survival"),
         ],
         "recognitions": results,
-        "survivals": [
-            Survival.of(results[0], without_change),
-            *(Survival.of(result, None) for result in results[1:]),
+        "pairs": [
+            (results[0], without_change),
+            *((result, None) for result in results[1:]),
         ],
+        "tracks": {
+            name: DriveTrack(np.arange(len(xs)), _poses(xs, 0.0, 0.0))
+            for name, xs in ((f"{MAP}_01", PLACES), (f"{MAP}_04", QUERIES))
+        },
         "drives": {
             "metropolis_01": _drive("metropolis_01", PLACES, 0, 0.0),
             "metropolis_04": _drive("metropolis_04", QUERIES, 2, 0.5 * np.pi),

@@ -22,7 +22,7 @@ from cns_drake.studies.tasks.task import (
 )
 from evaluation.localisation import estimators, localise
 from evaluation.localisation.localise import Starts
-from evaluation.recognition.survival import kept_share
+from evaluation.recognition.place_outcome import kept_share
 from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from cns_drake.studies.tasks.task import Answers, Jobs, Number, Pair, Task
-from evaluation.recognition.place_outcome import PlaceOutcome, place_numbers
-from evaluation.recognition.pose_errors import pose_success
-from evaluation.recognition.survival import kept_share
+from evaluation.recognition.place_outcome import (
+    PlaceOutcome,
+    place_numbers,
+    pose_numbers,
+)
 from evaluation.study.parts import Part
 from evaluation.study.place_outcomes import measure_places
 
@@ -42,11 +42,7 @@ class PlaceTask(Task):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            for name, value, interval in place_numbers(now, _same(before, now)):
-                number = len(now.outcomes)
-                yield Number(
-                    now.method, now.is_gated, name, value, interval, number
-                )
+            yield from place_numbers(now, _same(before, now))
 
     def answers(self, found: Outcomes) -> Iterator[Answers]:
         for now in found:
@@ -62,28 +58,7 @@ class PoseTask(PlaceTask):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            value = pose_success(now.pose_errors, now.outcomes)
-            if np.isnan(value):
-                continue
-            with_match = int(now.outcomes.has_match.sum())
-            values = {"pose_success": value}
-            then = _same(before, now)
-            if then is not None:
-                today = pose_success(then.pose_errors, then.outcomes)
-                values["kept"] = float(kept_share(value, today))
-            known = ~np.isnan(now.pose_errors.translation)
-            if known.any():
-                errors = now.pose_errors
-                values |= {
-                    "translation_median": float(
-                        np.median(errors.translation[known])
-                    ),
-                    "rotation_median_deg": float(
-                        np.median(errors.rotation_deg[known])
-                    ),
-                }
-            for name, one in values.items():
-                yield Number(now.method, now.is_gated, name, one, n=with_match)
+            yield from pose_numbers(now, _same(before, now))
 
     def answers(self, found: Outcomes) -> Iterator[Answers]:
         # Those of `place` have the errors of poses.

@@ -14,7 +14,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
 from evaluation.recognition.description import Role
-from evaluation.recognition.metrics import UNKNOWN, Interval
+from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import MakePart, Part, StudyFiles
@@ -23,27 +23,6 @@ from evaluation.study.surveys import DriveSource, Survey
 
 # Expected seconds to describe a drive by all methods.
 _DESCRIPTION_COST = 30.0
-
-
-class Number(NamedTuple):
-    """A number that a task found.
-
-    Attributes:
-        method: method, estimator or baseline; "" if there is none. For a place
-            recognition method it is the `key` of its choice.
-        gate: whether the gate was used.
-        metric: name of the number.
-        value: the number itself.
-        interval: its 95 % interval.
-        n: number of queries, or other things, that count.
-    """
-
-    method: str
-    gate: bool
-    metric: str
-    value: float
-    interval: Interval = UNKNOWN
-    n: int = 0
 
 
 class Answers(NamedTuple):

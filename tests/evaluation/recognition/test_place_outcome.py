@@ -49,11 +49,13 @@ def part(number, kept):
 def numbers(now, before=None):
     """Metric -> value, and metric -> interval."""
     found = list(place_numbers(now, before))
-    names = [name for name, _, _ in found]
-    assert len(set(names)) == len(names)
+    assert len({one.metric for one in found}) == len(found)
+    assert {(one.method, one.gate, one.n) for one in found} == {
+        ("solid", False, len(now.outcomes))
+    }
     return (
-        {name: value for name, value, _ in found},
-        {name: interval for name, _, interval in found},
+        {one.metric: one.value for one in found},
+        {one.metric: one.interval for one in found},
     )
 
 
@@ -75,6 +77,21 @@ def test_the_share_of_auc_that_is_kept():
     low, high = binom.ppf([0.025, 0.975], 60, 0.75) / 60
     assert intervals["r1"].low == pytest.approx(low, abs=0.02)
     assert intervals["r1"].high == pytest.approx(high, abs=0.02)
+
+
+@pytest.mark.parametrize("blocks_before", [None, np.arange(20) // 4])
+def test_intervals_of_kept_are_of_the_blocks_of_now(blocks_before):
+    after, before = part(20, 9), part(20, 16)
+    draws = np.random.default_rng([0, 5]).integers(5, size=(1000, 5))
+    counts = [one.reshape(5, 4).sum(axis=1) for one in (after, before)]
+    now, then = (one[draws].sum(axis=1) for one in counts)
+    _, intervals = numbers(
+        answered(after, blocks=np.arange(20) // 4),
+        answered(before, blocks=blocks_before),
+    )
+    limits = pytest.approx(tuple(np.percentile(now / then, [2.5, 97.5])))
+    for name in ("kept", "kept_r1"):
+        assert (intervals[name].low, intervals[name].high) == limits
 
 
 def test_right_answers_with_the_best_scores():

@@ -1,6 +1,3 @@
-from dataclasses import replace
-from types import SimpleNamespace
-
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Patch
@@ -9,12 +6,8 @@ import pytest
 
 from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
-from evaluation.paper import reference_for
-from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.report import curve_figures
-from evaluation.report.curve_figures import draw_auc_over_change
-from evaluation.report.drawing import PIXELS, save
 from evaluation.report.figures import judge_points, top_view, voxel_of_each
+from evaluation.results.drawing import PIXELS, save
 
 
 def test_change_picture_has_the_colours_of_the_metric():
@@ -47,42 +40,6 @@ def test_view_from_above_shows_the_route_and_60_m_around():
     # Without a point in view the whole map is shown.
     far = top_view(line, positions + np.array([0.0, 500.0, 0.0]))
     assert far.extent[1] > 990.0
-
-
-@pytest.mark.parametrize(("city", "panels"), [("metropolis", 3), ("town", 2)])
-def test_no_line_through_fewer_than_five_points(
-    city, panels, monkeypatch, tmp_path
-):
-    drawn = []
-    monkeypatch.setattr(
-        curve_figures, "save", lambda figure, stem: drawn.append(figure)
-    )
-    protocol = replace(PAPER_PROTOCOL, scans_per_place=10)
-    around = SimpleNamespace(low=0.4, high=0.6)
-    metrics = SimpleNamespace(auc=0.5, auc_interval=around)
-    pairs = [(city, f"{stage:02d}", "09") for stage in range(5)]
-    changes = {pair: 0.05 * stage for stage, pair in enumerate(pairs)}
-    for known in (4, 5):
-        results = [
-            SimpleNamespace(
-                pair=pair,
-                method="btc",
-                metrics={"all": metrics, "filtered": metrics},
-                outcome=SimpleNamespace(protocol=protocol),
-            )
-            for pair in pairs[:known]
-        ]
-        draw_auc_over_change(
-            results, changes, tmp_path / "auc", reference_for({city})
-        )
-    for figure, has_line in zip(drawn, (False, True), strict=True):
-        # The paper's table has ten pairs, and is shown beside its cities.
-        assert len(figure.axes) == panels
-        styles = [line.get_linestyle() for line in figure.axes[0].lines]
-        assert ("--" in styles) is has_line
-        (entry,) = figure.axes[0].get_legend().legend_handles
-        assert entry.get_marker() == "s"
-        assert entry.get_linestyle() == ("--" if has_line else "None")
 
 
 def test_points_of_pictures_have_their_voxels():

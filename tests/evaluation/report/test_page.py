@@ -170,7 +170,7 @@ def test_page_without_recognition_has_no_browser(content, tmp_path):
     empty = make_content(
         tmp_path,
         recognitions=[],
-        survivals=[],
+        pairs=[],
         illustrations=[],
     )
     write_page(tmp_path / "report.html", empty)

@@ -1,49 +1,62 @@
 import math
-from types import SimpleNamespace
 
 from helpers.small_page import make_content
 import pytest
 
-from evaluation.recognition.metrics import Interval
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.survival import Kept
-from evaluation.report import survival
-from evaluation.report.page import write_page
+from evaluation.report.page import Report, write_page
 from evaluation.report.survival import (
-    draw_survival,
     survival_numbers,
     survival_summary,
     survival_table,
+    survivals,
 )
+from evaluation.results.table import Row
+
+STAGES = {f"town_{number:02d}": f"{number:02d}" for number in range(4)}
 
 
 def make(method, database, before, after, interval=(0.25, 0.75)):
-    kept = Kept(before, after, Interval(*interval))
+    """The rows of a method on a pair; before is NaN without a control."""
     has_control = not math.isnan(before)
-    return SimpleNamespace(
-        pair=("town", database, "03"),
-        method=method,
-        unchanged=SimpleNamespace() if has_control else None,
-        control=f"town_{database}_stage_03" if has_control else None,
-        auc=kept,
-        auc_strict=(before, 0.5 * after),
-        recall_at_full_precision=0.125,
-        recall_at_1=Kept(before, before, Interval(*interval)),
-        protocol=RetrievalProtocol(radius=5.0, scans_per_place=10),
-    )
+    share = after / before if before else math.nan
+    known = {
+        "last": {"auc": before, "auc_strict": before, "r1": before},
+        "own": {
+            "auc": after,
+            "auc_strict": 0.5 * after,
+            "r1": before if has_control else after,
+            "recall_at_full_precision": 0.125,
+            **({"kept": share, "kept_r1": 1.0} if has_control else {}),
+        },
+    }
+    return [
+        Row(
+            *("stages", "town", f"town_{database}", "town_03", 1),
+            {"both.stage": stage},
+            *("place", method, False, "fair", metric, value),
+            *(interval if metric.startswith("kept") else ()),
+        )
+        for stage, values in known.items()
+        for metric, value in values.items()
+        if has_control or stage == "own"
+    ]
 
 
 SOME = [
-    make("btc", "01", 0.8, 0.4),
-    make("btc", "02", 0.8, 0.6),
-    make("solid", "01", 0.5, 0.05),
-    make("solid", "02", 0.0, 0.0, (math.nan, math.nan)),
+    *make("btc", "01", 0.8, 0.4),
+    *make("btc", "02", 0.8, 0.6),
+    *make("solid", "01", 0.5, 0.05),
+    *make("solid", "02", 0.0, 0.0, (math.nan, math.nan)),
 ]
-NO_CONTROL = make("btc", "00", math.nan, 0.5, (math.nan, math.nan))
+NO_CONTROL = make("btc", "00", math.nan, 0.5)
+
+
+def of(rows):
+    return survivals(rows, STAGES)
 
 
 def test_numbers():
-    table = survival_numbers([SOME[0], NO_CONTROL])
+    table = survival_numbers(of([*SOME[:9], *NO_CONTROL]))
     rows = [dict(zip(table.header, row, strict=True)) for row in table.rows]
     names = "map,db,query,method,auc_unchanged,auc_changed,kept"
     assert ",".join(table.header).startswith(names)
@@ -52,15 +65,14 @@ def test_numbers():
     assert rows[0]["r1_kept"] == 1.0
     first, last = table.to_csv().splitlines()[1:]
     assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
-    protocol = "5.0,10.0,5.0,100.0,10,,0,recorded"
-    assert first.endswith(f",0.125,town_01_stage_03,{protocol},0.8,0.2")
+    assert first.endswith(",0.125,0.8,0.2,fair")
     # Without a control, only the measured values stand there.
     assert last.startswith("town,00,03,btc,,0.5,,,,,")
-    assert last.endswith(f",,{protocol},,0.25")
+    assert last.endswith(",0.125,,0.25,fair")
 
 
 def test_table_for_print():
-    table = survival_table([*SOME, NO_CONTROL])
+    table = survival_table(of([*SOME, *NO_CONTROL]))
     # Rows are sorted by pair, then in the paper's order of methods.
     assert [row[1:3] for row in table.rows] == [
         ("01 → 03", "SOLiD"),
@@ -76,54 +88,26 @@ def test_table_for_print():
 
 
 def test_summary():
-    assert survival_summary(SOME) == (
+    assert survival_summary(of(SOME)) == (
         "Each method keeps part of its AUC without change (median of 2 pairs):"
         " BTC 62 %, SOLiD 10 %."
     )
-    assert survival_summary(SOME[:1]).endswith("(one pair): BTC 50 %.")
+    assert survival_summary(of(SOME[:9])).endswith("(one pair): BTC 50 %.")
     assert "For 1 of 3 pairs no control was" in (
-        survival_summary([*SOME, NO_CONTROL])
+        survival_summary(of([*SOME, *NO_CONTROL]))
     )
-    assert survival_summary([NO_CONTROL]).startswith("Here no control was")
+    assert survival_summary(of(NO_CONTROL)).startswith("Here no control was")
     assert survival_summary([]) == ""
 
 
-def test_section_of_the_page(tmp_path):
+def test_section_of_the_page(tmp_path, monkeypatch):
     page = tmp_path / "report.html"
-    write_page(page, make_content(tmp_path, survivals=[]))
+    write_page(page, make_content(tmp_path, pairs=[]))
     assert "survives the change" not in page.read_text()
-    survivals = [make("a<b", "01", 0.8, 0.4)]
-    write_page(page, make_content(tmp_path, survivals=survivals))
+    rows = of(make("a<b", "01", 0.8, 0.4))
+    monkeypatch.setattr(Report, "survivals", rows)
+    write_page(page, make_content(tmp_path))
     text = page.read_text()
     assert "a&lt;b" in text
     assert "<td>0.800</td><td>0.400</td><td><b>50 %</b>" in text
     assert "<td>0.125</td></tr>" in text
-
-
-def test_figure_shows_the_pairs_that_have_a_control(monkeypatch, tmp_path):
-    drawn = []
-    monkeypatch.setattr(
-        survival, "save", lambda figure, stem: drawn.append(figure)
-    )
-    beaten = {(("town", "01", "03"), "solid")}
-    draw_survival([*SOME, NO_CONTROL], tmp_path / "survival", beaten)
-    (axes,) = drawn[0].axes
-    texts = [text.get_text() for text in axes.texts]
-    assert texts == [
-        "town 01 → 03",
-        "10 %",
-        "50 %",
-        "town 02 → 03",
-        "–",
-        "75 %",
-        "kept",
-    ]
-    names = [label.get_text() for label in axes.get_yticklabels()]
-    assert names == ["SOLiD", "BTC"] * 2
-    lines = [line.get_xdata() for line in axes.lines]
-    assert [list(x) for x in lines if len(x) == 2] == [
-        [0.5, 0.05],
-        [0.8, 0.4],
-        [0.0, 0.0],
-        [0.8, 0.6],
-    ]

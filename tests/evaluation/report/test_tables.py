@@ -4,7 +4,7 @@ import io
 import numpy as np
 import pytest
 
-from evaluation.report.tables import Cell, Table, keyed, ranked
+from evaluation.results.table_forms import Cell, Table, keyed, ranked
 
 PLAIN = Table(
     ("name", "value", "count"),

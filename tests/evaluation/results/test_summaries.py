@@ -56,16 +56,6 @@ def firsts(number):
     return np.arange(20) < number
 
 
-def shares_of_samples(unchanged, changed):
-    """Returns kept shares of samples of five blocks, drawn as all are."""
-    draws = np.random.default_rng([0, 5]).integers(5, size=(1000, 5))
-    parts = [
-        np.reshape(one, (5, 4)).sum(axis=1) for one in (changed, unchanged)
-    ]
-    after, before = (part[draws].sum(axis=1) for part in parts)
-    return after / before
-
-
 def test_means_stand_between_the_least_and_the_greatest():
     rows = [
         row(0.1 * seed + year / 100.0, {YEARS: year}, seed=seed)
@@ -82,52 +72,6 @@ def test_means_stand_between_the_least_and_the_greatest():
     assert third.number == 0
 
 
-def test_kept_is_a_share_of_the_baseline_of_the_same_seed():
-    results = Results.of(
-        [
-            row(0.8, {SNOW: 0, YEARS: 5}, seed=1),
-            row(0.5, {SNOW: 0, YEARS: 5}, seed=2),
-            row(0.4, {SNOW: 0.2, YEARS: 5}, seed=1),
-            row(0.4, {SNOW: 0.2, YEARS: 5}, seed=2),
-            row(0.4, {SNOW: 0.2, YEARS: 5}, seed=3),
-            row(0.4, {SNOW: 0.2, YEARS: 9}, seed=1),
-            row(0.9, {SNOW: 0, YEARS: 5}, metric="r1"),
-            row(0.0, {SNOW: 0}, method="solid"),
-            row(0.3, {SNOW: 0.2}, method="solid"),
-            row(0.5, {SNOW: 0}, metric="pose_success", task="pose"),
-            row(0.1, {SNOW: 0.2}, metric="pose_success", task="pose"),
-        ]
-    )
-    rows = summaries.kept_rows(results, {SNOW: 0})
-    values = [one.value for one in rows]
-    expected = [1.0, 1.0, 0.5, 0.8, 0.5, math.nan, math.nan, math.nan, 1.0, 0.2]
-    assert values == pytest.approx(expected, nan_ok=True)
-    assert {one.metric for one in rows} == {"kept"}
-    assert rows[-1].task == "pose"
-    pooled = summaries.kept_rows(results, {SNOW: 0}, pooled=True)
-    # Three seeds with snow, two without.
-    assert pooled[1].value == pytest.approx(0.4 / 0.65)
-
-
-def test_intervals_of_kept_are_of_the_same_blocks():
-    before, after = firsts(16), firsts(9)
-    queries = QueryRows.of(
-        [answers(before, {SNOW: 0}), answers(after, {SNOW: 1})]
-    )
-    results = Results.of([row(0.8, {SNOW: 0}), row(0.45, {SNOW: 1})])
-    none, snow = summaries.kept_rows(results, {SNOW: 0}, queries)
-    assert (none.low, none.high) == (1.0, 1.0)
-    limits = np.percentile(shares_of_samples(before, after), [2.5, 97.5])
-    assert (snow.low, snow.high) == pytest.approx(tuple(limits))
-    # With other queries nothing is paired.
-    fewer = QueryRows.of(
-        [answers(before, {SNOW: 0}), answers(after[:8], {SNOW: 1})]
-    )
-    _, snow = summaries.kept_rows(results, {SNOW: 0}, fewer)
-    assert math.isnan(snow.low)
-    assert snow.value == pytest.approx(0.5625)
-
-
 def test_two_causes_cost_more_than_the_product():
     cause = "cause"
     level = {"level": 1}
@@ -141,29 +85,11 @@ def test_two_causes_cost_more_than_the_product():
             answers(firsts(4), {cause: "snow+rain", "level": 2}),
         ]
     )
-    (one,) = summaries.excesses(queries, {cause: "none", "level": 0})
+    (one,) = summaries.excesses(queries)
     assert one.names == ("snow", "leaves")
     assert one.kept == pytest.approx((0.5, 0.8, 0.2))
     assert one.value == pytest.approx(0.2)
     assert one.interval.low < 0.2 < one.interval.high
-
-
-def test_two_factors_together():
-    queries = QueryRows.of(
-        [
-            answers(firsts(number), {SNOW: snow, YEARS: years})
-            for snow, years, number in (
-                (0, 0, 20),
-                (1, 0, 12),
-                (0, 5, 15),
-                (1, 5, 9),
-            )
-        ]
-    )
-    (one,) = summaries.excesses(queries, {SNOW: 0, YEARS: 0})
-    assert one.names == (SNOW, YEARS)
-    assert one.kept == pytest.approx((0.6, 0.75, 0.45))
-    assert one.value == pytest.approx(0.0)
 
 
 def test_lifetimes_of_seeds_surround_that_of_the_mean():

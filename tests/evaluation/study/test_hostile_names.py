@@ -8,7 +8,7 @@ from helpers.small_towns import drive
 import pytest
 
 from cns_drake.base.files import file_name
-from evaluation.report.tables import Table
+from evaluation.results.table_forms import Table
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.figures import change_stems

@@ -6,10 +6,8 @@ from pathlib import Path
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from cns_drake.base.files import completing
-from evaluation.report.tables import title
 
 # Okabe and Ito's colours, distinct for all kinds of colour vision; line
 # styles and markers for prints without colour.
@@ -40,21 +38,6 @@ def method_style(method: str) -> tuple[str, str, str]:
     if method in METHOD_STYLES:
         return METHOD_STYLES[method]
     return _OTHER_STYLES[sum(method.encode()) % len(_OTHER_STYLES)]
-
-
-def method_entry(method: str, *, with_line: bool) -> Line2D:
-    """Returns a method's entry of a legend: its marker, and its line."""
-    colour, style, marker = method_style(method)
-    options: dict = {"linestyle": style if with_line else "none"}
-    return Line2D(
-        [],
-        [],
-        color=colour,
-        marker=marker,
-        markersize=5,
-        label=plain(title(method)),
-        **options,
-    )
 
 
 def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
