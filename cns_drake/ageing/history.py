@@ -511,19 +511,12 @@ class City:
     ) -> None:
         rng = self._rng("scaffold", name)
         one = plots.scaffold_before(plot, height, f"scaffold_{name}", rng)
-        area = one.footprint_W
+        area = one.footprint_W.buffer(-0.02)
         # Canopies and porches of its own building may be in the way.
         own = self._triangles(name)
         own = own[own[:, :, 2].min(axis=1) < plot.z + height]
-        reached = shapely.intersection(from_above(own), area)
-        if shapely.area(reached).sum() > 0.2:
-            return
-        blocked = [
-            n
-            for n in self.near(area)
-            if self._class(n) in ("building", "other-structure", *_PASSING)
-            and self._foot(n).intersection(area).area > 0.2
-        ]
+        blocked = shapely.intersects(from_above(own), area).any()
+        blocked |= bool(self.near(area))
         free = not area.intersects(self._world.ground.carriageway)
         if free and not blocked and height > 3.5:
             self._put(one, event="scaffold")

@@ -13,10 +13,10 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
 from cns_drake.command_line import options
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.protocol_options import with_named_protocol
+from evaluation.recognition.protocol_options import with_protocol
 
 
-@with_named_protocol
+@with_protocol
 def reproduce(
     maps: options.Maps = None,
     *,

@@ -591,14 +591,14 @@ def base_protocol(
     """
     values = dict(fields)
     base = values.pop("base", "fair")
-    known = {**PROTOCOLS, "recorded": RetrievalProtocol()}
-    if base not in known:
+    if base not in PROTOCOLS:
         raise InputError(
-            f"{source}: {place}.base: {base!r} is none of {', '.join(known)}"
+            f"{source}: {place}.base: {base!r} is none of"
+            f" {', '.join(PROTOCOLS)}"
         )
     validated(_ProtocolFields, values, f"{source}: {place}")
     try:
-        return replace(known[base], **values)
+        return replace(PROTOCOLS[base], **values)
     except InputError as error:
         option, _, fault = str(error).removeprefix("--").partition(":")
         name = option.replace("-", "_")

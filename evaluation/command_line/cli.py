@@ -21,10 +21,7 @@ from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
 from evaluation.command_line.trajectories import drives, trajectory
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.protocol_options import (
-    with_named_protocol,
-    with_protocol,
-)
+from evaluation.recognition.protocol_options import with_protocol
 
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
@@ -131,8 +128,10 @@ def pr(
     exact_overlaps: Annotated[
         Path | None, typer.Option(metavar="FILE.csv")
     ] = None,
-    turn_queries: Annotated[bool, typer.Option("--turn-queries")] = False,
-    tilt_queries: Annotated[float, typer.Option(metavar="DEG")] = 0.0,
+    turn_queries: Annotated[
+        bool | None, typer.Option("--turn-queries/--no-turn-queries")
+    ] = None,
+    tilt_queries: Annotated[float | None, typer.Option(metavar="DEG")] = None,
     hide_sector: Annotated[float, typer.Option(metavar="DEG")] = 0.0,
     seed: int = 0,
     json: options.Json = False,
@@ -154,8 +153,10 @@ def pr(
         overlaps: Write the overlap of each query with each place.
         exact_overlaps: Read exact overlaps from this table, which cns-drake
             export-pairs writes; by default they are found from the scans.
-        turn_queries: Turn each query by a random yaw.
-        tilt_queries: Tilt each query by a random roll and pitch of up to this.
+        turn_queries: Turn each query by a random yaw, or not; by default as
+            the protocol has it.
+        tilt_queries: Tilt each query by a random roll and pitch of up to this,
+            likewise.
         hide_sector: Hide a random sector of this angle from each query, as a
             truck beside it would.
         seed: Seed of the changes of queries.
@@ -164,11 +165,13 @@ def pr(
     from cns_drake.base.errors import InputError
     from evaluation.recognition import overlap_truth, place_recognition
 
+    if turn_queries is not None:
+        protocol = replace(protocol, turn_queries=turn_queries)
+    if tilt_queries is not None:
+        protocol = replace(protocol, tilt_queries=tilt_queries)
     protocol = replace(
         protocol,
         overlap=options.overlap_of(truth),
-        turn_queries=turn_queries,
-        tilt_queries=tilt_queries,
         hide_sector=hide_sector,
         seed=seed,
     )
@@ -296,7 +299,7 @@ app.command(
 @app.command(
     cls=Command, epilog=example("cns-eval report drives --output report")
 )
-@with_named_protocol
+@with_protocol
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option()],

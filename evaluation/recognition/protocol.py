@@ -261,8 +261,12 @@ PAPER_PROTOCOL = RetrievalProtocol(place="first")
 # nor streets at right angles help a method then. The draws are frozen.
 FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
 
-PROTOCOLS = {"fair": FAIR_PROTOCOL, "paper": PAPER_PROTOCOL}
-PROTOCOL_NAMES = (*PROTOCOLS, "recorded", "own")
+PROTOCOLS = {
+    "fair": FAIR_PROTOCOL,
+    "paper": PAPER_PROTOCOL,
+    "recorded": DEFAULT_PROTOCOL,
+}
+PROTOCOL_NAMES = (*PROTOCOLS, "own")
 _ASKED = (*_QUERY_CHANGES, "seed")
 
 

@@ -15,11 +15,11 @@ from evaluation.recognition.protocol import (
 _NAMED: Options = {
     "named_protocol": (
         Annotated[
-            Literal["fair", "paper"],
+            Literal["fair", "paper", "recorded"],
             typer.Option(
                 "--protocol",
-                help="Queries turned and tilted at random, or as the paper "
-                "asked.",
+                help="Queries turned and tilted at random, as the paper asked "
+                "them, or as recorded.",
             ),
         ],
         "fair",
@@ -94,12 +94,6 @@ def _named(named_protocol: str, **fields: Any) -> RetrievalProtocol:
     return replace(PROTOCOLS[named_protocol], **fields)
 
 
-# Both give a command the options of the protocol, which replace its keyword
-# `protocol`. The second adds `--protocol`, which says what the rest is; with
-# the first it is the default.
-with_protocol = with_options(
-    "protocol", {**_FIELDS, **_GATE}, RetrievalProtocol
-)
-with_named_protocol = with_options(
-    "protocol", {**_NAMED, **_FIELDS, **_GATE}, _named
-)
+# Gives a command the options of the protocol, which replace its keyword
+# `protocol`.
+with_protocol = with_options("protocol", {**_NAMED, **_FIELDS, **_GATE}, _named)

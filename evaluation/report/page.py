@@ -271,7 +271,9 @@ def _content(
     return {
         "report": report,
         "tables": tables,
-        "judgements": report.reference.judge(report.compared, report.changes),
+        "judgements": report.reference.judge(
+            [*report.recognitions, *report.repeated], report.changes
+        ),
         "survival_summary": survival.survival_summary(report.survivals),
     }
 

@@ -51,7 +51,9 @@ class Reference:
             method has one mode.
         protocols: method -> how the source ran it, its number of scans
             included.
-        judge: returns verdicts on all claims that our numbers can judge.
+        judge: returns verdicts on all claims that our numbers can judge: on
+            the results of a report, then those that it repeated by the source's
+            protocol, and the changes.
     """
 
     title: str = ""

@@ -26,6 +26,7 @@ from cns_drake.ageing.rates import (
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.generation.generate import generate_city
+from cns_drake.city.geometry.structures import Structure, assemble, block
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.world import load_world
 from cns_drake.transient.world_structures import read_structures
@@ -401,8 +402,28 @@ def test_a_scaffold_stands_before_its_building(town):
             for z in np.arange(triangles[..., 2].min() + 0.1, top - 1.2, 0.3):
                 cut = section(triangles, z)
                 inside = shapely.intersection(shapely.linestrings(cut), own)
-                assert shapely.length(inside).sum() < 0.5
+                assert not shapely.length(inside).any()
+            assert city.near(own, [name]) == []
     assert seen
+
+
+@pytest.mark.parametrize(("offset", "stands"), [(-0.03, False), (0.03, True)])
+def test_a_scaffold_stands_in_nothing_however_thin(town, offset, stands):
+    city = City(OldWorld(MapFolder(town)), _BUSY, 3, shapely.Polygon())
+    # The canopies of another building are not in the way of this one's.
+    first, *_, other = (lot for lot in city._lots if lot.building)
+    parts = []
+    city._scaffold(first.plot, first.height, other.building, parts)
+    (name,) = parts
+    area = city._structure(name).footprint_W
+    city._remove(name)
+    # A railing 5 mm wide, all around its area: just inside, or outside.
+    rail = area.buffer(offset).exterior.buffer(0.0025)
+    model = assemble(block("steel", (0.1, 0.1, 1.0), (0, 0, 0), rgb=(1, 1, 1)))
+    city._put(Structure("railing", "fence", model, (0, 0, 0), 0.0), rail)
+    parts.clear()
+    city._scaffold(first.plot, first.height, other.building, parts)
+    assert bool(parts) == stands
 
 
 def copied(town, folder):

@@ -22,12 +22,13 @@ def test_the_protocol_is_the_users(capsys, towns):
         "exclude_recent": None,
         "overlap": None,
         "gate": False,
-        "turn_queries": False,
-        "tilt_queries": 0.0,
+        "turn_queries": True,
+        "tilt_queries": 1.5,
         "hide_sector": 0.0,
         "seed": 0,
     }
-    options = ["--radius", "2", "--query-spacing", "20", "--max-range", "30"]
+    options = ["--protocol", "recorded"]
+    options += ["--radius", "2", "--query-spacing", "20", "--max-range", "30"]
     options += ["--scans-per-place", "2", "--place-spacing", "10"]
     status, out, _ = run(capsys, *both, *options, "--json")
     assert status == 0
@@ -56,8 +57,35 @@ def test_the_protocol_is_the_users(capsys, towns):
     assert "2 scans a place, the first scan gives the pose" in out
 
 
+def test_protocols_have_names_and_single_options_replace_their_fields(
+    capsys, towns
+):
+    both = ["pr", towns / "town_01", towns / "town_02", "--method", "btc"]
+
+    def asked(*options):
+        status, out, _ = run(capsys, *both, *options, "--json")
+        assert status == 0
+        values = json.loads(out)["protocol"]
+        names = ("turn_queries", "tilt_queries", "place")
+        return tuple(values[name] for name in names)
+
+    assert asked() == asked("--protocol", "fair") == (True, 1.5, "middle")
+    assert asked("--protocol", "paper") == (False, 0.0, "first")
+    assert asked("--protocol", "recorded") == (False, 0.0, "middle")
+    assert asked("--no-turn-queries") == (False, 1.5, "middle")
+    assert asked("--tilt-queries", "0") == (True, 0.0, "middle")
+    assert asked("--protocol", "paper", "--turn-queries") == (
+        True,
+        0.0,
+        "first",
+    )
+    wrong = [*both, "--protocol", "own"]
+    assert_refused(capsys, wrong, "'own' is not one of")
+
+
 def test_queries_are_turned(capsys, towns):
     both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
+    both += ["--protocol", "recorded"]
     options = ["--turn-queries", "--tilt-queries", "2", "--hide-sector", "60"]
     found = []
     for more in ([], options, [*options, "--seed", "1"], options):
