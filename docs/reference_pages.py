@@ -39,6 +39,7 @@ from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.studies.experiment import Experiment, MadeMap
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
+from evaluation.methods.published_networks import NetworkConfig
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -85,8 +86,9 @@ METHODS: Sections = {
     "All methods": MethodConfig,
     **{
         name: make_method(name, {}).Config
-        for name in (*shipped_methods(), "learned")
+        for name in (*shipped_methods(), "probe")
     },
+    "svt-net and dpa-net": NetworkConfig,
 }
 # What stands for the default where the model's own does not say it.
 _FILLED_IN = {

@@ -256,14 +256,11 @@ class Study:
         wanted = self.experiment.methods
         files = [*self.own_methods]
         if wanted is not None:
-            files += [
-                Path(one)
-                for one in wanted
-                if one.endswith(".py") or one in optional_methods()
-            ]
+            files += [Path(one) for one in wanted if one.endswith(".py")]
         known = {one.name: one for one in choose_methods(files)}
         if wanted is None:
             wanted = {name: {} for name in known}
+        known |= {name: MethodChoice(name) for name in optional_methods()}
         found = {}
         for variant in method_variants(wanted):
             name = variant.name

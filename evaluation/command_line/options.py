@@ -67,7 +67,8 @@ OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
         help="Method to run besides the shipped ones: a Python file that "
-        "registers it, or map-closures; may be repeated."
+        "registers it, map-closures, probe, svt-net or dpa-net; may be "
+        "repeated."
     ),
 ]
 

@@ -224,8 +224,13 @@ def yaw_pose(
 
 _METHODS: dict[str, type[Method]] = {}
 # Methods that run only if they are named: name -> module. Some need another
-# package.
-_OPTIONAL = {"map-closures": "evaluation.methods.map_closures"}
+# package, or weights.
+_OPTIONAL = {
+    "map-closures": "evaluation.methods.map_closures",
+    "probe": "evaluation.methods.probe",
+    "svt-net": "evaluation.methods.published_networks",
+    "dpa-net": "evaluation.methods.published_networks",
+}
 
 # The methods of the interface, which the author may have written.
 _CALLED = (

@@ -100,8 +100,6 @@ def choose_methods(
     for file in files:
         if str(file) in optional_methods():
             chosen.append(MethodChoice(str(file)))
-            # A missing package is reported before anything slow.
-            chosen[-1].make()
             continue
         path = Path(file).absolute()
         # Two modules with one name would replace each other.
@@ -126,6 +124,7 @@ def choose_methods(
         replace(one, settings=tuple(named[one.name].items())) for one in chosen
     ]
     for one in chosen:
-        if one.settings:
-            one.make()  # A wrong value is found before anything slow.
+        # A wrong value, or a missing package, is found before anything slow.
+        if one.settings or one.name in optional_methods():
+            one.make()
     return tuple(chosen)

@@ -1,0 +1,192 @@
+"""PROBE (Lee, Lee, Yoo: RA-L 2026, arXiv 2603.05965), without learning.
+
+A scan becomes a polar image of greatest heights and another one of occupancy.
+A move of the sensor by a normal distribution would shift the cells; in polar
+coordinates that is a blur along the rings, narrower farther away, and one
+across them. The blurred occupancy is the probability of a point in a cell.
+
+Heights give the turn between two scans, and their cosine at it. Probabilities
+are drawn to 1/2 where they are uncertain, and compared by the symmetric
+Kullback-Leibler divergence. The score is the product of both likenesses.
+
+It follows the authors' program (github.com/shawrby/PROBE-descriptor, BSD-3);
+on the same scans scores are equal to 1e-6. Deliberate differences:
+
+- All places are compared. The program first takes the 50 nearest ones by the
+  means of the rings, which saves time.
+- A scan without points within range is no candidate and finds none.
+- Scans of a narrow field of view are not treated apart.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from pydantic import PositiveFloat, PositiveInt
+from scipy.ndimage import gaussian_filter1d
+
+from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
+from evaluation.methods.sparse_convolution import PACKED
+
+# Probabilities stay this far from 0 and 1.
+_EPSILON = 1e-6
+# A cell counts if the probabilities of both scans add up to more.
+_SEEN = 1e-3
+# The least blur along a ring [cells], and the least part of a ring that counts
+# as occupied.
+_LEAST_BLUR, _LEAST_DENSITY = 0.1, 0.01
+
+
+class ProbeConfig(MethodConfig):
+    """Parameters of PROBE; defaults are those of the paper's Table I.
+
+    The height of the sensor is not used: heights are those in its frame.
+
+    Attributes:
+        voxel_size: cell of the thinning before, whose first point stays [m].
+        rings: cells of equal length up to `max_range`.
+        sectors: cells of equal angle.
+        max_range: farthest range [m].
+        sigma_t: standard deviation of the expected move [m].
+    """
+
+    voxel_size: PositiveFloat = 0.5
+    rings: PositiveInt = 40
+    sectors: PositiveInt = 60
+    max_range: PositiveFloat = 80.0
+    sigma_t: PositiveFloat = 2.0
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Descriptor of one scan.
+
+    Attributes:
+        heights: (rings, sectors) greatest height in a cell, of unit length
+            over all of them; all NaN without a point within range.
+        mu: (rings, sectors) probability that a cell has a point, in single
+            precision: near 1 its rounding decides on the uncertainty, and with
+            it on scores by up to 0.002.
+    """
+
+    heights: np.ndarray
+    mu: np.ndarray
+
+    def evidence(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the probabilities drawn to 1/2, and their log-odds."""
+        mu = self.mu.astype(np.float64)
+        sigma = np.sqrt(mu * (1.0 - mu))
+        p = mu * (1.0 - sigma) + 0.5 * sigma
+        p = np.clip(p, _EPSILON, 1.0 - _EPSILON)
+        return p, np.log(p / (1.0 - p))
+
+
+@dataclass(frozen=True)
+class ProbeDatabase:
+    """Descriptors of D places.
+
+    Attributes:
+        spectra: (D, rings, frequencies) of the heights.
+        mu: (D, rings, sectors), see `Probe`.
+        evidence: both (D, rings, sectors), see `Probe.evidence`.
+    """
+
+    spectra: np.ndarray
+    mu: np.ndarray
+    evidence: tuple[np.ndarray, np.ndarray]
+
+
+@register("probe")
+class ProbeMethod(Method[Probe, ProbeDatabase]):
+    """PROBE; the score is that of the paper's equation 16, from 0 to 1."""
+
+    Config = ProbeConfig
+    skips_places = True
+    config: ProbeConfig
+
+    def describe(self, points: np.ndarray) -> Probe:
+        config = self.config
+        shape = config.rings, config.sectors
+        voxels = np.floor(points / config.voxel_size).astype(np.int64)
+        _, first = np.unique(voxels @ PACKED, return_index=True)
+        x, y, z = points[first].T
+        ring = np.hypot(x, y) * (config.rings / config.max_range)
+        turn = np.arctan2(y, x) / (2.0 * math.pi) + 0.5
+        near = ring <= config.rings
+        # Rounding can put a value on the limit.
+        cell = np.ravel_multi_index(
+            (
+                ring[near].astype(np.int64),
+                (turn[near] * config.sectors).astype(np.int64),
+            ),
+            shape,
+            mode="clip",
+        )
+        heights = np.full(math.prod(shape), -np.inf)
+        np.maximum.at(heights, cell, z[near])
+        occupied = np.isfinite(heights).reshape(shape)
+        heights = np.where(occupied, heights.reshape(shape), 0.0)
+        length = float(np.linalg.norm(heights)) or math.nan
+        return Probe(heights / length, self._blurred(occupied))
+
+    def _blurred(self, occupied: np.ndarray) -> np.ndarray:
+        """Returns the probabilities of cells (rings, sectors); eq. 3 to 7."""
+        config = self.config
+        step = config.max_range / config.rings
+        mu = occupied.astype(np.float64)
+        for number, row in enumerate(mu):
+            density = max(float(row.mean()), _LEAST_DENSITY)
+            arc = (number + 0.5) * step * (2.0 * math.pi / config.sectors)
+            blur = config.sigma_t * math.sqrt(density) / arc
+            mu[number] = gaussian_filter1d(
+                row, max(blur, _LEAST_BLUR), mode="wrap"
+            )
+        mu = gaussian_filter1d(mu, config.sigma_t / step, 0, mode="constant")
+        return np.clip(mu, 0.0, 1.0).astype(np.float32)
+
+    def build_database(self, places: Sequence[Probe]) -> ProbeDatabase:
+        evidence = zip(*(place.evidence() for place in places), strict=True)
+        p, odds = (np.stack(one) for one in evidence)
+        return ProbeDatabase(
+            np.stack([np.fft.rfft(place.heights) for place in places]),
+            np.stack([place.mu for place in places]),
+            (p, odds),
+        )
+
+    def score(
+        self, query: Probe, database: ProbeDatabase, *, exhaustive: bool = False
+    ) -> np.ndarray:
+        del exhaustive  # It always is.
+        cosines = self._cosines(query, database.spectra)
+        scores = np.clip(cosines.max(axis=1), 0.0, 1.0)
+        for place, shift in enumerate(cosines.argmax(axis=1)):
+            turned = Probe(query.heights, np.roll(query.mu, shift, axis=1))
+            counts = database.mu[place] + turned.mu > _SEEN
+            p, odds = turned.evidence()
+            # The symmetric divergence of two Bernoulli variables.
+            divergence = 0.5 * (database.evidence[0][place] - p)
+            divergence *= database.evidence[1][place] - odds
+            total = float(divergence[counts].sum())
+            scores[place] *= math.exp(-total / max(1, counts.sum()))
+        return scores
+
+    def relative_pose(
+        self, query: Probe, database: ProbeDatabase, place: int
+    ) -> np.ndarray | None:
+        """Returns the turn of the query, in steps of one sector.
+
+        None if one of the two has no points within range.
+        """
+        cosines = self._cosines(query, database.spectra[place, None])[0]
+        if np.isnan(cosines).any():
+            return None
+        # What the query sees in sector a, the place sees in a + shift.
+        shift = int(cosines.argmax())
+        return yaw_pose(2.0 * math.pi * shift / self.config.sectors)
+
+    def _cosines(self, query: Probe, spectra: np.ndarray) -> np.ndarray:
+        """Returns the cosines with D places at all turns, (D, sectors)."""
+        own = np.conj(np.fft.rfft(query.heights))
+        products = np.einsum("drf,rf->df", spectra, own)
+        return np.fft.irfft(products, n=self.config.sectors)

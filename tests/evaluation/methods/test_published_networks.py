@@ -1,0 +1,318 @@
+"""Published networks: convolutions, files of weights, closed forms."""
+
+from collections import OrderedDict
+import io
+import itertools
+import math
+import pickle
+import sys
+import types
+import zipfile
+
+import numpy as np
+import pytest
+from scipy.ndimage import correlate
+from scipy.special import expit
+
+from cns_drake.base.errors import InputError
+from evaluation.methods import make_method
+from evaluation.methods.published_networks import (
+    _DPA_NET,
+    _SVT_NET,
+    dpa_net,
+    farthest_points,
+    prepare,
+    svt_net,
+)
+from evaluation.methods.sparse_convolution import coarser, convolve
+from evaluation.methods.torch_weights import read_weights
+from evaluation.study.chosen_methods import choose_methods
+
+RNG = np.random.default_rng(11)
+
+
+def grid(size=8, part=0.3, channels=2):
+    """Returns cells, some below 0, their features, and both in a box."""
+    taken = RNG.uniform(size=(size, size, size)) < part
+    cells = np.argwhere(taken)
+    features = RNG.normal(size=(len(cells), channels))
+    dense = np.zeros((size, size, size, channels))
+    dense[taken] = features
+    return cells - size // 2, features, dense, taken
+
+
+def image(kernel, size, i, o):
+    """Returns weights over x, y, z: of offsets, the first runs fastest."""
+    values = np.zeros((size, size, size))
+    for number, (z, y, x) in enumerate(
+        itertools.product(range(size), repeat=3)
+    ):
+        values[x, y, z] = kernel[number, i, o]
+    return values
+
+
+@pytest.mark.parametrize("size", [1, 3, 5])
+def test_convolution_of_a_dense_grid(size):
+    cells, features, dense, taken = grid()
+    order = RNG.permutation(len(cells))
+    kernel = RNG.normal(size=(size**3, 2, 3))
+    found = convolve(cells[order], features[order], kernel)
+    for o in range(3):
+        wanted = sum(
+            correlate(dense[..., i], image(kernel, size, i, o), mode="constant")
+            for i in range(2)
+        )
+        np.testing.assert_allclose(found[:, o], wanted[taken][order], atol=1e-9)
+
+
+def test_convolution_to_a_coarser_grid():
+    cells, features, dense, _ = grid()
+    kernel = RNG.normal(size=(8, 2, 3))
+    at = coarser(cells, 2)
+    assert {tuple(c) for c in at.tolist()} == {
+        tuple(2 * math.floor(v / 2) for v in cell) for cell in cells.tolist()
+    }
+    found = convolve(cells, features, kernel, 1, at)
+    for (x, y, z), row in zip(at + 4, found, strict=True):
+        block = dense[x : x + 2, y : y + 2, z : z + 2]
+        wanted = sum(
+            np.einsum("xyz,xyz->", block[..., i], image(kernel, 2, i, 1))
+            for i in range(2)
+        )
+        assert row[1] == pytest.approx(wanted)
+
+
+def test_convolution_with_a_step():
+    cells, features = grid()[:2]
+    kernel = RNG.normal(size=(27, 2, 1))
+    once, thrice = (convolve(k * cells, features, kernel, k) for k in (1, 3))
+    np.testing.assert_allclose(once, thrice)
+
+
+def test_farthest_points():
+    points = RNG.normal(size=(60, 3)).astype(np.float32)
+    chosen = [0]
+    for _ in range(9):
+        gaps = [min(math.dist(p, points[c]) for c in chosen) for p in points]
+        chosen.append(int(np.argmax(gaps)))
+    assert farthest_points(points, 10).tolist() == chosen
+
+
+def street(number=20_000, slope=0.05):
+    """Returns sloping ground with walls of 8 m on both sides, (N, 3)."""
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform([-60.0, -9.0], [60.0, 9.0], (number, 2)).T
+    z = np.zeros(number)
+    wall = np.arange(number) % 3 == 0
+    y[wall] = np.where(y[wall] > 0.0, 9.0, -9.0)
+    z[wall] = rng.uniform(0.0, 8.0, wall.sum())
+    return np.stack([x, y, z + slope * x - 1.6], axis=1)
+
+
+def test_preparation():
+    points = street()
+    cloud = prepare(points)
+    assert cloud.shape == (4096, 3)
+    assert cloud.dtype == np.float32
+    assert np.abs(cloud).max() <= 1.0
+    again = prepare(street(2000))
+    assert again.shape == (4096, 3)
+    # Without ground the rest has its centre at 0, and a mean distance of 1/2,
+    # up to the few that are drawn anew.
+    assert np.abs(cloud.mean(axis=0)).max() < 0.02
+    distances = np.linalg.norm(cloud, axis=1)
+    assert distances.mean() == pytest.approx(0.5, abs=0.02)
+    # x points backwards: the street falls ahead.
+    assert np.polyfit(cloud[:, 0], cloud[:, 2], 1)[0] == pytest.approx(
+        -0.05, abs=0.01
+    )
+    ground = np.array([[x, y, -1.6] for x in range(9) for y in range(9)], float)
+    assert prepare(ground).shape == prepare(ground[:0]).shape == (0, 3)
+
+
+def blank(shapes, **values):
+    """Returns weights of 0, of normalisations that change nothing, and some."""
+    weights = {n: np.zeros(s, np.float32) for n, s in shapes.items()}
+    for name in weights:
+        if name.endswith(("running_var", "bn.weight", "norm1.weight")):
+            weights[name][:] = 1.0
+            if name.endswith("running_var"):
+                weights[name] -= 1e-6 if "spconv" in name else 1e-5
+    for name, value in values.items():
+        weights[name][...] = value
+    return weights
+
+
+def svt_weights():
+    """Returns weights by which each channel counts the cells of a block."""
+    eye = np.eye(32)
+    weights = blank(_SVT_NET)
+    weights["backbone.conv0.kernel"][62] = 1.0
+    for number in (0, 1):
+        weights[f"backbone.convs.{number}.kernel"][:] = eye
+    weights["backbone.blocks.1.0.downsample.0.kernel"][:, :32] = eye
+    weights["backbone.conv1x1.0.kernel"][:32, :32] = 3.0 * eye
+    weights["pooling.p"][:] = 2.0
+    return weights
+
+
+def test_svt_net_in_closed_form():
+    cloud = RNG.uniform(-0.1, 0.1, (500, 3)).astype(np.float32)
+    cells = {tuple(c) for c in np.floor(cloud / np.float32(0.01)).tolist()}
+    counts = {}
+    for cell in cells:
+        block = tuple(v // 4 for v in cell)
+        counts[block] = counts.get(block, 0) + 1
+    # Both transformers add nothing to their input, and both have it.
+    wanted = math.sqrt(np.mean([(6.0 * n) ** 2 for n in counts.values()]))
+    found = svt_net(svt_weights(), cloud)
+    np.testing.assert_allclose(found[:32], wanted, rtol=1e-5)
+    np.testing.assert_allclose(found[32:], 1e-6, rtol=1e-3)
+
+
+def dpa_weights():
+    """Returns weights by which a point is described by its coordinates."""
+    rng = np.random.default_rng(4)
+    weights = blank(_DPA_NET, **{"Gem.p": 1.0})
+    random = ("spconv", "offset", "q_proj", "k_proj", "rel_pos", "interpolate")
+    for name, values in weights.items():
+        if any(part in name for part in random) and "var" not in name:
+            values[...] = rng.normal(size=values.shape) * 0.1
+    weights["dpa0.norm2.bias"][:] = rng.normal(size=32)
+    for layer in (0, 1):
+        kernel = weights[f"FP_modules.0.mlp.layer{layer}.conv.weight"]
+        kernel[...] = rng.normal(size=kernel.shape)
+    return weights
+
+
+def test_dpa_net_in_closed_form():
+    cloud = RNG.uniform(-1.0, 1.0, (1500, 3)).astype(np.float32)
+    weights = dpa_weights()
+    # The attention ends with the same 32 numbers at each point.
+    feature = np.tile(weights["dpa0.norm2.bias"], (len(cloud), 1))
+    x = np.concatenate([feature, cloud], axis=1)
+    for layer in (0, 1):
+        kernel = weights[f"FP_modules.0.mlp.layer{layer}.conv.weight"]
+        x = np.maximum(x @ kernel[:, :, 0, 0].T, 0.0)
+    wanted = np.maximum(x * expit(0.0), 1e-6).mean(axis=0)
+    np.testing.assert_allclose(dpa_net(weights, cloud), wanted, rtol=1e-3)
+
+
+class FloatStorage:
+    """Stands for PyTorch's type of that name."""
+
+
+class Ran:
+    """Runs code when it is unpickled."""
+
+    ran = False
+
+    def __reduce__(self):
+        return setattr, (Ran, "ran", True)
+
+
+def save(path, state, monkeypatch, around=lambda state: state):
+    """Writes tensors as `torch.save` does."""
+    content, numbers = io.BytesIO(), itertools.count()
+    names = types.ModuleType("torch._utils")
+
+    class Tensor:
+        def __init__(self, values):
+            self.values = np.asarray(values)
+
+        def __reduce__(self):
+            v = self.values
+            steps = tuple(s // v.itemsize for s in v.strides)
+            return rebuild, (v, 0, v.shape, steps, False, OrderedDict())
+
+    def rebuild(*arguments):
+        raise AssertionError
+
+    rebuild.__module__ = FloatStorage.__module__ = "torch._utils"
+    rebuild.__qualname__ = rebuild.__name__ = "_rebuild_tensor_v2"
+    FloatStorage.__module__ = "torch"
+    names._rebuild_tensor_v2 = rebuild
+    torch = types.ModuleType("torch")
+    torch.FloatStorage = FloatStorage
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    monkeypatch.setitem(sys.modules, "torch._utils", names)
+    with zipfile.ZipFile(path, "w") as archive:
+
+        class Pickler(pickle.Pickler):
+            def persistent_id(self, one):
+                if not isinstance(one, np.ndarray):
+                    return None
+                key = str(next(numbers))
+                # The storage of an array in another order is its transpose.
+                flat = one.ravel(order="K")
+                archive.writestr(f"archive/data/{key}", flat.tobytes())
+                return "storage", FloatStorage, key, "cpu", one.size
+
+        state = OrderedDict((k, Tensor(v)) for k, v in state.items())
+        Pickler(content, 2).dump(around(state))
+        archive.writestr("archive/data.pkl", content.getvalue())
+    return path
+
+
+def test_weights_as_saved(tmp_path, monkeypatch):
+    values = {
+        "a": RNG.normal(size=(2, 3)).astype(np.float32),
+        "b": np.float32(3.0),
+        "c": RNG.normal(size=(4, 5)).astype(np.float32).T,
+        "more": np.zeros(7, np.float32),
+    }
+    shapes = {"a": (2, 3), "b": (), "c": (5, 4)}
+    for around in (
+        lambda state: state,
+        lambda state: {"epoch": 3, "net": state, "run": Ran()},
+    ):
+        path = save(tmp_path / "w.pth", values, monkeypatch, around)
+        found = read_weights(path, shapes)
+        assert not Ran.ran
+        assert found.keys() == shapes.keys()
+        for name, value in found.items():
+            np.testing.assert_array_equal(value, values[name])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"pooling.p": None}, "pooling.p: no such tensor"),
+        ({"pooling.p": np.ones(2, np.float32)}, r"\(2,\) instead of \(1,\)"),
+        ({"pooling.p": np.full(1, np.nan, np.float32)}, "not all are finite"),
+    ],
+)
+def test_other_weights(tmp_path, monkeypatch, changes, message):
+    values = {**svt_weights(), **changes}
+    values = {k: v for k, v in values.items() if v is not None}
+    path = save(tmp_path / "w.pth", values, monkeypatch)
+    with pytest.raises(InputError, match=rf"w\.pth: .*{message}") as error:
+        make_method("svt-net", {"weights": path})
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_are_no_weights(tmp_path):
+    path = tmp_path / "w.pth"
+    with pytest.raises(InputError, match=r"w\.pth: No such file"):
+        make_method("dpa-net", {"weights": path})
+    path.write_bytes(b"text")
+    with pytest.raises(InputError, match=r"w\.pth: no weights of PyTorch"):
+        make_method("dpa-net", {"weights": path})
+    with pytest.raises(InputError, match="svt-net: weights: Field required"):
+        choose_methods(["svt-net"])
+
+
+def test_as_a_method(tmp_path, monkeypatch):
+    path = save(tmp_path / "w.pth", svt_weights(), monkeypatch)
+    chosen = choose_methods(["svt-net"], [f"svt-net.weights={path}"])[-1]
+    method = chosen.make()
+    assert len(chosen.identity()["parameters"]["digest"]) == 16
+    query = method.describe(street())
+    empty = method.describe(np.zeros((0, 3)))
+    other = method.describe(street(slope=0.3) * [1.0, 2.0, 1.0])
+    database = method.build_database([query, other, empty])
+    scores = method.score(query, database)
+    assert scores[0] == 0.0
+    assert np.isnan(scores[2])
+    assert scores[1] == pytest.approx(-np.linalg.norm(query - other))
+    assert method.relative_pose(query, database, 0) is None
