@@ -53,8 +53,9 @@ _X_BS = poses.make_pose(
 class NcltDrive(FileDrive):
     """A session of NCLT, its HDL-32E.
 
-    The motion during a turn is undone in the files. Rings count upwards; the
-    lasers' numbers, in which low and high ones take turns, do not.
+    The unit hangs upside down, and looks up to 30.67 deg. The motion during a
+    turn is undone in the files. Rings count upwards; the lasers' numbers do
+    not: high and low ones take turns.
     """
 
     def __init__(self, path: Path, columns: int | None = None):
@@ -83,7 +84,7 @@ class NcltDrive(FileDrive):
             stamps_ns=stamps_ns[spanned],
             X_WS=_X_WN @ X_NB @ _X_BS,
             notes=unknown + notes,
-            unit="hdl-32e",
+            unit="hdl-32e-upside-down",
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
@@ -110,8 +111,8 @@ def read_scan(path: Path) -> np.ndarray:
     ):
         points[axis] = sign * (stored[axis] * _STEP + _LEAST - origin)
     points["intensity"] = stored["intensity"]
-    half = _NUM_LASERS // 2
-    points["ring"] = stored["laser"] // 2 + half * (stored["laser"] % 2)
+    down = stored["laser"] // 2 + _NUM_LASERS // 2 * (stored["laser"] % 2)
+    points["ring"] = _NUM_LASERS - 1 - down
     return points
 
 

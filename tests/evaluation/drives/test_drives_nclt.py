@@ -77,15 +77,17 @@ def test_scans_are_seen_from_the_lidar(tmp_path):
     wanted[:, 1:] *= -1.0
     np.testing.assert_allclose(stored(scan, "x", "y", "z"), wanted, atol=1e-5)
     assert scan["intensity"].tolist() == [31, 255]
-    # Laser 0 is the lowest one, laser 31 the highest.
-    assert scan["ring"].tolist() == [0, 31]
+    # The unit hangs upside down: its first laser is the highest one.
+    assert scan["ring"].tolist() == [31, 0]
+    field = drive.lidar_field
+    assert (field.lowest_deg, field.highest_deg) == (-10.67, 30.67)
 
 
 def test_the_order_of_the_lasers(tmp_path):
     hits = [(20000, 20000, 20000, 1, laser) for laser in range(32)]
     scan = open_drive(write_session(tmp_path, hits=hits)).scan(0)
-    # They fire as 0, 16, 1, 17 and so on, counted upwards.
-    wanted = np.ravel([(k, k + 16) for k in range(16)])
+    # They fire as 0, 16, 1, 17 and so on, counted downwards.
+    wanted = 31 - np.ravel([(k, k + 16) for k in range(16)])
     np.testing.assert_array_equal(scan["ring"], wanted)
 
 
