@@ -64,9 +64,9 @@ def tcr(
 ) -> None:
     """Measure change between drives or maps.
 
-    A and B are recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry,
-    CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
-    the directed ratios. Drives in different world frames are aligned.
+    A and B are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
+    odometry, CNS) or maps (.pcd .ply .npy .bin). A is the source and B the
+    target of the directed ratios. Drives in different world frames are aligned.
 
     Args:
         control: A recording of A's route in B's stage, or of B's route in A's
@@ -141,8 +141,8 @@ def pr(
     """Recognise the places of another drive.
 
     Measures how well the scans of QUERY find their place in DATABASE. Both are
-    recorded drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Drives in
-    different world frames are aligned.
+    recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI odometry, CNS).
+    Drives in different world frames are aligned.
 
     Args:
         mode: Count all queries, or those that have a match.

@@ -37,11 +37,11 @@ def localise(
 ) -> None:
     """Localise scans in a map.
 
-    MAP and QUERY are drives (MCAP, MulRan, HeLiPR, KITTI odometry, CNS) or
-    clouds (.pcd .ply .npy .bin). The map is made of a drive's scans at their
-    true poses. A cloud as QUERY is one scan at the origin of the map. Each scan
-    is aligned from its true pose, moved by --start in a random direction and
-    turned by --start-turn about a random axis.
+    MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
+    odometry, CNS) or clouds (.pcd .ply .npy .bin). The map is made of a drive's
+    scans at their true poses. A cloud as QUERY is one scan at the origin of the
+    map. Each scan is aligned from its true pose, moved by --start in a random
+    direction and turned by --start-turn about a random axis.
 
     Args:
         method: Estimator; a Python file holds one's own function.

@@ -28,8 +28,8 @@ def open_drive(
 
     Args:
         path: an .mcap file or a folder with one (as cns-drake and rosbag2
-            write it), or a folder of a drive as MulRan, HeLiPR, KITTI
-            odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
+            write it), or a folder of a drive as MulRan, HeLiPR, NCLT, Boreas,
+            KITTI odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
             chooses the LiDAR.
         lidar: which LiDAR's scans to read, of a recording with several.
         columns: number of float32 of a point of KITTI's and MulRan's `.bin`;
@@ -48,12 +48,21 @@ def open_drive(
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
     from cns_drake.base.drives import mcap_drive
-    from evaluation.drives import cns_folder, helipr, kitti, mulran
+    from evaluation.drives import (
+        boreas,
+        cns_folder,
+        helipr,
+        kitti,
+        mulran,
+        nclt,
+    )
 
     readers = (
         (mcap_drive.holds_mcap, mcap_drive.McapDrive),
         (mulran.holds_mulran, mulran.MulranDrive),
         (helipr.holds_helipr, helipr.HeliprDrive),
+        (nclt.holds_nclt, nclt.NcltDrive),
+        (boreas.holds_boreas, boreas.BoreasDrive),
         (kitti.holds_kitti, kitti.KittiDrive),
         (cns_folder.holds_cns, cns_folder.CnsFolderDrive),
     )
@@ -77,7 +86,8 @@ def open_drive(
         )
     raise InputError(
         f"{path}: not a recorded drive (a folder with an .mcap file, or"
-        " one, or a drive of MulRan, HeLiPR, KITTI odometry or CNS)"
+        " one, or a drive of MulRan, HeLiPR, NCLT, Boreas, KITTI odometry or"
+        " CNS)"
     )
 
 

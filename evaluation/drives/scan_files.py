@@ -1,7 +1,7 @@
 """Drives that are stored as one file for each scan."""
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -172,8 +172,17 @@ class BinDrive(FileDrive):
         return read_packed(path, self._layout.dtype)
 
 
-def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
+def list_stamped(
+    folder: Path,
+    suffix: str,
+    parse: Callable[[np.ndarray], np.ndarray] = parse_stamps_ns,
+) -> tuple[list[Path], np.ndarray]:
     """Finds files whose names are their times.
+
+    Args:
+        folder: of the files.
+        suffix: of their names.
+        parse: returns times [ns] of texts.
 
     Returns:
         The files in order of time; (N,) int64 times [ns]; N >= 1.
@@ -190,7 +199,7 @@ def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
         raise InputError(f"{folder}: no scan (*{suffix}) in it")
     stems = [path.name.removesuffix(suffix) for path in files]
     try:
-        stamps_ns = parse_stamps_ns(np.array(stems))
+        stamps_ns = parse(np.array(stems))
     except ValueError as error:
         raise InputError(
             f"{folder}: a file named *{suffix}: {error}"

@@ -7,6 +7,7 @@ import io
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
@@ -14,6 +15,7 @@ from cns_drake.base.files import decode_text, read_bytes
 from cns_drake.base.number_rows import is_number, parse_rows
 
 _NS_PER_S = 1_000_000_000
+_NS_PER_US = 1000
 # Enough for hours of an IMU [bytes].
 _TABLE_LIMIT_BYTES = 1 << 26
 # Greatest error of a rotation matrix or quaternion: that of texts with four
@@ -126,6 +128,15 @@ def parse_seconds(texts: np.ndarray) -> np.ndarray:
         ValueError: if a string is no number.
     """
     return np.array([_seconds_to_ns(text) for text in map(str, texts)])
+
+
+def parse_microseconds(texts: np.ndarray) -> np.ndarray:
+    """Returns times [ns], (N,) int64, of strings that hold microseconds.
+
+    Raises:
+        ValueError: if a string is no number.
+    """
+    return np.array([_to_ns(text, _NS_PER_US) for text in map(str, texts)])
 
 
 def check_increasing(path: Path, stamps_ns: np.ndarray, what: str) -> None:
@@ -311,6 +322,45 @@ def read_quaternions(
     R = poses.rotation_from_quaternion(values[:, 3:])
     _check_near(path, values[:, :3])
     return _in_order(path, stamps_ns, poses.make_pose(R, values[:, :3]))
+
+
+def read_angles(path: Path, width: int) -> tuple[Trajectory, tuple[str, ...]]:
+    """Reads rows of microseconds, a position, and roll, pitch and yaw [rad].
+
+    Args:
+        path: a table with commas.
+        width: number of values after the time. Those between the position and
+            the angles, and behind them, are velocities. The angles are the
+            last three, or else begin with the seventh.
+
+    Returns:
+        Poses with the rotation Rz(yaw) Ry(pitch) Rx(roll); a note if rows were
+        left out, since a number in them is NaN.
+
+    Raises:
+        InputError: like `read_matrices`, but for NaN.
+    """
+    columns = [("stamp", "U40"), ("values", "f8", width)]
+    rows = read_numbers(path, columns, ",")
+    known = rows[~np.isnan(rows["values"]).any(axis=1)]
+    try:
+        stamps_ns = parse_microseconds(known["stamp"])
+    except ValueError as error:
+        raise InputError(f"{path}: time: {error}") from error
+    values = known["values"]
+    if not len(values):
+        raise InputError(f"{path}: no row without NaN")
+    check_finite(path, values)
+    _check_near(path, values[:, :3])
+    first = min(width - 3, 6)
+    angles = values[:, first : first + 3]
+    R = Rotation.from_euler("xyz", angles).as_matrix()
+    num_unknown = len(rows) - len(known)
+    note = f"{path}: {num_unknown} rows with NaN are left out"
+    return (
+        _in_order(path, stamps_ns, poses.make_pose(R, values[:, :3])),
+        (note,) if num_unknown else (),
+    )
 
 
 def read_poses(path: Path) -> np.ndarray:

@@ -5,342 +5,27 @@
 
 Each of both is a folder of a drive that `cns-eval` reads (KITTI, recordings and
 others), a folder of scans (`.bin`, float32 x y z intensity), or a folder of
-such folders. Needs the extra `judge`.
-
-Sixteen patches of 8 m of each scan, within 30 m, are described by features.
-Boosted trees then tell the patches of both sets apart; none of a place is ever
-both learned from and asked for. Scans less than 30 m from the one before belong
-to its place, as those of one folder of scans do. The AUC is 1 if all patches
-are told apart, and 0.5 for a guess. The control tells the first half of the
-simulated places from the second one. All AUCs are means over draws of patches,
-of which one differs by up to 0.04; features are those of the first draw.
-
-Rings come from recordings, or from files with one ring after the other, as
-KITTI's. Features that need them are left out if either set has none.
+such folders. `evaluation.real.judge` says how they are told apart; the features
+that are printed are those of the first draw. Needs the extra `judge`.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 import json
 from pathlib import Path
-import sys
 
 import numpy as np
-from scipy.spatial import cKDTree
-from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.metrics import roc_auc_score
-from threadpoolctl import threadpool_limits
 
+from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
-from evaluation.drives import open_drive
-
-_PATCHES = 16
-_HALF_WIDTH = 4.0
-_NEAREST, _FARTHEST = 5.0, 30.0
-_FEWEST_POINTS = 150
-# Neighbourhoods: that many of a patch, of this radius [m].
-_NEIGHBOURHOODS, _RADIUS = 160, 0.75
-_APART = 30.0
-# Most scans of a drive; most folds.
-_MOST_SCANS, _MOST_FOLDS = 40, 3
-_TREES = 120
-_QUANTILES = (0.1, 0.5, 0.9)
-# As KITTI's, which never reaches 1.
-_FULL = 99.0
-
-
-def scan_table(scan: np.ndarray) -> np.ndarray:
-    """Returns (N, 5) x, y, z [m], intensity from 0 to 99 and ring.
-
-    Args:
-        scan: (N, 4) x, y, z and intensity, or records of a drive.
-    """
-    ring = None
-    if scan.dtype.names:
-        names = scan.dtype.names
-        ring = scan["ring"].astype(float) if "ring" in names else None
-        empty = np.zeros(len(scan))
-        bright = scan["intensity"] if "intensity" in names else empty
-        scan = np.stack([scan["x"], scan["y"], scan["z"], bright], axis=1)
-    table = np.asarray(scan, float)
-    bright = table[:, 3] * (100.0 if table[:, 3].max() <= 1.0 else 1.0)
-    bright = np.minimum(np.rint(bright), _FULL)
-    if ring is None:
-        azimuth = np.arctan2(table[:, 1], table[:, 0]) % (2.0 * np.pi)
-        ring = np.cumsum(np.diff(azimuth, prepend=0.0) < -np.pi).astype(float)
-        if not 8 <= ring[-1] <= 160:
-            ring = np.full(len(table), np.nan)
-    table = np.column_stack([table[:, :3], bright, ring])
-    return table[np.isfinite(table[:, :3]).all(axis=1)]
-
-
-def read_places(path: Path) -> list[list[np.ndarray]]:
-    """Returns the scans of each place of a set."""
-    if not path.is_dir():
-        raise InputError(f"{path}: no folder of scans")
-    files = sorted(path.glob("*.bin"))
-    if files:
-        raws = (np.fromfile(file, np.float32).reshape(-1, 4) for file in files)
-        return [[scan_table(raw) for raw in raws]]
-    try:
-        drive = open_drive(path)
-    except InputError:
-        folders = sorted(one for one in path.iterdir() if one.is_dir())
-        if not folders:
-            raise
-        return [place for one in folders for place in read_places(one)]
-    step = -(-len(drive) // _MOST_SCANS)
-    places: list[list[np.ndarray]] = []
-    before = np.full(3, np.inf)
-    for k in range(0, len(drive), step):
-        p_WS = drive.X_WS[k, :3, 3]
-        if not np.linalg.norm(p_WS - before) < _APART:
-            places.append([])
-        places[-1].append(scan_table(drive.scan(k)))
-        before = p_WS
-    return places
-
-
-def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yields patches of a scan."""
-    ranges = np.linalg.norm(scan[:, :3], axis=1)
-    near = np.flatnonzero((ranges > _NEAREST) & (ranges < _FARTHEST))
-    found = 0
-    for row in rng.permutation(near)[: 4 * _PATCHES]:
-        apart = np.abs(scan[:, :2] - scan[row, :2]).max(axis=1)
-        patch = scan[apart < _HALF_WIDTH]
-        if len(patch) >= _FEWEST_POINTS:
-            yield patch
-            found += 1
-        if found == _PATCHES:
-            return
-
-
-def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Returns the features of a patch; their names begin with their group."""
-    p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
-    tree = cKDTree(p)
-    result = _intensity(bright, tree) | _density(p, ring, tree)
-    low = np.quantile(p[:, 2], 0.05)
-    height = p[:, 2] - low
-    for part in (0.25, *_QUANTILES, 0.99):
-        result[f"height: {part:.0%}"] = float(np.quantile(height, part))
-    result["height: 2 to 5 m"] = float(np.mean((height > 2) & (height < 5)))
-    result["height: below 0.3 m"] = float(np.mean(height < 0.3))
-    result |= _ground_steps(p[height < 0.5])
-
-    count = min(len(p), _NEIGHBOURHOODS)
-    chosen = rng.choice(len(p), count, replace=False)
-    groups = tree.query_ball_point(p[chosen], _RADIUS)
-    shapes = [_shape(p[g], ring[g]) for g in groups if len(g) >= 8]
-    if not shapes:
-        return result
-    table = np.array(shapes)
-    linear, planar, scattered, up, residual, within, between = table.T
-    flat = planar > 0.5
-    kinds = ("linear", linear), ("planar", planar), ("scattered", scattered)
-    for name, values in kinds:
-        result[f"eigenvalues: {name}"] = float(np.mean(values))
-        result[f"eigenvalues: {name}, 90 %"] = float(np.quantile(values, 0.9))
-    result["eigenvalues: mainly scattered"] = float(
-        np.mean(scattered > np.maximum(linear, planar))
-    )
-    result["eigenvalues: oblique"] = _mean((up > 0.3) & (up < 0.85), flat)
-    result["eigenvalues: up"] = _mean(up > 0.95, flat)
-    ground = flat & (up > 0.95) & (p[chosen][_kept(groups), 2] < low + 0.5)
-    for name, mask in (("ground", ground), ("walls", flat & (up < 0.2))):
-        for kind, values in (
-            ("all", residual),
-            ("within rings", within),
-            ("between rings", between),
-        ):
-            known = values[mask & np.isfinite(values)]
-            for part in _QUANTILES:
-                key = f"roughness: {name}, {kind}, {part:.0%} [log mm]"
-                result[key] = _quantile(known, part)
-    result["intensity: ground"] = _mean(bright[chosen][_kept(groups)], ground)
-    return result
-
-
-def _kept(groups: np.ndarray) -> np.ndarray:
-    return np.array([len(group) >= 8 for group in groups])
-
-
-def _intensity(bright: np.ndarray, tree: cKDTree) -> dict[str, float]:
-    rows = tree.query(tree.data, 7)[1][:, 1:]
-    spread = bright[rows].std(axis=1)
-    result = {
-        "intensity: spread among 6": float(np.median(spread)),
-        "intensity: spread among 6, mean": float(np.mean(spread)),
-        "intensity: values": float(len(np.unique(bright))),
-        "intensity: zeros": float(np.mean(bright == 0.0)),
-        "intensity: spread": float(np.std(bright)),
-        "intensity: mean": float(np.mean(bright)),
-    }
-    for part in (0.05, 0.25, 0.5, 0.75, 0.95):
-        result[f"intensity: {part:.0%}"] = float(np.quantile(bright, part))
-    return result
-
-
-def _density(
-    p: np.ndarray, ring: np.ndarray, tree: cKDTree
-) -> dict[str, float]:
-    ranges = np.linalg.norm(p, axis=1)
-    distance = tree.query(p, 5)[0][:, 1:] / ranges[:, None]
-    result = {"density: points": float(np.log(len(p)))}
-    for part in _QUANTILES:
-        key = f"density: neighbour, {part:.0%}"
-        result[key] = float(np.quantile(distance[:, 0], part))
-    result["density: isolated"] = float(np.mean(distance[:, 3] > 0.02))
-    along, across = np.full((2, 1), np.nan)
-    if np.isfinite(ring).all():
-        gap = np.linalg.norm(np.diff(p, axis=0), axis=1) / ranges[1:]
-        order = np.lexsort((np.arctan2(p[:, 1], p[:, 0]), ring))
-        gap = np.linalg.norm(np.diff(p[order], axis=0), axis=1)
-        gap /= ranges[order][1:]
-        along = gap[np.diff(ring[order]) == 0.0]
-        rows = tree.query(p, 16)[1] % len(p)
-        other = ring[rows] != ring[:, None]
-        first = rows[np.arange(len(p)), other.argmax(axis=1)]
-        across = np.linalg.norm(p - p[first], axis=1) / ranges
-        across = across[other.any(axis=1)]
-    for part in _QUANTILES:
-        result[f"density: along rings, {part:.0%}"] = _quantile(along, part)
-        result[f"density: across rings, {part:.0%}"] = _quantile(across, part)
-    for size in (0.2, 0.5, 1.0):
-        cells = len(np.unique(np.floor(p / size), axis=0))
-        result[f"voxels: of {size} m a point"] = cells / len(p)
-    return result
-
-
-def _ground_steps(p: np.ndarray) -> dict[str, float]:
-    """Returns by how much neighbouring cells of the ground differ."""
-    cell = np.floor(p[:, :2] / 0.5).astype(int)
-    places, which = np.unique(cell, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    mean = np.bincount(which, p[:, 2]) / np.bincount(which)
-    heights = {tuple(k): z for k, z in zip(places, mean, strict=True)}
-    steps = np.array(
-        [
-            abs(z - heights.get((i + 1, j), np.nan))
-            for (i, j), z in heights.items()
-        ]
-    )
-    steps = steps[np.isfinite(steps)]
-    return {
-        f"ground: steps, {part:.0%}": _quantile(steps, part)
-        for part in _QUANTILES
-    }
-
-
-def _shape(p: np.ndarray, ring: np.ndarray) -> tuple[float, ...]:
-    """Returns the shape of a neighbourhood: shares, normal and residuals.
-
-    The shares of lines, planes and scatter are those of Demantke et al. (2011).
-    Residuals are logarithms of mm: of all points, within rings, and of the
-    means of rings.
-    """
-    spread = p - p.mean(axis=0)
-    values, vectors = np.linalg.eigh(spread.T @ spread / len(p))
-    c, b, a = np.sqrt(np.maximum(values, 1e-12))
-    residual = spread @ vectors[:, 0]
-    within = between = np.nan
-    if np.isfinite(ring[0]):
-        _, which, count = np.unique(
-            ring, return_inverse=True, return_counts=True
-        )
-        mean = np.bincount(which, residual) / count
-        many = count >= 3
-        if many.sum() >= 3:
-            between = _log_mm(mean[many].std())
-            within = _log_mm((residual - mean[which])[many[which]].std())
-    shares = (a - b) / a, (b - c) / a, c / a
-    return *shares, abs(vectors[2, 0]), _log_mm(c), within, between
-
-
-def _log_mm(metres: float) -> float:
-    return float(np.log(max(1e3 * metres, 1e-2)))
-
-
-def _mean(values: np.ndarray, mask: np.ndarray) -> float:
-    return float(values[mask].mean()) if mask.sum() >= 5 else np.nan
-
-
-def _quantile(values: np.ndarray, part: float) -> float:
-    return float(np.quantile(values, part)) if len(values) >= 5 else np.nan
-
-
-class Features:
-    """The features of the patches of a set.
-
-    Attributes:
-        rows: a dictionary for each patch.
-        place: (N,) number of the place of each.
-    """
-
-    def __init__(self, places: list[list[np.ndarray]], seed: int = 0):
-        rng = np.random.default_rng(seed)
-        self.rows = []
-        numbers = []
-        for number, scans in enumerate(places):
-            for scan in scans:
-                for patch in patches(scan, rng):
-                    self.rows.append(describe(patch, rng))
-                    numbers.append(number)
-        self.place = np.array(numbers)
-
-    def of(self, names: list[str]) -> np.ndarray:
-        """Returns (N, F) features; NaN where a patch has none."""
-        return np.array(
-            [[row.get(name, np.nan) for name in names] for row in self.rows]
-        )
-
-    def part(self, mask: np.ndarray) -> Features:
-        """Returns some of the patches."""
-        part = object.__new__(Features)
-        part.rows = [
-            row for row, kept in zip(self.rows, mask, strict=True) if kept
-        ]
-        part.place = self.place[mask]
-        return part
-
-
-def common_names(sets: list[Features]) -> list[str]:
-    """Returns the features that both sets have in a tenth of the patches."""
-    names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
-    shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]
-    kept = np.min(shares, axis=0) >= 0.1
-    return [name for name, is_kept in zip(names, kept, strict=True) if is_kept]
-
-
-def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
-    """Returns the mean AUC over folds of places; NaN if a set has one place."""
-    sets = [_in_folds(one) for one in (real, simulated)]
-    folds = min(_MOST_FOLDS, *(fold.max() + 1 for fold in sets))
-    if folds < 2:
-        return np.nan
-    x = np.concatenate([real.of(names), simulated.of(names)])
-    y = np.repeat([1, 0], [len(real.rows), len(simulated.rows)])
-    fold = np.concatenate([one % folds for one in sets])
-    aucs = []
-    for k in range(folds):
-        model = HistGradientBoostingClassifier(
-            max_iter=_TREES, min_samples_leaf=10, random_state=0
-        )
-        learned = fold != k
-        share = y[learned].mean()
-        weight = np.where(y == 1, 1.0 / share, 1.0 / (1.0 - share))
-        model.fit(x[learned], y[learned], weight[learned])
-        score = model.predict_proba(x[~learned])[:, 1]
-        aucs.append(roc_auc_score(y[~learned], score))
-    return float(np.mean(aucs))
-
-
-def _in_folds(one: Features) -> np.ndarray:
-    """Returns the number of each patch's place, in order of appearance."""
-    return np.unique(one.place, return_inverse=True)[1]
+from evaluation.real.judge import (
+    Features,
+    common_names,
+    judge_draws,
+    read_places,
+)
 
 
 def strongest(
@@ -364,51 +49,6 @@ def strongest(
     return sorted(table, key=lambda row: -row["auc"])
 
 
-def judge(real: Features, simulated: Features) -> dict:
-    """Returns the AUC by groups of features, the control, the features."""
-    names = common_names([real, simulated])
-    groups = {"all": names}
-    for name in names:
-        groups.setdefault(name.partition(":")[0], []).append(name)
-    groups["all but intensity"] = [
-        n for n in names if not n.startswith("intensity")
-    ]
-    groups["all but intensity and rings"] = [
-        n for n in groups["all but intensity"] if "rings" not in n
-    ]
-    place = _in_folds(simulated)
-    half = place > place.max() // 2
-    halves = simulated.part(half), simulated.part(~half)
-    # The trees are small: threads take longer.
-    with threadpool_limits(1):
-        return {
-            "patches": [len(real.rows), len(simulated.rows)],
-            "auc": {
-                g: tell_apart(real, simulated, n) for g, n in groups.items()
-            },
-            "control": {g: tell_apart(*halves, n) for g, n in groups.items()},
-            "features": strongest(real, simulated, names),
-        }
-
-
-def judge_draws(
-    real: list[list[np.ndarray]], simulated: list[list[np.ndarray]], draws: int
-) -> dict:
-    """Returns what `judge` does, with the mean AUCs of draws of patches."""
-    results = []
-    for seed in range(draws):
-        print(f"draw {seed + 1} of {draws}", file=sys.stderr)
-        sets = Features(real, seed), Features(simulated, seed)
-        results.append(judge(*sets))
-    for key in ("auc", "control"):
-        results[0][key] = {
-            group: float(np.mean([one[key][group] for one in results]))
-            for group in results[0][key]
-            if all(group in one[key] for one in results)
-        }
-    return results[0]
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("real", type=Path)
@@ -422,7 +62,9 @@ def main() -> None:
         sets = read_places(arguments.real), read_places(arguments.simulated)
     except InputError as error:
         raise SystemExit(f"error: {error}") from None
-    result = judge_draws(*sets, arguments.draws)
+    result = judge_draws(*sets, arguments.draws, terminal.track)
+    first = Features(sets[0]), Features(sets[1])
+    result["features"] = strongest(*first, common_names([*first]))
     if arguments.json:
         print(json.dumps(result, indent=1))
         return

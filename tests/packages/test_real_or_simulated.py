@@ -14,13 +14,20 @@ PLACES = 6
 
 @pytest.fixture(scope="module")
 def judge():
+    from evaluation.real import judge
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "_TREES", 25)
+        yield judge
+
+
+@pytest.fixture(scope="module")
+def program():
     sys.path.insert(0, str(FOLDER))
     import real_or_simulated
 
     sys.path.remove(str(FOLDER))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(real_or_simulated, "_TREES", 25)
-        yield real_or_simulated
+    return real_or_simulated
 
 
 def make_place(folder, seed, *, rough=0.005, bias=0.0, texture=3.0):
@@ -84,14 +91,16 @@ def test_equal_sets_are_not_told_apart(judge, plain, tmp_path):
     ],
 )
 def test_it_finds_the_difference(
-    judge, plain, tmp_path, options, group, feature
+    judge, program, plain, tmp_path, options, group, feature
 ):
     other = features(judge, tmp_path / "set", 3, **options)
     result = judge.judge(plain, other)
     assert result["auc"][group] > 0.95
-    first = result["features"][0]
+    names = judge.common_names([plain, other])
+    features_of_both = program.strongest(plain, other, names)
+    first = features_of_both[0]
     assert first["feature"].startswith(group)
-    assert any(feature in row["feature"] for row in result["features"][:6])
+    assert any(feature in row["feature"] for row in features_of_both[:6])
     assert first["auc"] > 0.95
 
 
@@ -126,8 +135,20 @@ def test_rings_follow_from_the_order_of_a_file(judge, tmp_path):
     assert len(first) >= 25
 
 
-def test_without_a_folder_it_says_so(judge, tmp_path, monkeypatch):
+def test_without_a_folder_it_says_so(program, tmp_path, monkeypatch):
     words = ["judge", str(tmp_path / "none"), str(tmp_path)]
     monkeypatch.setattr(sys, "argv", words)
     with pytest.raises(SystemExit, match=r"none: no folder of scans"):
-        judge.main()
+        program.main()
+
+
+def test_a_long_drive_has_a_place_every_30_m(judge, tmp_path):
+    # A scan every 8 m: the fourth is 24 m from the first, the fifth 32 m.
+    make_place(tmp_path / "velodyne", 0)
+    file = tmp_path / "velodyne" / "000000.bin"
+    for k in range(1, 9):
+        (file.parent / f"{k:06d}.bin").write_bytes(file.read_bytes())
+    rows = [f"1 0 0 {8 * k} 0 1 0 0 0 0 1 0" for k in range(9)]
+    (tmp_path / "poses.txt").write_text("\n".join(rows))
+    (tmp_path / "times.txt").write_text("\n".join(map(str, range(9))))
+    assert [len(one) for one in judge.read_places(tmp_path)] == [4, 4, 1]

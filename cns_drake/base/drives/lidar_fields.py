@@ -13,7 +13,7 @@ class LidarField(NamedTuple):
 
 # Preset, or unit of a public data set. Livox's units have no rings; theirs are
 # as many as of the `cns` preset. HeLiPR's Ouster is an OS2 with 128 channels
-# over 22.5 deg (its data sheet).
+# over 22.5 deg (its data sheet). NCLT's HDL-32E hangs upside down.
 _FIELDS = {
     "cns": LidarField(32, -22.5, 22.5),
     "os0-128": LidarField(128, -45.0, 45.0),
@@ -26,6 +26,7 @@ _FIELDS = {
     "vlp-16": LidarField(16, -15.0, 15.0),
     "hdl-64e": LidarField(64, -24.33, 2.0),
     "hdl-32e": LidarField(32, -30.67, 10.67),
+    "hdl-32e-upside-down": LidarField(32, -10.67, 30.67),
     "alpha-prime": LidarField(128, -25.0, 15.0),
     "hesai-pandar64": LidarField(64, -25.0, 15.0),
     "hesai-pandar-xt32": LidarField(32, -16.0, 15.0),

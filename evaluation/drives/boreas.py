@@ -1,0 +1,88 @@
+"""Drives of the Boreas data set (Burnett et al., IJRR 2023).
+
+    SEQ/lidar/<us>.bin               float32 x y z intensity laser time
+    SEQ/applanix/lidar_poses.csv     us, x y z [m], velocity, roll pitch yaw
+                                     [rad], angular velocity
+
+Times are those of the middle of a scan; a point's time is in seconds from it.
+Angles are those of the world in the LiDAR's frame S, as its development kit
+reads them: Rz(yaw) Ry(pitch) Rx(roll) is R_SW. All drives share W, with its
+axes east, north and up. In the first releases it was the UTM grid.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from evaluation.drives.scan_files import (
+    FileDrive,
+    check_below,
+    is_local,
+    keep_spanned,
+    list_stamped,
+    read_packed,
+)
+from evaluation.drives.text_tables import parse_microseconds, read_angles
+
+_SCANS = "lidar"
+_POSES = "applanix/lidar_poses.csv"
+_NUM_LASERS = 128
+_STORED = np.dtype(
+    [(n, "<f4") for n in ("x", "y", "z", "intensity", "laser", "time")]
+)
+_POINT = np.dtype(
+    [
+        *((n, "<f4") for n in ("x", "y", "z", "intensity")),
+        ("laser", "<u2"),
+        ("t", "<i4"),
+    ]
+)
+_LONGEST_GAP_NS = 1_000_000_000
+# Of W on the UTM grid, in Toronto, see `scan_files.ORIGIN` [m].
+_ORIGIN = (620_000.0, 4_845_000.0, 0.0)
+
+
+class BoreasDrive(FileDrive):
+    """A drive of Boreas, its Alpha Prime."""
+
+    def __init__(self, path: Path, columns: int | None = None):
+        """Opens a drive; its files have columns of their own.
+
+        Raises:
+            InputError: if there is none, or its poses cannot be used.
+        """
+        del columns
+        files, stamps_ns = list_stamped(
+            path / _SCANS, ".bin", parse_microseconds
+        )
+        trajectory, unknown = read_angles(path / _POSES, 12)
+        X_WS = trajectory.X_WB
+        X_WS[:, :3, :3] = np.swapaxes(X_WS[:, :3, :3], 1, 2)
+        local = is_local(X_WS)
+        if not local:
+            X_WS[:, :3, 3] -= _ORIGIN
+        X_WS, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        kept, notes = keep_spanned(files, spanned, trajectory.path)
+        super().__init__(
+            name=path.resolve().name,
+            world_frame=f"boreas/{'enu' if local else 'utm-17n'}",
+            files=kept,
+            stamps_ns=stamps_ns[spanned],
+            X_WS=X_WS,
+            notes=unknown + notes,
+            unit="alpha-prime",
+        )
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        stored = read_packed(path, _STORED)
+        check_below(stored, "laser", _NUM_LASERS)
+        points = np.empty(len(stored), _POINT)
+        for name in ("x", "y", "z", "intensity", "laser"):
+            points[name] = stored[name]
+        points["t"] = np.rint(stored["time"] * 1e9)
+        return points
+
+
+def holds_boreas(path: Path) -> bool:
+    """Returns whether a folder looks like a drive of Boreas."""
+    return (path / _POSES).is_file()

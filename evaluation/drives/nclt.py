@@ -1,0 +1,129 @@
+"""Drives of the NCLT data set (Carlevaris-Bianco et al., IJRR 2016).
+
+    DATE/velodyne_sync/<us>.bin     uint16 x y z, uint8 intensity, uint8 laser
+    groundtruth_DATE.csv            us, x y z [m], roll pitch yaw [rad] of X_NB
+
+The table lies in the drive's folder, beside it, or in a `ground_truth` there.
+N has its axes north, east and down. B is the vehicle's body, with x forward, y
+right and z down; points are in B, and stored in steps of 5 mm from -100 m on.
+All sessions share N.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from evaluation.drives.scan_files import (
+    FileDrive,
+    check_below,
+    keep_spanned,
+    list_stamped,
+    read_packed,
+)
+from evaluation.drives.text_tables import parse_microseconds, read_angles
+
+_SCANS = "velodyne_sync"
+_HITS = "velodyne_hits.bin"
+_STORED = np.dtype(
+    [(axis, "<u2") for axis in "xyz"] + [("intensity", "u1"), ("laser", "u1")]
+)
+_POINT = np.dtype(
+    [
+        *((axis, "<f4") for axis in "xyz"),
+        ("intensity", "u1"),
+        ("ring", "<u2"),
+    ]
+)
+_STEP, _LEAST = 0.005, -100.0
+_NUM_LASERS = 32
+_LONGEST_GAP_NS = 1_000_000_000
+# W has its axes east, north and up.
+_X_WN = poses.make_pose(
+    np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]), np.zeros(3)
+)
+# S is at the LiDAR, by the data set's x_body_velodyne, with x forward, y left
+# and z up.
+_X_BS = poses.make_pose(
+    np.diag([1.0, -1.0, -1.0]), np.array([0.002, -0.004, -0.957])
+)
+
+
+class NcltDrive(FileDrive):
+    """A session of NCLT, its HDL-32E.
+
+    The unit hangs upside down, and looks up to 30.67 deg. The motion during a
+    turn is undone in the files. Rings count upwards; the lasers' numbers do
+    not: high and low ones take turns.
+    """
+
+    def __init__(self, path: Path, columns: int | None = None):
+        """Opens a session; its files have columns of their own.
+
+        Raises:
+            InputError: if there is none, or its poses cannot be used.
+        """
+        del columns
+        if not (path / _SCANS).is_dir():
+            raise InputError(
+                f"{path / _HITS}: packets as they came; {_SCANS}, the data"
+                " set's scans, is needed beside it"
+            )
+        files, stamps_ns = list_stamped(
+            path / _SCANS, ".bin", parse_microseconds
+        )
+        name = path.resolve().name
+        trajectory, unknown = read_angles(_poses_path(path), 6)
+        X_NB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        kept, notes = keep_spanned(files, spanned, trajectory.path)
+        super().__init__(
+            name=name,
+            world_frame="nclt",
+            files=kept,
+            stamps_ns=stamps_ns[spanned],
+            X_WS=_X_WN @ X_NB @ _X_BS,
+            notes=unknown + notes,
+            unit="hdl-32e-upside-down",
+        )
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        return read_scan(path)
+
+
+def holds_nclt(path: Path) -> bool:
+    """Returns whether a folder looks like a session of NCLT."""
+    return (path / _SCANS).is_dir() or (path / _HITS).is_file()
+
+
+def read_scan(path: Path) -> np.ndarray:
+    """Returns the points (N,) of a `velodyne_sync` file, in S.
+
+    Raises:
+        ValueError: if the file is not of its format.
+        InputError: if it cannot be read.
+    """
+    stored = read_packed(path, _STORED)
+    check_below(stored, "laser", _NUM_LASERS)
+    points = np.empty(len(stored), _POINT)
+    for axis, origin, sign in zip(
+        "xyz", _X_BS[:3, 3], _X_BS.diagonal(), strict=False
+    ):
+        points[axis] = sign * (stored[axis] * _STEP + _LEAST - origin)
+    points["intensity"] = stored["intensity"]
+    down = stored["laser"] // 2 + _NUM_LASERS // 2 * (stored["laser"] % 2)
+    points["ring"] = _NUM_LASERS - 1 - down
+    return points
+
+
+def _poses_path(path: Path) -> Path:
+    resolved = path.resolve()
+    name = f"groundtruth_{resolved.name}.csv"
+    beside = resolved.parent
+    for folder in (path, beside, beside / "ground_truth"):
+        if (folder / name).is_file():
+            return folder / name
+    raise InputError(
+        f"{path}: NCLT: no {name}, neither in it nor beside it nor in"
+        " ../ground_truth"
+    )
