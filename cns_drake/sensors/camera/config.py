@@ -1,6 +1,5 @@
 """The description of a camera."""
 
-
 import math
 from typing import Annotated
 
