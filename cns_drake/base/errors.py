@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import locale
 import re
@@ -65,6 +66,19 @@ class FailedJobsError(InputError):
     """
 
     exit_status = 1
+
+
+@contextlib.contextmanager
+def value_errors(place: object) -> Iterator[None]:
+    """Turns a ValueError into one line that begins with its place.
+
+    Raises:
+        InputError: if the block raises ValueError.
+    """
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(f"{place}: {error}") from error
 
 
 def one_line(message: object) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import value_errors
 from cns_drake.base.files import read_bytes
 
 # Files written by hand stay far below both.
@@ -23,10 +23,8 @@ def read_yaml(path: Path) -> Any:
             values or has a key twice.
     """
     text = read_bytes(path)
-    try:
+    with value_errors(path):
         return parse_yaml(text)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:

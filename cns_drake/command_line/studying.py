@@ -1,6 +1,5 @@
 """The commands that run studies: what change costs each method."""
 
-from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,6 +1,7 @@
 """Recording the sensors of a Diagram as ROS 2 messages."""
 
 from collections.abc import Callable, Mapping
+import functools
 import math
 from typing import Any, NamedTuple
 import warnings
@@ -290,26 +291,20 @@ class McapRecorder(LeafSystem):
         )
 
     def _add_camera(self, name: str, info: CameraInfo) -> None:
-        topic = recorded_topics.camera_info_topic(name)
-        encode = messages.make_image
-        ports = {
-            kind: self._declare(f"{name}_{kind}", image())
-            for kind, image in _IMAGES.items()
-        }
+        def make(kind: str, image: Any, stamp_ns: int) -> dict:
+            return {
+                recorded_topics.image_topic(name, kind): messages.make_image(
+                    image.data, messages.ENCODINGS[kind], name, stamp_ns
+                ),
+                recorded_topics.camera_info_topic(name): (
+                    messages.make_camera_info(info, name, stamp_ns)
+                ),
+            }
 
-        def make_all(context: Context, stamp_ns: int) -> dict[Topic, Any]:
-            made = {}
-            for kind, port in ports.items():
-                image = _value_of(port, context)
-                if image is not None:
-                    made[recorded_topics.image_topic(name, kind)] = encode(
-                        image.data, messages.ENCODINGS[kind], name, stamp_ns
-                    )
-            if made:
-                made[topic] = messages.make_camera_info(info, name, stamp_ns)
-            return made
-
-        self._streams.append((topic, make_all))
+        for kind, image in _IMAGES.items():
+            topic = recorded_topics.image_topic(name, kind)
+            port = f"{name}_{kind}"
+            self._add_port(port, topic, functools.partial(make, kind), image())
 
     def _declare_events(self) -> None:
         """Declares an event for each tick that needs one."""

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base.errors import InputError, validated, value_errors
 from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
@@ -133,10 +133,8 @@ def find_files(values: dict, path: Path) -> None:
         place = fields.get(field)
         if not isinstance(place, str) or place in shipped_maps():
             return fields
-        try:
+        with value_errors(f"{path}: {field}"):
             return {**fields, field: str((path.parent / place).resolve())}
-        except ValueError as error:
-            raise InputError(f"{path}: {field}: {error}") from error
 
     for field in ("map", "world", "waypoints"):
         values |= find(values, field)

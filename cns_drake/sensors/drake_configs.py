@@ -190,15 +190,12 @@ def ApplyLidarConfig(
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
     section = _section(config, LidarSection, ("rate",))
-    plant = plant or builder.GetSubsystemByName("plant")
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
-    frame, X_PB = _place(config, plant)
     lidar = add_described_lidar(
         section,
         builder,
         scene_graph,
-        frame,
-        X_PB,
+        *_place(config, builder, plant),
         name=config.name,
         seed=config.seed,
         period=(
@@ -215,8 +212,9 @@ def ApplyLidarConfig(
         "POINT_CLOUD",
         [lidar.GetOutputPort("point_cloud_W")],
         PointCloudToLcm("world"),
-        _interface(config, builder, lcm_buses, lcm),
         lidar.pattern.period,
+        lcm_buses,
+        lcm,
     )
     return lidar
 
@@ -246,12 +244,11 @@ def ApplyImuConfig(
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
     section = _section(config, ImuSection)
-    plant = plant or builder.GetSubsystemByName("plant")
     rate = _checked_rate(config, section.sample_rate(_RATE))
     ideal = section.replaced(rate=None).is_ideal
     imu = add_imu(
         builder,
-        *_place(config, plant),
+        *_place(config, builder, plant),
         rate=rate,
         noise=None if ideal else section.noise(config.seed),
         name=config.name,
@@ -260,8 +257,9 @@ def ApplyImuConfig(
     axes = [f"{name}_{axis}" for name in ports for axis in "xyz"]
     measured = list(ports.values())
     to_lcm = _SignalToLcm(measured, axes, lambda *values: np.hstack(values))
-    interface = _interface(config, builder, lcm_buses, lcm)
-    _publish(builder, config, "IMU", measured, to_lcm, interface, 1.0 / rate)
+    _publish(
+        builder, config, "IMU", measured, to_lcm, 1.0 / rate, lcm_buses, lcm
+    )
     return imu
 
 
@@ -289,16 +287,16 @@ def ApplyOdometryConfig(
     """
     section = _section(config, OdometrySection)
     rate = _checked_rate(config, section.rate)
-    plant = plant or builder.GetSubsystemByName("plant")
-    frame, X_PB = _place(config, plant)
+    frame, X_PB = _place(config, builder, plant)
     sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
     axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
     axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
     measured = [sensor.GetOutputPort("odometry")]
     to_lcm = _SignalToLcm(measured, axes, _odometry_values)
-    interface = _interface(config, builder, lcm_buses, lcm)
     period = 1.0 / rate
-    _publish(builder, config, "ODOMETRY", measured, to_lcm, interface, period)
+    _publish(
+        builder, config, "ODOMETRY", measured, to_lcm, period, lcm_buses, lcm
+    )
     return sensor
 
 
@@ -310,7 +308,7 @@ def _section(
     Raises:
         ValueError: a field is out of range.
     """
-    source = f"{type(config).__name__} {config.name}"
+    source = _caller(config)
     rate = config.rate
     if rate is not None and not 0.0 < rate <= HIGHEST_RATE:
         raise ValueError(
@@ -324,18 +322,19 @@ def _section(
     try:
         return kind.model_validate(given)
     except ValidationError as error:
-        text = describe_validation_error(_caller(config), error, kind)
+        text = describe_validation_error(source, error, kind)
         raise ValueError(text) from None
 
 
 def _place(
-    config: Config, plant: MultibodyPlant
+    config: Config, builder: DiagramBuilder, plant: MultibodyPlant | None
 ) -> tuple[Frame, RigidTransform]:
     """Returns the frame P that carries a sensor, and X_PB.
 
     Raises:
         ValueError: X_PB is not finite.
     """
+    plant = plant or builder.GetSubsystemByName("plant")
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:
         frame = GetScopedFrameByName(plant, config.X_PB.base_frame)
@@ -363,25 +362,6 @@ def _caller(config: Config) -> str:
     return f"{type(config).__name__} {config.name}"
 
 
-def _interface(
-    config: Config,
-    builder: DiagramBuilder,
-    lcm_buses: LcmBuses | None,
-    lcm: Interface | None,
-) -> Interface:
-    caller = _caller(config)
-    if lcm is not None:
-        return lcm
-    if lcm_buses is not None:
-        return find_bus(builder, lcm_buses, caller, config.lcm_bus)
-    if config.lcm_bus != "default":
-        raise RuntimeError(
-            f"{caller}: lcm_bus: there is no bus '{config.lcm_bus}' without "
-            "lcm_buses"
-        )
-    return builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
-
-
 def _odometry_values(value: odometry.Odometry) -> np.ndarray:
     X_WB, V_WB_B = value.X_WB, value.V_WB_B
     return np.hstack(
@@ -400,18 +380,40 @@ def _publish(
     kind: str,
     ports: list[OutputPort],
     to_lcm: framework.System,
-    interface: Interface,
     period: float,
+    lcm_buses: LcmBuses | None,
+    lcm: Interface | None,
 ) -> None:
     """Adds systems that make a message of ports, and publish it.
 
-    The channel is `DRAKE_<kind>_<name>`, the period in seconds.
+    Args:
+        builder: holds the sensor.
+        config: its description.
+        kind: the channel is `DRAKE_<kind>_<name>`.
+        ports: what it measures.
+        to_lcm: makes a message of the ports.
+        period: time between two messages [s].
+        lcm_buses: see `ApplyLidarConfig`.
+        lcm: likewise.
+
+    Raises:
+        RuntimeError: there is no such bus.
     """
+    caller = _caller(config)
+    if lcm is None and lcm_buses is not None:
+        lcm = find_bus(builder, lcm_buses, caller, config.lcm_bus)
+    if lcm is None:
+        if config.lcm_bus != "default":
+            raise RuntimeError(
+                f"{caller}: lcm_bus: there is no bus '{config.lcm_bus}' "
+                "without lcm_buses"
+            )
+        lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
     is_cloud = isinstance(to_lcm, PointCloudToLcm)
     publisher = drake_lcm.LcmPublisherSystem.Make(
         f"DRAKE_{kind}_{config.name}",
         lcmt_point_cloud if is_cloud else lcmt_drake_signal,
-        interface,
+        lcm,
         publish_period=period,
         use_cpp_serializer=is_cloud,
     )

@@ -110,10 +110,13 @@ class SensorConfig(Mount, abc.ABC):
         """Returns the ROS 2 message of a value of the port."""
 
 
-def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:
+def check_rate(
+    rate: float, lowest: int, name: str = "rate", *, multiple_of: int = 1
+) -> None:
     """Checks that a rate of samples is possible.
 
-    Stamps are whole nanoseconds, so the rate must divide a billion.
+    Stamps are whole nanoseconds, so the rate must divide a billion. The name is
+    that of its field.
 
     Raises:
         ValueError: it is not allowed; the message has the nearest allowed
@@ -133,7 +136,7 @@ def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:
         kind = f"a multiple of {multiple_of}"
     near = " or ".join(map(str, below + above))
     raise ValueError(
-        f"rate: {rate:g} a second; it must be {kind} from"
+        f"{name}: {rate:g} a second; it must be {kind} from"
         f" {lowest} to {HIGHEST_RATE} that divides 1,000,000,000 ns"
         + (f", such as {near}" if near else ", and there is none")
     )

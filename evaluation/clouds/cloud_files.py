@@ -2,7 +2,6 @@
 
 import codecs
 from collections.abc import Callable, Iterator
-import contextlib
 import functools
 import itertools
 import math
@@ -14,8 +13,8 @@ import numpy as np
 
 from cns_drake.base import points as point_arrays
 from cns_drake.base.compiled import compiled
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular
+from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.number_rows import is_number, parse_rows
 from cns_drake.base.points import check_range, store
 from cns_drake.base.poses import FARTHEST
@@ -475,7 +474,7 @@ def read_cloud(
     """
     path = Path(path)
     _find_reader(path)
-    with _faults(path):
+    with user_errors(path), value_errors(path):
         size = path.stat().st_size
         if size > SCAN_LIMIT_BYTES:
             raise ValueError(f"{size} bytes is too large for a scan")
@@ -509,7 +508,7 @@ def read_blocks(
     reader = _find_reader(path)
     if reader is _read_bin:
         reader = functools.partial(_read_bin, columns=columns)
-    with _faults(path):
+    with user_errors(path), value_errors(path):
         check_regular(path)
         read = 0
         coarse = 0.0
@@ -548,17 +547,6 @@ def _find_reader(path: Path) -> _Reader:
             f"{' '.join(_READERS)})"
         )
     return reader
-
-
-@contextlib.contextmanager
-def _faults(path: Path) -> Iterator[None]:
-    """Turns errors of readers into one line that names the file."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
-    except (ValueError, EOFError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def _read_npy(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
@@ -614,7 +602,7 @@ def read_npy(path: Path) -> np.ndarray:
     Raises:
         InputError: it cannot be read, or holds no array of the size it names.
     """
-    with _faults(path):
+    with user_errors(path), value_errors(path):
         check_regular(path)
         dtype, shape, _, offset = _read_npy_header(path)
         count = math.prod(shape)

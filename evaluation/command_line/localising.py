@@ -1,6 +1,5 @@
 """The command `localise`."""
 
-from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -21,7 +21,7 @@ import yaml
 
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import IMU_DTYPE, read_scenario
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_text
 from cns_drake.base.yaml_files import parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
@@ -126,14 +126,12 @@ def _read_mount(path: Path | None) -> np.ndarray:
     """Returns X_BS (4, 4), the pose of the LiDAR on the vehicle."""
     if path is None:
         return poses.make_pose(np.eye(3), np.array([0.0, 0.0, _LIDAR_HEIGHT]))
-    try:
+    with value_errors(path):
         # OpenCV begins its files with a directive that is not YAML's.
         lines = [
             x for x in read_text(path).splitlines() if not x.startswith("%")
         ]
         X_BS = _find_pose(parse_yaml("\n".join(lines), _Loader), path)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
     if X_BS is None:
         raise InputError(
             f"{path}: no transformation (a matrix of 4 x 4 or 3 x 4 numbers,"

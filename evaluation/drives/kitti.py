@@ -31,7 +31,7 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import index_instances, read_scenario
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_bytes, read_text
 from cns_drake.base.json_text import parse_json
 from cns_drake.base.number_rows import parse_rows
@@ -80,10 +80,8 @@ class KittiDrive(BinDrive):
         files, numbers = _numbered_files(path)
         times_path = path / "times.txt"
         times = read_numbers(times_path, [("time", "U40")])["time"]
-        try:
+        with value_errors(times_path):
             stamps_ns = parse_seconds(times)
-        except ValueError as error:
-            raise InputError(f"{times_path}: {error}") from error
         check_increasing(times_path, stamps_ns, "row")
         poses_path = _poses_path(path)
         X_C0C = read_poses(poses_path)
@@ -139,10 +137,8 @@ class KittiDrive(BinDrive):
         path = self._structures
         if not is_there(path):
             return None
-        try:
+        with value_errors(path):
             table = parse_json(read_bytes(path))
-        except ValueError as error:
-            raise InputError(f"{path}: {error}") from error
         return index_instances(table, str(path))
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:

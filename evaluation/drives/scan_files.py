@@ -10,8 +10,8 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base.files import read_bytes, user_errors
 from cns_drake.base.points import FARTHEST_RETURN, check_range
 from evaluation.clouds.bin_columns import BinLayout, find_layout
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
@@ -129,12 +129,8 @@ class FileDrive(Drive):
         if not 0 <= index < len(self):
             raise IndexError(f"scan {index} of {len(self)}")
         path = self._files[index]
-        try:
+        with user_errors(path), value_errors(path):
             return _returns(self._read(path, int(self._stamps_ns[index])))
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror or error}") from error
-        except ValueError as error:
-            raise InputError(f"{path}: {error}") from error
 
     @abc.abstractmethod
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
@@ -198,12 +194,8 @@ def list_stamped(
     if not files:
         raise InputError(f"{folder}: no scan (*{suffix}) in it")
     stems = [path.name.removesuffix(suffix) for path in files]
-    try:
+    with value_errors(f"{folder}: a file named *{suffix}"):
         stamps_ns = parse(np.array(stems))
-    except ValueError as error:
-        raise InputError(
-            f"{folder}: a file named *{suffix}: {error}"
-        ) from error
     order = np.argsort(stamps_ns, kind="stable")
     check_increasing(folder, stamps_ns[order], "scan")
     return [files[i] for i in order], stamps_ns[order]

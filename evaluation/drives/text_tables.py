@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import decode_text, read_bytes
 from cns_drake.base.number_rows import is_number, parse_rows
 
@@ -47,10 +47,8 @@ def read_stamped_rows(
     rows = read_numbers(
         path, [("stamp", "U40"), ("values", "f8", width)], separator
     )
-    try:
+    with value_errors(f"{path}: time"):
         stamps_ns = (parse or parse_stamps_ns)(rows["stamp"])
-    except ValueError as error:
-        raise InputError(f"{path}: time: {error}") from error
     check_finite(path, rows["values"])
     return stamps_ns, rows["values"]
 
@@ -89,10 +87,8 @@ def read_numbers(
         lines = lines[1:]
     if not lines:
         raise InputError(f"{path}: no row of numbers")
-    try:
+    with value_errors(path):
         return parse_rows(lines, np.dtype(columns), separator)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:

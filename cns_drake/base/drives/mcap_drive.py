@@ -1,6 +1,6 @@
 """Drives recorded as MCAP by cns-drake (or by others on the same topics)."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 import contextlib
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,7 @@ from cns_drake.base.drives.drive import (
 )
 from cns_drake.base.drives.mcap_file import McapFile
 from cns_drake.base.drives.mcap_messages import StaticTransforms, checked_poses
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.json_text import parse_json
 
 _LIDAR_TOPIC = "/lidar/points"
@@ -360,13 +360,9 @@ class McapDrive(Drive):
         with self._faults(topic):
             return mcap_messages.decode(data, self._message_types[topic])
 
-    @contextlib.contextmanager
-    def _faults(self, where: str) -> Iterator[None]:
+    def _faults(self, where: str) -> contextlib.AbstractContextManager[None]:
         """Turns a ValueError into one line that names file and place."""
-        try:
-            yield
-        except ValueError as error:
-            raise InputError(f"{self._path}: {where}: {error}") from error
+        return value_errors(f"{self._path}: {where}")
 
     def _check_frame(
         self, topic: str, stamp_ns: int, frame: str, first: str

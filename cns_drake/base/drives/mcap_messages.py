@@ -8,7 +8,7 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.drives import ros_types
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 
 # More bytes than a message of each type can need [bytes]. A few compressed
 # kilobytes can hold gigabytes of padding. A cloud fills a chunk at most.
@@ -171,8 +171,6 @@ def checked_poses(
         raise InputError(
             f"{where}: a pose is {np.abs(p).max():g} m from the origin"
         )
-    try:
+    with value_errors(f"{where}: a pose"):
         R = poses.rotation_from_quaternion(quat_xyzw)
-    except ValueError as error:
-        raise InputError(f"{where}: a pose has {error}") from error
     return poses.make_pose(R, p)

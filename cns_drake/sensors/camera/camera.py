@@ -1,7 +1,5 @@
 """Cameras on a vehicle, and what is recorded of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 import logging
 from typing import Any

@@ -1,7 +1,5 @@
 """The description of a camera."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base.errors import InputError, validated, value_errors
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.sensors.imu.noise import ImuNoise
 from cns_drake.sensors.sensor_config import (
@@ -65,10 +65,8 @@ class ImuSection(Mount):
         kalibr = self._read_kalibr()
         if kalibr is None or kalibr.update_rate is None:
             return scan_rate
-        try:
-            check_rate(kalibr.update_rate, scan_rate)
-        except ValueError as error:
-            raise InputError(f"{self.kalibr}: update_{error}") from error
+        with value_errors(self.kalibr):
+            check_rate(kalibr.update_rate, scan_rate, "update_rate")
         return round(kalibr.update_rate)
 
     def noise(self, seed: int) -> ImuNoise:

@@ -76,23 +76,13 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     return sides
 
 
-@compiled
 def _find_directions(
     d_Wset: np.ndarray, row: np.ndarray, neighbour: np.ndarray
 ) -> np.ndarray:
     """Returns unit vectors across beams, (P, 3), to their neighbours."""
-    toward = np.empty((len(row), 3))
-    for side in range(len(row)):
-        d, d_j = d_Wset[row[side]], d_Wset[neighbour[side]]
-        along = d[0] * d_j[0] + d[1] * d_j[1] + d[2] * d_j[2]
-        x = d_j[0] - along * d[0]
-        y = d_j[1] - along * d[1]
-        z = d_j[2] - along * d[2]
-        length = np.sqrt(x * x + y * y + z * z)
-        toward[side, 0] = x / length
-        toward[side, 1] = y / length
-        toward[side, 2] = z / length
-    return toward
+    d, d_j = d_Wset[row], d_Wset[neighbour]
+    toward = d_j - (d * d_j).sum(axis=1, keepdims=True) * d
+    return toward / np.sqrt((toward * toward).sum(axis=1, keepdims=True))
 
 
 @compiled

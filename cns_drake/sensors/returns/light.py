@@ -52,25 +52,15 @@ class BeamHits(NamedTuple):
     @classmethod
     def of(cls, d_Wset: np.ndarray, hits: RayHits) -> BeamHits:
         """Returns the hits of rays that were cast with normals."""
+        cosine = -(hits.normals_W * d_Wset).sum(axis=1)
         return cls(
             d_Wset,
             hits.ranges.astype(float),
             hits.geometry,
             hits.normals_W,
             hits.is_outside,
-            _cosines(hits.normals_W, d_Wset),
+            np.clip(cosine, 0.0, 1.0),
         )
-
-
-@compiled
-def _cosines(normals_W: np.ndarray, d_Wset: np.ndarray) -> np.ndarray:
-    """Returns the cosines of incidence, 0 for a miss."""
-    result = np.empty(len(d_Wset))
-    for k in range(len(d_Wset)):
-        n, d = normals_W[k], d_Wset[k]
-        along = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
-        result[k] = min(max(along, 0.0), 1.0)
-    return result
 
 
 class Shots(NamedTuple):
