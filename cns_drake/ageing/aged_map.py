@@ -24,8 +24,7 @@ from cns_drake.base.files import draft_folder, is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, stage_name
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.generate import MAX_STRUCTURES, stage_sdf
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry import Mesh, Structure
 from cns_drake.city.growth import stage_structures
 from cns_drake.imports.map_files import YEAR_COLUMN, stage_size, triangles_in
 from cns_drake.motion.trajectory import Trajectory

@@ -24,9 +24,14 @@ from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import Plot
 from cns_drake.ageing.rates import Tally
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry.polygons import polygons_of
-from cns_drake.city.geometry.structures import Part, Structure, assemble, block
-from cns_drake.city.geometry.upper_sides import from_above
+from cns_drake.city.geometry import (
+    Part,
+    Structure,
+    assemble,
+    block,
+    from_above,
+    polygons_of,
+)
 from cns_drake.city.growth import stage_structures
 from cns_drake.city.growth.lowering import top_of
 from cns_drake.city.placement.frontage import lines_along, lot_at

@@ -15,17 +15,19 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.facades.assembly import Rgb
-from cns_drake.city.geometry.polygons import placed, polygons_of
-from cns_drake.city.geometry.structures import (
+from cns_drake.city.geometry import (
     MeshShape,
     Model,
     Part,
     Structure,
     assemble,
     block,
+    from_above,
     part_triangles,
+    placed,
+    polygons_of,
+    unit_normals,
 )
-from cns_drake.city.geometry.upper_sides import from_above, unit_normals
 from cns_drake.city.growth.lowering import lowered, top_of
 from cns_drake.city.growth.stage_structures import (
     building_site,

@@ -11,8 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 from shapely.validation import make_valid
 
-from cns_drake.city.geometry.polygons import triangulate
-from cns_drake.city.geometry.upper_sides import long_normals, quartered
+from cns_drake.city.geometry import long_normals, quartered, triangulate
 from cns_drake.imports.options import ImportFaults
 
 # Faces of less area are dropped [m^2].

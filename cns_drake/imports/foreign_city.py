@@ -9,9 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.polygons import hull_of
-from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
+from cns_drake.city.geometry import (
+    Mesh,
+    MeshShape,
+    Model,
+    Part,
+    Structure,
+    hull_of,
+)
 from cns_drake.imports.options import ImportFaults
 
 Rgb = tuple[float, float, float]

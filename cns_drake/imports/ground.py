@@ -10,9 +10,14 @@ from scipy.ndimage import gaussian_filter
 import shapely
 from shapely.geometry import Point
 
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.polygons import hull_of
-from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
+from cns_drake.city.geometry import (
+    Mesh,
+    MeshShape,
+    Model,
+    Part,
+    Structure,
+    hull_of,
+)
 from cns_drake.imports.faces import joined, surface_samples
 from cns_drake.imports.foreign_city import Imported
 

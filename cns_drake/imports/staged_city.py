@@ -17,8 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import MAX_STRUCTURES
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.geometry import Mesh, MeshShape
 from cns_drake.imports.building_years import stands_today
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import (

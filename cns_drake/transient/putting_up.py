@@ -12,13 +12,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.geometry.polygons import placed
-from cns_drake.city.geometry.structures import (
+from cns_drake.city.geometry import (
     Model,
     Part,
     assemble,
     bar,
     block,
+    placed,
     post,
 )
 from cns_drake.city.placement.objects import OBJECTS, pick

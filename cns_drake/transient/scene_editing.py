@@ -15,8 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import product
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry import structures
-from cns_drake.city.geometry.mesh import FOLDER
+from cns_drake.city.geometry import FOLDER, structures
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.structure_table import (
     StructureEntry,

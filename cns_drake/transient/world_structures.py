@@ -15,10 +15,10 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from cns_drake.base.elementary import product
-from cns_drake.city.geometry.polygons import polygons_of
-from cns_drake.city.geometry.upper_sides import (
+from cns_drake.city.geometry import (
     UpperSides,
     from_above,
+    polygons_of,
     turned_up,
     unit_normals,
 )

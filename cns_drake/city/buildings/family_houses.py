@@ -2,11 +2,18 @@
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, wings
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.roofs import add_chimney
-from cns_drake.city.facades.walls import Band
-from cns_drake.city.facades.wings import Openings, Roof, Wing
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Openings,
+    Roof,
+    Wing,
+    add_chimney,
+    bays,
+    details,
+    massing,
+    wings,
+)
 
 STOREY_M = 2.65
 ROOF_M = 0.2

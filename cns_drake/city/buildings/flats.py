@@ -6,13 +6,25 @@ import numpy as np
 
 from cns_drake.city.buildings import family_houses
 from cns_drake.city.buildings.family_houses import ROOF_M
-from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.roofs import add_chimney, equip_roof
-from cns_drake.city.facades.walls import Band, Facade, Layout, Relief
-from cns_drake.city.facades.wings import Openings, Roof, Wing
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    Layout,
+    Openings,
+    Relief,
+    Roof,
+    Wing,
+    add_chimney,
+    bays,
+    details,
+    equip_roof,
+    massing,
+    roofs,
+    tiers,
+    wings,
+)
+from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 
 
 class CourtBlock(Building):

@@ -4,10 +4,20 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs, walls, wings
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
+from cns_drake.city.facades import (
+    Building,
+    Openings,
+    Roof,
+    Wing,
+    bays,
+    details,
+    equip_roof,
+    free_stretches,
+    massing,
+    roofs,
+    walls,
+    wings,
+)
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _MARGIN = 0.5

@@ -22,8 +22,7 @@ from pydantic import BaseModel
 import yaml
 
 from cns_drake.city.facades.assembly import Building, Rgb
-from cns_drake.city.geometry.mesh import Mesh, read_mesh
-from cns_drake.city.geometry.structures import MeshShape, triple
+from cns_drake.city.geometry import Mesh, MeshShape, read_mesh, triple
 
 _MODELS = Path(__file__).parent / "landmark_models"
 _Triple = tuple[float, float, float]

@@ -2,11 +2,20 @@
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs, wings
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import Band, Patch
-from cns_drake.city.facades.wings import Openings, Roof, Wing
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Openings,
+    Patch,
+    Roof,
+    Wing,
+    bays,
+    details,
+    equip_roof,
+    massing,
+    roofs,
+    wings,
+)
 
 # Kept free in front for canopies and behind for gutters [m].
 _FRONT_M, _BACK_M = 0.4, 0.1

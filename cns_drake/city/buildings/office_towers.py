@@ -5,18 +5,21 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building, Site
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import (
+from cns_drake.city.facades import (
     Band,
+    Building,
     Facade,
     Relief,
+    Site,
+    bays,
+    details,
+    equip_roof,
     facade_mesh,
     glass_mesh,
+    massing,
+    tiers,
 )
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 
 
 class BandedTower(Building):

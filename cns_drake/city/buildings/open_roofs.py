@@ -5,12 +5,21 @@ import math
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.details import add_railing
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
-from cns_drake.city.facades.wings import Openings, Wing
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    Openings,
+    Wing,
+    add_railing,
+    bays,
+    details,
+    equip_roof,
+    facade_mesh,
+    glass_mesh,
+    massing,
+    roofs,
+)
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _RECESS = 0.18

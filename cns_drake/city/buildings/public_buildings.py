@@ -2,11 +2,22 @@
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs, tiers, wings
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import Band, Facade
-from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    Openings,
+    Roof,
+    Wing,
+    bays,
+    details,
+    equip_roof,
+    free_stretches,
+    massing,
+    roofs,
+    tiers,
+    wings,
+)
 from cns_drake.city.geometry.mesh import Mesh
 
 _MARGIN = 0.6

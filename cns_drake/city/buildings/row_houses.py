@@ -6,11 +6,22 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs, wings
-from cns_drake.city.facades.assembly import Assembly, Building
-from cns_drake.city.facades.roofs import add_chimney, equip_roof
-from cns_drake.city.facades.walls import Band, Patch
-from cns_drake.city.facades.wings import Openings, Roof, Wing
+from cns_drake.city.facades import (
+    Assembly,
+    Band,
+    Building,
+    Openings,
+    Patch,
+    Roof,
+    Wing,
+    add_chimney,
+    bays,
+    details,
+    equip_roof,
+    massing,
+    roofs,
+    wings,
+)
 from cns_drake.city.geometry.mesh import Mesh
 
 _ROOF_M = 0.2

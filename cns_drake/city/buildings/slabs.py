@@ -7,10 +7,18 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building, Site
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import Band, Facade, Relief
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    Relief,
+    Site,
+    bays,
+    details,
+    equip_roof,
+    massing,
+    tiers,
+)
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _PARAPET = 1.2

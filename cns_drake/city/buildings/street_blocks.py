@@ -4,10 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import Band, Facade, Relief
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    Relief,
+    bays,
+    details,
+    equip_roof,
+    massing,
+    tiers,
+)
 from cns_drake.city.geometry.mesh import Mesh
 
 # Higher houses have their fire stairs inside.

@@ -4,10 +4,16 @@ import math
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, tiers
-from cns_drake.city.facades.assembly import Building
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.facades.walls import Band, Facade
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    bays,
+    details,
+    equip_roof,
+    massing,
+    tiers,
+)
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 

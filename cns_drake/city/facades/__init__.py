@@ -1,1 +1,40 @@
 """One grammar of walls, windows, doors, shop fronts, balconies and roofs."""
+
+from cns_drake.city.facades.assembly import Assembly, Building, Rgb, Site
+from cns_drake.city.facades.details import add_railing
+from cns_drake.city.facades.roofs import add_chimney, equip_roof
+from cns_drake.city.facades.walls import (
+    Band,
+    Facade,
+    Layout,
+    Patch,
+    Relief,
+    facade_mesh,
+    glass_mesh,
+    lifted,
+    single_wall,
+)
+from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
+
+__all__ = [
+    "Assembly",
+    "Band",
+    "Building",
+    "Facade",
+    "Layout",
+    "Openings",
+    "Patch",
+    "Relief",
+    "Rgb",
+    "Roof",
+    "Site",
+    "Wing",
+    "add_chimney",
+    "add_railing",
+    "equip_roof",
+    "facade_mesh",
+    "free_stretches",
+    "glass_mesh",
+    "lifted",
+    "single_wall",
+]

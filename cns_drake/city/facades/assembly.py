@@ -15,8 +15,15 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades import massing
 from cns_drake.city.formulas import FUNCTIONS, value_of
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes, object_mesh
-from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
+from cns_drake.city.geometry import (
+    Mesh,
+    MeshShape,
+    Model,
+    Part,
+    Shape,
+    merge_meshes,
+    object_mesh,
+)
 
 Rgb = tuple[float, float, float]
 T = TypeVar("T")

@@ -11,41 +11,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-
-
-def ears(points: np.ndarray) -> list[tuple[int, ...]]:
-    """Triangulates a simple outline by cutting ears off (O(N^3))."""
-    left = list(range(len(points)))
-    faces = []
-    while len(left) > 3:
-        for k in range(len(left)):
-            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
-            triangle = points[[a, b, c]]
-            others = [i for i in left if i not in (a, b, c)]
-            if _cross(*triangle) > 1e-9 and not any(
-                _inside(points[i], triangle) for i in others
-            ):
-                faces.append((a, b, c))
-                left.pop(k)
-                break
-        else:
-            raise ValueError("an outline crosses itself or runs clockwise")
-    return [*faces, tuple(left)]
-
-
-def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _inside(p: np.ndarray, triangle: np.ndarray) -> bool:
-    a, b, c = triangle
-    return (
-        _cross(a, b, p) > -1e-9
-        and _cross(b, c, p) > -1e-9
-        and _cross(c, a, p) > -1e-9
-    )
-
+from cns_drake.city.geometry import Mesh, merge_meshes
+from cns_drake.city.geometry.polygons import cut_ears
 
 Point = tuple[float, float]
 Corners = list[np.ndarray]
@@ -155,7 +122,8 @@ def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
             for k in range(1, n - 1, 2)
         ]
     else:
-        faces = ears(points)
+        thousandths = np.rint(1e3 * points).astype(int).tolist()
+        faces = cut_ears([(x, y) for x, y in thousandths], fans=True)
     if not up:
         faces = [face[::-1] for face in faces]
     return Mesh(_at(points, z), tuple(faces))

@@ -12,10 +12,13 @@ from shapely.ops import unary_union
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.buildings import ARCHETYPES
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.polygons import snap
-from cns_drake.city.geometry.structures import Structure, ground_triangles
-from cns_drake.city.geometry.upper_sides import UpperSides
+from cns_drake.city.geometry import (
+    Mesh,
+    Structure,
+    UpperSides,
+    ground_triangles,
+    snap,
+)
 from cns_drake.city.ground.districts import share_out
 from cns_drake.city.ground.elevation import aprons, make_ground
 from cns_drake.city.ground.streets import (

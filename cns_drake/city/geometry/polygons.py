@@ -40,7 +40,9 @@ def triangulate(polygon: Polygon) -> np.ndarray:
     fixed = {
         frozenset(edge) for ring in (outer, *holes) for edge in _edges(ring)
     }
-    triangles = _flip(_cut_ears(_bridge(outer, holes)), fixed)
+    ring = _bridge(outer, holes)
+    ears = ([ring[k] for k in ear] for ear in cut_ears(ring))
+    triangles = _flip(ears, fixed)
     return np.array(triangles, dtype=float).reshape(-1, 3, 2) / _MM
 
 
@@ -160,24 +162,29 @@ def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
     return all(min(p[k], q[k]) <= c[k] <= max(p[k], q[k]) for k in range(2))
 
 
-def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
-    """Returns triangles that fill a ring, which may touch itself."""
+def cut_ears(
+    ring: Sequence[_Point], fans: bool = False
+) -> list[tuple[int, ...]]:
+    """Returns triangles, as numbers of corners, that fill a ring.
+
+    It may touch itself. Fans of thin triangles are avoided unless `fans`.
+
+    Raises:
+        ValueError: the ring crosses itself, or runs clockwise.
+    """
     points = np.array(ring, dtype=np.int64)
     left = list(range(len(ring)))
-    triangles, start = [], 0
+    triangles: list[tuple[int, ...]] = []
+    start = 0
     while len(left) > 3:
         for step in range(len(left)):
             k = (start + step) % len(left)
-            ear = (
-                ring[left[k - 1]],
-                ring[left[k]],
-                ring[left[k + 1 - len(left)]],
-            )
-            if _cross(*ear) > 0 and not _any_inside(points[left], ear):
+            ear = (left[k - 1], left[k], left[k + 1 - len(left)])
+            corners = (ring[ear[0]], ring[ear[1]], ring[ear[2]])
+            if _cross(*corners) > 0 and not _any_inside(points[left], corners):
                 triangles.append(ear)
                 left.pop(k)
-                # Continuing behind the ear avoids fans of thin triangles.
-                start = k
+                start = 0 if fans else k
                 break
         else:
             a, b = ring[left[0]], ring[left[1]]
@@ -185,7 +192,7 @@ def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
                 raise ValueError("the polygon crosses itself")
             return triangles
     a, b, c = (ring[i] for i in left)
-    return [*triangles, (a, b, c)] if _cross(a, b, c) > 0 else triangles
+    return [*triangles, tuple(left)] if _cross(a, b, c) > 0 else triangles
 
 
 def _any_inside(
@@ -203,7 +210,7 @@ def _any_inside(
 
 
 def _flip(
-    triangles: Iterable[tuple[_Point, _Point, _Point]],
+    triangles: Iterable[Sequence[_Point]],
     fixed: set[frozenset[_Point]],
 ) -> list[tuple[_Point, _Point, _Point]]:
     """Flips inner edges until every circumcircle is empty (Lawson)."""

@@ -15,8 +15,7 @@ from scipy.sparse.linalg import spsolve
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.polygons import snap
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry import Structure, snap
 from cns_drake.roads import street_areas
 
 # Distance of the nodes between which the field is interpolated [m].

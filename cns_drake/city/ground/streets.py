@@ -10,16 +10,20 @@ from shapely.geometry import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.polygons import (
+from cns_drake.city.geometry import (
     HeightMap,
+    Mesh,
+    MeshShape,
+    Model,
+    Part,
+    Structure,
+    merge_meshes,
     polygons_of,
     snap,
     surface_mesh,
     tiles,
     wall_mesh,
 )
-from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
 from cns_drake.roads import street_areas
 from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.centreline import sample_stations

@@ -9,15 +9,15 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.polygons import (
+from cns_drake.city.geometry import (
     HeightMap,
+    Structure,
+    merge_meshes,
     polygons_of,
     snap,
     surface_mesh,
     wall_mesh,
 )
-from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.districts import District
 from cns_drake.city.ground.elevation import Ground
 from cns_drake.city.ground.streets import Covering

@@ -12,16 +12,18 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.facades.assembly import Assembly, Rgb, Site
-from cns_drake.city.facades.roofs import equip_roof
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.polygons import (
+from cns_drake.city.facades import Assembly, Rgb, Site, equip_roof
+from cns_drake.city.geometry import (
+    Mesh,
+    MeshShape,
+    Model,
+    Part,
+    part_mesh,
     polygons_of,
     snap,
     surface_mesh,
     wall_mesh,
 )
-from cns_drake.city.geometry.structures import MeshShape, Model, Part, part_mesh
 
 # Walls and the glass behind them count as one if they are this close [m].
 _REVEAL = 0.7

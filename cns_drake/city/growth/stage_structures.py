@@ -18,11 +18,11 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.buildings import ARCHETYPES, sample
-from cns_drake.city.geometry.polygons import Occupancy
-from cns_drake.city.geometry.structures import (
+from cns_drake.city.geometry import (
     BoxShape,
     MeshShape,
     Model,
+    Occupancy,
     Part,
     Structure,
     part_mesh,

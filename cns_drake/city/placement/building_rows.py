@@ -11,8 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.facades.assembly import Site
-from cns_drake.city.geometry.polygons import placed
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry import Structure, placed
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Lot, lines_along, lot_at

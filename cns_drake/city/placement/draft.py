@@ -11,9 +11,14 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.polygons import Occupancy, snap
-from cns_drake.city.geometry.structures import MeshShape, Model, Structure
-from cns_drake.city.geometry.upper_sides import UpperSides
+from cns_drake.city.geometry import (
+    MeshShape,
+    Model,
+    Occupancy,
+    Structure,
+    UpperSides,
+    snap,
+)
 from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.city_plan import CityPlan

@@ -6,13 +6,13 @@ import string
 
 import numpy as np
 
-from cns_drake.city.geometry.mesh import object_mesh
-from cns_drake.city.geometry.structures import (
+from cns_drake.city.geometry import (
     Builder,
     MeshShape,
     Model,
     Part,
     assemble,
+    object_mesh,
     triple,
 )
 

@@ -16,8 +16,14 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.generation.generate import MAX_STRUCTURES
-from cns_drake.city.geometry.structures import MeshShape, Model, Structure
-from cns_drake.city.geometry.upper_sides import UpperSides, looks_up, turned_up
+from cns_drake.city.geometry import (
+    MeshShape,
+    Model,
+    Structure,
+    UpperSides,
+    looks_up,
+    turned_up,
+)
 from cns_drake.imports.dressing import facade_pieces, grounds
 from cns_drake.imports.dressing.facade_pieces import FacadePlan
 from cns_drake.imports.dressing.street_dressing import dress_streets

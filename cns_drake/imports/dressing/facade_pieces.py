@@ -16,13 +16,17 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon, box
 
-from cns_drake.city.facades import bays, details
-from cns_drake.city.facades.assembly import Assembly
-from cns_drake.city.facades.roofs import add_chimney, equip_roof
-from cns_drake.city.facades.walls import Relief, lifted, single_wall
-from cns_drake.city.geometry import upper_sides
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.polygons import triangulate
+from cns_drake.city.facades import (
+    Assembly,
+    Relief,
+    add_chimney,
+    bays,
+    details,
+    equip_roof,
+    lifted,
+    single_wall,
+)
+from cns_drake.city.geometry import Mesh, triangulate, upper_sides
 from cns_drake.imports.dressing.styles import Style, Use
 from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.faces import parts_of

@@ -9,9 +9,14 @@ from shapely import STRtree
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import MeshShape, Part, Structure
-from cns_drake.city.geometry.upper_sides import looks_up, turned_up
+from cns_drake.city.geometry import (
+    Mesh,
+    MeshShape,
+    Part,
+    Structure,
+    looks_up,
+    turned_up,
+)
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.faces import flat_surface, joined, parts_of
 from cns_drake.imports.foreign_city import (

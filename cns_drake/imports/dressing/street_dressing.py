@@ -14,17 +14,19 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.round_shapes import revolved
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.polygons import Occupancy, placed
-from cns_drake.city.geometry.structures import (
+from cns_drake.city.geometry import (
     CylinderShape,
+    Mesh,
     MeshShape,
     Model,
+    Occupancy,
     SphereShape,
     Structure,
+    UpperSides,
     ground_triangles,
+    placed,
+    turned_up,
 )
-from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.imports.dressing.grounds import HALF_STREET

@@ -14,8 +14,7 @@ from shapely.geometry import LinearRing, LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.angles import wrapped
-from cns_drake.city.geometry.polygons import polygons_of, snap
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry import Structure, polygons_of, snap
 from cns_drake.city.ground.streets import (
     TILE,
     Covering,

@@ -13,8 +13,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.polygons import triangulate
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry import Structure, triangulate
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.foreign_city import Rgb, make_imported
 from cns_drake.imports.opendrive.lanes import LaneBand

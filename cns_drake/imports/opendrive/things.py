@@ -10,8 +10,7 @@ from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.xml_elements import Element
-from cns_drake.city.geometry.polygons import placed
-from cns_drake.city.geometry.structures import Model, Structure
+from cns_drake.city.geometry import Model, Structure, placed
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import tree
 from cns_drake.imports.faces import extruded

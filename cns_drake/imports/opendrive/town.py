@@ -14,8 +14,7 @@ from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, stage_name
 from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.starter import starter_plan, starter_stages
-from cns_drake.city.geometry.polygons import polygons_of
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry import Structure, polygons_of
 from cns_drake.city.ground.streets import street_surfaces
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.open_ground import place_car
