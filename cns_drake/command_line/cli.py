@@ -48,7 +48,7 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
         "age suburbia \\",
         "    --years 1 5 20 --seed 1 --output old_suburbia",
     ),
-    city: ("city town --start", "cns-drake city town --calibrate 01 02"),
+    city: ("city town --start",),
 }
 # Commands whose names are no names of functions.
 _NAMES = {list_drives: "list", import_city: "import"}

@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base.commands import Jobs
 from cns_drake.base.csv_files import whole_number
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
 from cns_drake.imports.options import (
@@ -297,10 +295,6 @@ def city(
     seed: Annotated[int, typer.Option(min=0, metavar="N")] = 0,
     check: Annotated[bool, typer.Option("--check")] = False,
     repair_stages: Annotated[bool, typer.Option("--repair-stages")] = False,
-    calibrate: Annotated[
-        tuple[str, str] | None, typer.Option(metavar="EARLIER LATER")
-    ] = None,
-    jobs: Jobs = None,
 ) -> None:
     """Build a city from its roads and plan.
 
@@ -313,13 +307,7 @@ def city(
         check: Write nothing; exit with 1 if a file would change.
         repair_stages: Update stages.yaml after the plan has grown: structures
             that have kept their place in structures.csv get their new names.
-        calibrate: Generate nothing. Simulate the drives of two stages, such as
-            01 04, and show TCR_sym and each method without the offset of the
-            routes, without absent structures, and without lower ones.
     """
-    if calibrate is not None:
-        _calibrate(folder, *calibrate, jobs)
-        return
     with uninterrupted():
         from cns_drake.city.generation.generate import (
             differing_files,
@@ -340,23 +328,6 @@ def city(
     files = generate_city(folder, note, repair_stages=repair_stages)
     write_table(folder, note)
     note(f"{len(files)} files")
-
-
-def _calibrate(
-    folder: Path, earlier: str, later: str, jobs: int | None
-) -> None:
-    with uninterrupted():  # Only --calibrate needs the evaluation.
-        from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.studies.knob_effects import effect_lines, knob_effects
-
-    first, last = (
-        load_scenario(MapFolder(folder).drive(stage))
-        for stage in (earlier, later)
-    )
-    effects = knob_effects(first, last, choose_cluster(jobs, None))
-    for line in effect_lines(effects):
-        print(line)
 
 
 def maps_and_years(

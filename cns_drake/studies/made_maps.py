@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import abc
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 import hashlib
 from pathlib import Path
-import shutil
 from typing import Any
 
 from cns_drake.ageing.aged_map import age_map
@@ -18,11 +16,10 @@ from cns_drake.ageing.rates import (
     read_rates,
 )
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes, user_errors
+from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.options import ImportOptions
@@ -30,50 +27,15 @@ from cns_drake.scenarios.provenance import digest_file
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.studies.experiment import Experiment, MadeMap
-from cns_drake.studies.redrawing import RedrawCity
-from evaluation.study.parts import Part
+from cns_drake.studies.redrawing import MakeMap, RedrawCity, make_maps
 
-# The file in its folder with the fingerprint of a made map.
-_PART = "made.data"
 _FACTOR = "factor"
 # The only stage of a city that is drawn anew.
 _STAGE = "01"
 
 
 @dataclass(frozen=True)
-class _MakeMap(Step):
-    """Makes the folder of a map, in place of one of other inputs."""
-
-    folder: Path
-
-    @property
-    def output(self) -> Path:
-        return self.folder
-
-    def is_done(self) -> bool:
-        # A folder that has its final name is complete.
-        return Part(self.folder / _PART).is_current(self._made_of())
-
-    def run(self, reporter: Reporter) -> None:
-        made_of = self._made_of()
-        if (self.folder / _PART).is_file():
-            with user_errors(self.folder):
-                shutil.rmtree(self.folder)
-        self._make(
-            lambda draft: Part(draft / _PART).write(made_of, None), reporter
-        )
-
-    @abc.abstractmethod
-    def _make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        """Makes the folder; `finish` completes it before it gets its name."""
-
-    @abc.abstractmethod
-    def _made_of(self) -> dict[str, object]:
-        """Returns all that the map depends on, ready for JSON."""
-
-
-@dataclass(frozen=True)
-class AgeCity(_MakeMap):
+class AgeCity(MakeMap):
     """Lets a city live for some years, with a stage after each of them."""
 
     source: Path
@@ -81,7 +43,7 @@ class AgeCity(_MakeMap):
     seed: int
     rates: tuple[tuple[str, float], ...]
 
-    def _make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
+    def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
         age_map(
             self.source,
             self.years,
@@ -91,7 +53,7 @@ class AgeCity(_MakeMap):
             finish=lambda draft, _: finish(draft),
         )
 
-    def _made_of(self) -> dict[str, object]:
+    def sources(self) -> dict[str, object]:
         files = MapFolder(self.source).files()
         return {
             "files": {one.name: digest_file(one) for one in files},
@@ -103,13 +65,13 @@ class AgeCity(_MakeMap):
 
 
 @dataclass(frozen=True)
-class ImportCity(_MakeMap):
+class ImportCity(MakeMap):
     """Imports the file of a real city."""
 
     source: Path
     options: ImportOptions
 
-    def _make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
+    def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
         import_city(
             self.source,
             self.folder,
@@ -118,7 +80,7 @@ class ImportCity(_MakeMap):
             lambda draft, _: finish(draft),
         )
 
-    def _made_of(self) -> dict[str, object]:
+    def sources(self) -> dict[str, object]:
         return {
             "file": digest_file(self.source),
             "options": repr(self.options),
@@ -169,7 +131,7 @@ class MadeMaps:
         source = map_folder(drive).path.resolve()
         folder, stage = self.redrawn(drive, seed)
         path = Path(folder)
-        self._steps[path] = RedrawCity(source, stage, seed, path)
+        self._steps[path] = RedrawCity(path, source, stage, seed)
         return str(drive.map), str(drive.stage)
 
     def aged(
@@ -191,7 +153,7 @@ class MadeMaps:
         Raises:
             InputError: one could not be made; all are named.
         """
-        steps = [
+        aged = [
             AgeCity(
                 self._aged_folder(path, rates, seed),
                 path,
@@ -201,15 +163,7 @@ class MadeMaps:
             )
             for (path, rates, seed), years in self._ages.items()
         ]
-        every: list[tuple[Path, Step]] = [(one.folder, one) for one in steps]
-        every += self._steps.items()
-        run_jobs(
-            [
-                Job(f"city {folder.name}", step, cost=15.0)
-                for folder, step in every
-            ],
-            cluster,
-        )
+        make_maps([*aged, *self._steps.values()], self.folder, cluster)
 
     def _key(
         self, drive: Scenario, rates: Any, seed: int
@@ -244,7 +198,7 @@ class MadeMaps:
 
 def made_map_step(
     made: MadeMap, experiment: Experiment, folder: Path, shipped: Mapping
-) -> _MakeMap:
+) -> MakeMap:
     """Returns the step that makes a map of an experiment in a folder.
 
     Raises:

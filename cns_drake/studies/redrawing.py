@@ -9,12 +9,14 @@ whole, so that their streets lie off the axes of the world. `worlds/fresh.csv`
 holds the seeds and turns, drawn before any method ran.
 """
 
-from collections.abc import Mapping, Sequence
+import abc
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 import math
 import os
 from pathlib import Path
+import shutil
 from typing import Any
 
 import yaml
@@ -37,8 +39,10 @@ from evaluation.study.parts import Part
 
 # The first line of each input that is written here.
 _MARK = b"# Of a city drawn anew by cns-drake"
-# The file in its folder with the fingerprint of a city.
+# The file in its folder with the fingerprint of a map.
 _PART = "drawn.data"
+# Expected seconds to make a map.
+_COST = 15.0
 # Fields of inputs that hold a place, and lists of places.
 _PLACES = frozenset({"position", "at", "block", "start", "end"})
 _LISTS_OF_PLACES = frozenset({"via", "area", "line", "within", "points"})
@@ -68,30 +72,18 @@ def redraw_cities(
     folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
     # Quick checks come before all slow work.
     load_plan(MapFolder(map_folder).plan)
-    for folder in folders.values():
-        _is_replaced(folder)
-    files.make_folder(output)
-    jobs = [
-        Job(
-            name=f"city {folder.name}",
-            step=RedrawCity(map_folder, stage, seed, folder),
-        )
+    steps = [
+        RedrawCity(folder, map_folder, stage, seed)
         for seed, folder in folders.items()
     ]
-    run_jobs(jobs, cluster)
+    make_maps(steps, output, cluster)
     return folders
 
 
 @dataclass(frozen=True)
-class RedrawCity(Step):
-    """Draws the city of a map anew, with one stage, the whole city.
+class MakeMap(Step):
+    """Makes the folder of a map, in place of an older one that it made."""
 
-    An older redrawn city in `folder` is replaced, anything else is refused.
-    """
-
-    map_folder: Path
-    stage: str
-    seed: int
     folder: Path
 
     @property
@@ -103,8 +95,69 @@ class RedrawCity(Step):
         return Part(self.folder / _PART).is_current(self.sources())
 
     def run(self, reporter: Reporter) -> None:
-        folder, made_of = self.folder, self.sources()
-        with files.draft_folder(folder, replaces=True) as draft:
+        made_of = self.sources()
+        if is_older := self.check():
+            with files.user_errors(self.folder):
+                shutil.rmtree(self.folder)
+        self.make(
+            lambda draft: Part(draft / _PART).write(made_of, None), reporter
+        )
+        if is_older:
+            reporter.note(
+                f"{self.folder}: replaced, since its inputs have changed"
+            )
+
+    def check(self) -> bool:
+        """Returns whether an older one is there.
+
+        Raises:
+            InputError: anything else has its name.
+        """
+        with files.user_errors(self.folder):
+            is_there = os.path.lexists(self.folder)
+            if is_there and not (self.folder / _PART).is_file():
+                raise InputError(
+                    f"{self.folder}: this folder is there already and is not a"
+                    " map that a study made; remove it or give another output"
+                )
+        return is_there
+
+    @abc.abstractmethod
+    def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
+        """Makes the folder; `finish` completes it before it gets its name."""
+
+    @abc.abstractmethod
+    def sources(self) -> dict[str, object]:
+        """Returns all that the map depends on, ready for JSON."""
+
+
+def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
+    """Makes maps in a folder, with progress on stderr; finished ones are kept.
+
+    Raises:
+        InputError: another file or folder has the name of a map, or some could
+            not be made; all are named.
+    """
+    # Quick checks come before all slow work.
+    for step in steps:
+        step.check()
+    if steps:
+        files.make_folder(output)
+    jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
+    run_jobs(jobs, cluster)
+
+
+@dataclass(frozen=True)
+class RedrawCity(MakeMap):
+    """Draws the city of a map anew, with one stage, the whole city."""
+
+    map_folder: Path
+    stage: str
+    seed: int
+
+    def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
+        del reporter
+        with files.draft_folder(self.folder) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)
             try:
@@ -115,11 +168,7 @@ class RedrawCity(Step):
                 raise InputError(
                     f"{self.map_folder}: seed {self.seed}: {fault}"
                 ) from error
-            Part(draft / _PART).write(made_of, None)
-            if _is_replaced(folder):
-                reporter.note(
-                    f"{folder}: replaced, since its inputs have changed"
-                )
+            finish(draft)
 
     def inputs(self) -> dict[str, bytes]:
         """Returns name -> content of the inputs of the city."""
@@ -176,20 +225,6 @@ def to_yaml(title: str, values: dict) -> bytes:
     return f"{comment}\n{text}".encode()
 
 
-def _is_replaced(folder: Path) -> bool:
-    """Returns whether an older redrawn city has this name."""
-    plan = MapFolder(folder).plan
-    with files.user_errors(folder):
-        if not os.path.lexists(folder):
-            return False
-        if not (plan.is_file() and plan.read_bytes().startswith(_MARK)):
-            raise InputError(
-                f"{folder}: this folder is there already and is not a redrawn "
-                "city; remove it or give another output"
-            )
-    return True
-
-
 @dataclass(frozen=True)
 class Version:
     """A version of a shipped map, from 1 on, turned about the origin [deg]."""
@@ -235,18 +270,17 @@ def draw_fresh_cities(
                 )
     steps = [
         DrawFreshCity(
+            output.resolve() / f"{one.map_name}_f{one.number:02d}",
             shipped_maps()[one.map_name],
             max(MapFolder(shipped_maps()[one.map_name]).stages()),
             one.seed,
-            output.resolve() / f"{one.map_name}_f{one.number:02d}",
             one.turn_deg,
         )
         for one in versions
         if (not maps or one.map_name in maps)
         and (not numbers or one.number in numbers)
     ]
-    files.make_folder(output)
-    run_jobs([Job(f"city {step.folder.name}", step) for step in steps], cluster)
+    make_maps(steps, output, cluster)
     return [step.folder for step in steps]
 
 

@@ -49,7 +49,7 @@ from cns_drake.studies.experiment import (
 from cns_drake.studies.frozen import check_frozen
 from cns_drake.studies.made_maps import MadeMaps, made_map_step
 from cns_drake.studies.recording import is_recorded
-from cns_drake.studies.redrawing import draw_fresh_cities
+from cns_drake.studies.redrawing import draw_fresh_cities, make_maps
 from cns_drake.studies.tasks.change import ChangeTask
 from cns_drake.studies.tasks.cost import CostTask
 from cns_drake.studies.tasks.localise import LocaliseTask
@@ -310,8 +310,7 @@ class Study:
         if isinstance(one, MadeMap):
             folder = self.output / "cities" / one.name
             step = made_map_step(one, self.experiment, folder, shipped_maps())
-            make_folder(self.output)
-            run_jobs([Job(f"city {one.name}", step, cost=15.0)], self.cluster)
+            make_maps([step], folder.parent, self.cluster)
             yield _Drives(one.name, {}, self._pairs(folder))
             return
         path = shipped_maps().get(one, Path(one))

@@ -19,7 +19,6 @@ from cns_drake.base.files import check_writable, completing, make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.npz_files import read_npz
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.version import __version__
 from cns_drake.studies.training_drives import DrawnCity, scan_city
@@ -55,8 +54,6 @@ _RATE, _LEAST_RATE, _WARM_UP = 2e-3, 2e-5, 30
 _DECAYS = (0.9, 0.99)
 _GRADIENT = 1.0
 _KEPT_EVERY = 50
-# Greatest size of a state [bytes].
-_MOST_STATE = 1 << 26
 
 Parameters = dict[str, Any]
 
@@ -341,8 +338,19 @@ def train(
         return values, first, second, value, right
 
     sampler = Sampler(scans, seed)
-    key = json.dumps([WEIGHTS_VERSION, digest, len(scans.xy), steps, seed])
-    moments, curve = _read_state(state, key, seed)
+    made_of = {
+        "training": [WEIGHTS_VERSION, digest, len(scans.xy), steps, seed]
+    }
+    kept = Part(state)
+    start = start_parameters(seed)
+    zero = {name: np.zeros_like(one) for name, one in start.items()}
+    moments, curve = (start, zero, zero), []
+    if state.exists():
+        if not kept.is_current(made_of):
+            raise InputError(
+                f"{state}: damaged, or the state of another training; delete it"
+            )
+        moments, curve = kept.read()
     begin = len(curve)
     for step in track(range(begin, steps), "training", steps - begin):
         batch = sampler.batch(step)
@@ -356,54 +364,11 @@ def train(
         moments = tuple(new)
         curve.append((float(value), float(right)))
         if (step + 1) % _KEPT_EVERY == 0 or step + 1 == steps:
-            _write_state(state, key, moments, curve)
+            known = [{k: np.asarray(v) for k, v in one.items()} for one in new]
+            kept.write(made_of, (tuple(known), curve))
             on_step(step + 1, moments[0])
     values = {name: np.asarray(one) for name, one in moments[0].items()}
     return values, np.array(curve)
-
-
-_Moments = tuple[Parameters, ...]
-_PREFIXES = ("value", "first", "second")
-
-
-def _read_state(
-    path: Path, key: str, seed: int
-) -> tuple[_Moments, list[tuple[float, float]]]:
-    """Returns weights and moments, and the curve so far."""
-    start = start_parameters(seed)
-    zero = {name: np.zeros_like(one) for name, one in start.items()}
-    if not path.exists():
-        return (start, zero, zero), []
-    names = [f"{prefix}_{name}" for prefix in _PREFIXES for name in start]
-    try:
-        file = read_npz(path, ("key", "curve", *names), _MOST_STATE)
-        if str(file["key"]) != key:
-            raise InputError(
-                f"{path}: the state of another training; delete it"
-            )
-        moments = tuple(
-            {name: file[f"{prefix}_{name}"] for name in start}
-            for prefix in _PREFIXES
-        )
-        return moments, [tuple(row) for row in file["curve"].tolist()]
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{path}: damaged ({error}); delete it") from error
-
-
-def _write_state(
-    path: Path,
-    key: str,
-    moments: _Moments,
-    curve: Sequence[tuple[float, float]],
-) -> None:
-    values: dict[str, Any] = {
-        f"{prefix}_{name}": np.asarray(one)
-        for prefix, part in zip(_PREFIXES, moments, strict=True)
-        for name, one in part.items()
-    }
-    values |= {"key": key, "curve": np.array(curve)}
-    with completing(path) as part_file, open(part_file, "wb") as stream:
-        np.savez(stream, **values)
 
 
 def write_weights(
@@ -513,7 +478,7 @@ def make_weights(
     )
     digest = fingerprint({"cities": [part.identity() for part in parts]})
     values, curve = train(
-        scans, plan.steps, plan.seed, work / "state.npz", digest, track
+        scans, plan.steps, plan.seed, work / "state.data", digest, track
     )
     seen = scans.images.any(axis=(1, 3)).mean(axis=1)
     least = float(seen.min()) * (1.0 - _HIDDEN_DEG[1] / 360.0)

@@ -52,8 +52,6 @@ from evaluation.results.table_forms import (
 _MEASURES = {"AUC": "auc", "strict": "auc_strict", "R@1": "recall_at_1"}
 # The reference has this, too.
 _PUBLISHED = {**_MEASURES, "F1": "f1_max"}
-# A difference with a smaller p-value is beyond doubt.
-_SIGNIFICANCE = 0.05
 # Frame, time and pose of a sensor, as columns of files.
 _MOMENT = ("frame", "stamp_ns", "x", "y", "z", "qx", "qy", "qz", "qw")
 
@@ -344,19 +342,6 @@ def method_differences(
         MethodDifference(*pair, one, p)
         for pair, one, p in zip(both, found, corrected, strict=True)
     ]
-
-
-def beaten(
-    differences: Iterable[MethodDifference],
-) -> set[tuple[tuple[str, str, str], str]]:
-    """Returns pair and name of methods that another beats beyond doubt."""
-    found = set()
-    for one in differences:
-        if one.p_value < _SIGNIFICANCE:
-            is_first_less = one.difference.value < 0.0
-            worse = one.result if is_first_less else one.other
-            found.add((worse.pair, worse.method))
-    return found
 
 
 def difference_numbers(differences: Sequence[MethodDifference]) -> Table:

@@ -117,17 +117,6 @@ class Table:
             caption,
         )
 
-    @classmethod
-    def of_rows(cls, rows: Sequence[Mapping[str, object]]) -> Table:
-        """Returns a table of rows that all have the same columns.
-
-        A row with lists or arrays stands for several, see `Columns`.
-        """
-        return cls(
-            tuple(rows[0]) if rows else (),
-            tuple(line for row in rows for line in _rows(list(row.values()))),
-        )
-
     def without_empty(self, name: str) -> Table:
         """Returns the table without a column that has no value in any row."""
         column = self.header.index(name)

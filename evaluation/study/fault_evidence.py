@@ -39,14 +39,14 @@ _COINCIDENT = 1.0
 
 def explain_faults(
     reporter: Reporter,
-    surveyed: tuple[tuple[Part, Part], tuple[Part, Part]],
+    drives: tuple[Part, Part],
     methods: tuple[MethodChoice, ...],
     results: tuple[Part, ...],
     protocol: RetrievalProtocol,
 ) -> PairEvidence | None:
     """Returns the evidence of two drives; None if a drive closes no loop.
 
-    The database and the query are each a `SurveyedDrive` and `KeptScans`.
+    The database and the query are each a `KeptDrive`.
     """
     found = []
     for choice, part in zip(methods, results, strict=True):
@@ -55,15 +55,13 @@ def explain_faults(
         found.append(part.read())
     if None in found or not found:
         return None
-    database, query = (
-        KeptDrive(drive.read(), scans.read()) for drive, scans in surveyed
-    )
+    database, query = (part.read() for part in drives)
     return find_evidence(database, query, found, protocol, reporter.track)
 
 
 def find_evidence(
-    database: Drive,
-    query: Drive,
+    database: Drive | KeptDrive,
+    query: Drive | KeptDrive,
     results: Sequence[RecognitionResult],
     protocol: RetrievalProtocol,
     track: Track = silent,
@@ -153,7 +151,9 @@ class _Shown:
     instances: np.ndarray | None
 
     @classmethod
-    def of(cls, drive: Drive, frame: int, max_range: float) -> _Shown:
+    def of(
+        cls, drive: Drive | KeptDrive, frame: int, max_range: float
+    ) -> _Shown:
         scan = drive.scan(frame)
         points = xyz(scan)
         kept = within_range(points, max_range)

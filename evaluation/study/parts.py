@@ -468,7 +468,7 @@ class SurveyFiles:
 
     @property
     def scans(self) -> Part:
-        """The scans of places and queries: a `KeptScans`, or a list."""
+        """The scans of places and queries: a `KeptDrive`, or a list."""
         return Part(self.folder / "scans.data")
 
     def described(self, key: str) -> Part:

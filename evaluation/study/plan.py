@@ -297,7 +297,7 @@ class Study:
                 results.evidence,
                 explain_faults,
                 (
-                    tuple((one.drive, one.scans) for one in surveys),
+                    tuple(one.scans for one in surveys),
                     self.methods,
                     tuple(results.result(one.key) for one in self.methods),
                     self.protocol,

@@ -7,13 +7,12 @@ drive, not the drive.
 
 from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, field
-import io
 import os
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
 import numpy as np
-import zstandard
+from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
@@ -39,8 +38,6 @@ Further: TypeAlias = (
 )
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
-# Greatest size of a kept scan; one in a file is smaller [bytes].
-_MOST_BYTES = 1 << 29
 
 
 class MappedDrive(RecentScans):
@@ -173,62 +170,31 @@ class SurveyedDrive:
 
 
 @dataclass(frozen=True)
-class KeptScans:
-    """The scans of a drive's places and queries.
+class KeptDrive:
+    """The scans of a drive's places and queries, and nothing else of it.
 
-    Each frame has coordinates and instances (see `Drive.instances`) of the
-    points within range, packed as an .npy file, compressed by zstd.
+    Attributes:
+        name: name of the drive.
+        X_WS: (N, 4, 4) poses of the sensor at all frames.
+        instances: see `Drive.instances`.
+        scans: frame -> coordinates and instances of the points within range.
     """
 
-    packed: dict[int, bytes] = field(default_factory=dict)
-    instances: Mapping[int, Mapping] | None = None
+    name: str
+    X_WS: np.ndarray
+    instances: Mapping[int, Mapping] | None
+    scans: dict[int, np.ndarray] = field(default_factory=dict)
 
     def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
         """Keeps a scan; see `Drive.scan` and `within_range`."""
         names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
-        points = np.empty(len(scan), [(one, scan.dtype[one]) for one in names])
-        for name in names:
-            points[name] = scan[name]
-        stream = io.BytesIO()
-        np.save(stream, points[within_range(xyz(scan), max_range)])
-        self.packed[frame] = zstandard.compress(stream.getvalue(), 1)
-
-    def scan(self, frame: int) -> np.ndarray:
-        """Returns a scan; see `Drive.scan`."""
-        packed = self.packed[frame]
-        size = zstandard.frame_content_size(packed)
-        if not 0 <= size <= _MOST_BYTES:
-            raise InputError(f"scan {frame}: {size} bytes; delete its part")
-        plain = zstandard.decompress(packed)
-        return np.load(io.BytesIO(plain), allow_pickle=False)
-
-
-class KeptDrive(Drive):
-    """A surveyed drive with the scans that were kept, and no others."""
-
-    def __init__(self, surveyed: SurveyedDrive, kept: KeptScans):
-        """Joins both parts of a survey."""
-        self.name = surveyed.name
-        self.world_frame = surveyed.placed.world_frame
-        self._surveyed, self._kept = surveyed, kept
-
-    def __len__(self) -> int:
-        return len(self.stamps_ns)
-
-    @property
-    def stamps_ns(self) -> np.ndarray:
-        return self._surveyed.stamps_ns
-
-    @property
-    def X_WS(self) -> np.ndarray:
-        return self._surveyed.X_WS
+        kept = within_range(xyz(scan), max_range)
+        # A view would hold all fields.
+        self.scans[frame] = repack_fields(scan[names][kept])
 
     def scan(self, index: int) -> np.ndarray:
-        return self._kept.scan(index)
-
-    @property
-    def instances(self) -> Mapping[int, Mapping] | None:
-        return self._kept.instances
+        """Returns a scan that was kept."""
+        return self.scans[index]
 
 
 @dataclass(frozen=True)
@@ -244,7 +210,7 @@ class RecordingSurvey:
 
     placed: PlacedDrive
     described: dict[str, description.DescribedDrive]
-    scans: KeptScans | list[np.ndarray] | None = None
+    scans: KeptDrive | list[np.ndarray] | None = None
     drive: SurveyedDrive | None = None
     fine: np.ndarray | None = None
 
@@ -287,8 +253,10 @@ def survey_recording(
     mapped = MappedDrive(recording, number) if with_map else None
     drive = mapped or RecentScans(recording, number)
     seen: list[np.ndarray] = []
-    instances = recording.instances if with_map and with_scans else None
-    kept = KeptScans(instances=instances and dict(instances))
+    kept: KeptDrive | None = None
+    if with_map and with_scans:
+        known = recording.instances
+        kept = KeptDrive(drive.name, drive.X_WS, known and dict(known))
 
     def keep(frame: int, cloud: np.ndarray) -> None:
         if mapped is None:
@@ -297,7 +265,7 @@ def survey_recording(
         # Pictures show the scan as recorded, whatever its query sees.
         frames.append(frame)
         scan = mapped.scan(frame)
-        if with_scans:
+        if kept is not None:
             kept.keep(frame, scan, protocol.max_range)
         height = MethodConfig().sensor_height
         shown = cropped(scan, protocol.max_range)
@@ -334,8 +302,7 @@ def survey_recording(
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )
-    scans = kept if with_scans else None
-    return RecordingSurvey(placed, described, scans, surveyed, fine)
+    return RecordingSurvey(placed, described, kept, surveyed, fine)
 
 
 @dataclass(frozen=True)

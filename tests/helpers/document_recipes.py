@@ -95,7 +95,6 @@ RECIPES = {
     "help: city": Recipe(
         "cns-drake city town --start\n",
         after=("start a city",),
-        prints=("TCR_sym",),
     ),
     "own city": Recipe(
         ".venv/bin/cns-drake list town\n",
@@ -151,10 +150,10 @@ RECIPES = {
         after=("imported scenario",),
         prints=("stage 01",),
     ),
-    "calibration": Recipe(
-        _CITY + "town --calibrate",
+    "study of an own city": Recipe(
+        ".venv/bin/cns-drake study stages town --quick",
         after=("repair stages",),
-        prints=("TCR_sym",),
+        makes=("town_change/results.csv",),
     ),
     "repair stages": Recipe(
         _CITY + "town --repair-stages",

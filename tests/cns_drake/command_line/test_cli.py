@@ -252,7 +252,6 @@ def test_output_that_cannot_be_written(files, capfd, command):
     [
         (["{files}/none"], "none/roads.yaml: "),
         (["{files}", "--seed", "-1"], "--seed"),
-        (["{files}", "--calibrate", "01", "77"], "sequence_01.yaml: no such"),
     ],
 )
 def test_faults_of_city_are_one_line(files, capfd, arguments, fault):

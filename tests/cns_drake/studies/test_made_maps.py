@@ -14,7 +14,7 @@ from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.studies import made_maps
+from cns_drake.studies import redrawing
 from cns_drake.studies.experiment import Experiment, MadeMap, load_experiment
 from cns_drake.studies.made_maps import AgeCity, MadeMaps, made_map_step
 from cns_drake.studies.redrawing import RedrawCity
@@ -41,7 +41,7 @@ def steps(monkeypatch):
     """The steps of the jobs of each run, which are not done."""
     runs = []
     monkeypatch.setattr(
-        made_maps,
+        redrawing,
         "run_jobs",
         lambda jobs, cluster: runs.append([job.step for job in jobs]),
     )
@@ -95,7 +95,7 @@ def test_a_city_is_drawn_anew_for_each_version(town, tmp_path, steps):
     folders = [tmp_path / "town_c7", tmp_path / "town_c0"]
     assert steps == [
         [
-            RedrawCity(town.resolve(), "01", seed, folder)
+            RedrawCity(folder, town.resolve(), "01", seed)
             for seed, folder in zip((7, 0), folders, strict=True)
         ]
     ]
@@ -135,7 +135,7 @@ def test_versions_that_cannot_be(town, tmp_path, version):
 def test_an_older_city_is_made_once_and_anew_when_its_inputs_change(
     town, tmp_path, monkeypatch
 ):
-    studies.run_here(monkeypatch, made_maps)
+    studies.run_here(monkeypatch, redrawing)
     rates = tuple(sorted(DEFAULT_RATES.items()))
     step = AgeCity(tmp_path / "old", town, (2,), 1, rates)
     assert not step.is_done()

@@ -192,7 +192,7 @@ def test_what_was_drawn_of_something_else_is_replaced(
         }[change]
         assert old in text
         file.write_text(text.replace(old, new))
-    step = RedrawCity(town, "02", 4, folder)
+    step = RedrawCity(folder, town, "02", 4)
     assert not step.is_done()
     notes = []
     step.run(Reporter(lambda kind, text: notes.append(text)))
@@ -223,7 +223,7 @@ def test_anything_else_of_that_name_is_left_alone(town, tmp_path, other):
     with pytest.raises(
         InputError, match=r"town_c4: this folder is there already"
     ):
-        RedrawCity(town, "02", 4, folder).run(Reporter())
+        RedrawCity(folder, town, "02", 4).run(Reporter())
     assert contents(tmp_path) == before
     assert [p.name for p in folder.parent.iterdir()] == ["town_c4"]
 

@@ -15,7 +15,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import DriveSimulation
-from cns_drake.studies import made_maps
+from cns_drake.studies import redrawing
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
@@ -533,7 +533,7 @@ class PlannedError(Exception):
 def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
     runs = []
     monkeypatch.setattr(
-        made_maps, "run_jobs", lambda jobs, _: runs.append([*jobs])
+        redrawing, "run_jobs", lambda jobs, _: runs.append([*jobs])
     )
 
     def stop(jobs, cluster):
