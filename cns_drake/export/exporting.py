@@ -15,10 +15,17 @@ from cns_drake.base.drives.deskewing import deskew
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.export.layouts import CNS, KITTI, TUM, Layout, kitti_layout
+from cns_drake.export.layouts import (
+    CNS,
+    KITTI,
+    MULRAN,
+    TUM,
+    Layout,
+    kitti_layout,
+)
 from cns_drake.recording.rosbag2_metadata import to_yaml
 
-_LAYOUTS = {"cns": CNS, "kitti": KITTI, "tum": TUM}
+_LAYOUTS = {"cns": CNS, "kitti": KITTI, "mulran": MULRAN, "tum": TUM}
 _MARKER = "export.yaml"
 
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import yaml
 
 from cns_drake.base import poses
+from cns_drake.base.drives import mulran_frames
 from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import encode_bin, encode_labels, encode_pcd
@@ -300,4 +301,25 @@ def _tum_inner_files(drive: McapDrive) -> dict[str, str]:
 TUM = Layout(
     lambda drive: PurePosixPath(checked_name(drive, drive.name)),
     _tum_inner_files,
+)
+
+
+def _mulran_inner_files(drive: McapDrive) -> dict[str, str]:
+    # The vehicle stands where MulRan's mount has it below this LiDAR.
+    X_UB = drive.X_WS @ poses.inverse(mulran_frames.X_BS)
+    X_UB[:, :3, 3] += mulran_frames.ORIGIN
+    rows = X_UB[:, :3].reshape(-1, 12)
+    return {
+        "global_pose.csv": stamped_rows(drive.stamps_ns.tolist(), [rows], ","),
+        **imu_files(drive),
+        **scenario_files(drive),
+    }
+
+
+MULRAN = Layout(
+    lambda drive: PurePosixPath(checked_name(drive, drive.name)),
+    _mulran_inner_files,
+    scan_files=lambda _, frame, stamp_ns, scan: {
+        f"Ouster/{stamp_ns}.bin": encode_bin(scan)
+    },
 )
