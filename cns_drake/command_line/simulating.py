@@ -292,7 +292,9 @@ def generate(
 
 def export(
     drive: Annotated[Path, typer.Argument(metavar="DRIVE")],
-    layout: Annotated[Literal["cns", "kitti", "tum"], typer.Option("--format")],
+    layout: Annotated[
+        Literal["cns", "kitti", "mulran", "tum"], typer.Option("--format")
+    ],
     output: Annotated[Path, typer.Option()],
     sensor: Annotated[str | None, typer.Option(metavar="NAME")] = None,
     absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
@@ -304,8 +306,8 @@ def export(
 
     Args:
         drive: A recorded folder, or its .mcap file.
-        layout: Layout: CNS data set, KITTI odometry, or TUM (the trajectory
-            alone).
+        layout: Layout: CNS data set, KITTI odometry, MulRan, or TUM (the
+            trajectory alone).
         output: Folder of drives: new, empty, or of earlier exports.
         sensor: Name of the LiDAR, if there are several.
         absent_in: Label points on structures that this stage of the map lacks

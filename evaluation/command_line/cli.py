@@ -35,6 +35,8 @@ RENAMED = {
     "trend": "cns-drake study FILE.yaml FOLDER",
 }
 
+_NOT_FINITE = "points are not finite, and left out"
+
 app = terminal.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
@@ -89,9 +91,7 @@ def tcr(
             terminal.note(note)
         ignored = one.voxels.num_ignored
         if ignored:
-            terminal.note(
-                f"{one.name}: {ignored} points are not finite, and left out"
-            )
+            terminal.note(f"{one.name}: {ignored} {_NOT_FINITE}")
     for alignment in alignments:
         terminal.note(alignment.to_text())
     options.show(report.to_json(), _change_rows(report), json=json)
@@ -163,6 +163,7 @@ def pr(
     """
     from cns_drake.base import files
     from cns_drake.base.errors import InputError
+    from evaluation.drives.drive_views import CountedDrive
     from evaluation.recognition import overlap_truth, place_recognition
 
     if turn_queries is not None:
@@ -198,6 +199,8 @@ def pr(
         align,
         across_maps=across_maps,
     )
+    counted = [CountedDrive(one) for one in (places, query_drive)]
+    places, query_drive = counted
     exact = None
     if exact_overlaps is not None:
         frames = overlap_truth.compared_frames(places, query_drive, protocol)
@@ -217,6 +220,9 @@ def pr(
     ):
         if note is not None:
             terminal.note(note)
+    for one in counted:
+        if one.num_ignored:
+            terminal.note(f"{one.name}: {one.num_ignored} {_NOT_FINITE}")
     if overlaps is not None:
         found = result.retrieval
         assert found.overlaps is not None
@@ -281,7 +287,7 @@ def scores(
         on_note=terminal.note,
     )
     if num_ignored:
-        terminal.note(f"{num_ignored} points are not finite, and left out")
+        terminal.note(f"{num_ignored} {_NOT_FINITE}")
     terminal.note(f"wrote {output}")
     if (note := chosen.assumption(None)) is not None:
         terminal.note(note)
@@ -306,6 +312,7 @@ def report(
     method: options.OwnMethods = None,
     parameter: commands.MethodSettings = None,
     lidar: options.LidarName = None,
+    columns: options.Columns = None,
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     costs: commands.Costs = True,
@@ -336,6 +343,7 @@ def report(
         with_costs=costs,
         reference_for=reference_for,
         lidar=lidar,
+        columns=columns,
     )
     print(path)
 

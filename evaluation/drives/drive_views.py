@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cns_drake.base import points
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.lidar_fields import LidarField
 
@@ -78,6 +79,28 @@ class MovedDrive(DriveView):
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
         return self._drive.instances
+
+
+class CountedDrive(MovedDrive):
+    """Another drive, which counts the points that are not finite.
+
+    Attributes:
+        num_ignored: number of such points in the scans that were read.
+    """
+
+    def __init__(self, drive: Drive):
+        super().__init__(drive, drive.X_WS, drive.world_frame, drive.datum)
+        self._ignored: dict[int, int] = {}
+
+    def scan(self, index: int) -> np.ndarray:
+        scan = super().scan(index)
+        finite = np.isfinite(points.xyz(scan)).all(axis=1)
+        self._ignored[index] = len(scan) - int(finite.sum())
+        return scan
+
+    @property
+    def num_ignored(self) -> int:
+        return sum(self._ignored.values())
 
 
 class RecentScans(DriveView):

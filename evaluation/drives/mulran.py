@@ -10,9 +10,9 @@ is on the ground. Times are whole nanoseconds.
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
+from cns_drake.base.drives.drive import read_scenario
+from cns_drake.base.drives.mulran_frames import X_BS
 from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
     DATUM,
@@ -35,18 +35,6 @@ _NUM_COLUMNS = 1024
 _SWEEP_NS = 100_000_000
 # Poses have a rate of 100 Hz.
 _LONGEST_GAP_NS = 1_000_000_000
-
-# Pose of the LiDAR on the vehicle, from the data set's calib_base2ouster. Read
-# as its name says, it puts the LiDAR above the base. Other programs apply its
-# inverse. Since it turns by almost 180 degrees, the inverse puts the LiDAR
-# within a centimetre of the same horizontal position, but 1.8 m below the
-# ground.
-_X_BS = poses.make_pose(
-    Rotation.from_euler(
-        "xyz", [0.0001, 0.0003, 179.6654], degrees=True
-    ).as_matrix(),
-    np.array([1.7042, -0.021, 1.8047]),
-)
 
 
 class MulranDrive(BinDrive):
@@ -90,16 +78,18 @@ class MulranDrive(BinDrive):
             )
         else:
             X_UB = to_world(X_UB, trajectory.path)
+        scenario = read_scenario(path)  # An export of cns-drake has one.
         super().__init__(
             columns,
             name=name,
             world_frame=f"mulran/{name if local else DATUM}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
-            X_WS=X_UB @ _X_BS,
+            X_WS=X_UB @ X_BS,
             notes=notes,
             datum=None if local else DATUM,
-            unit="os1-64-33",
+            scenario=scenario,
+            unit="os1-64-33" if scenario is None else None,
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:

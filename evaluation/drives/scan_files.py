@@ -10,6 +10,7 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
+from cns_drake.base.drives.mulran_frames import ORIGIN
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import read_bytes, user_errors
 from cns_drake.base.points import FARTHEST_RETURN, check_range
@@ -18,11 +19,6 @@ from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
 DATUM = "utm-52n"
-
-# Easting, northing and height of the origin of W [m]. It is in Daejeon. Its
-# coordinates are multiples of the voxel size, so that voxels have the same
-# borders as on the UTM grid.
-ORIGIN = (350_000.0, 4_020_000.0, 0.0)
 
 # Ranges of easting and northing on the northern half of the Earth.
 _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))

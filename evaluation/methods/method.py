@@ -38,6 +38,9 @@ class MethodConfig(BaseModel):
         place: which of the merged scans stands for a place, `middle` or
             `first`; None for the choice of the protocol. Methods of single
             scans do not use it.
+        sequence: length of the way before a query whose queries vote for its
+            place, too, as in SeqSLAM [m]; 0 for the query alone. See
+            `sequences.along_the_way`.
 
     Example:
         from evaluation import MethodConfig
@@ -50,6 +53,7 @@ class MethodConfig(BaseModel):
 
     sensor_height: NonNegativeFloat = 1.6
     place: PlaceScan | None = None
+    sequence: NonNegativeFloat = 0.0
 
 
 class Method(abc.ABC, Generic[Descriptor, Database]):

@@ -21,6 +21,7 @@ from evaluation.recognition.pose_errors import (
 )
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.scoring import gated, ranking, score_places
+from evaluation.recognition.sequences import along_the_way
 
 
 @dataclass(frozen=True)
@@ -154,6 +155,7 @@ def compare_with_gates(
     places, queries = database.places, query.queries
     is_known = _known_places(database, query, protocol)
     indexed = method.build_database(places.descriptors)
+    alone = np.empty(is_known.shape)
     scores = [np.empty(is_known.shape) for _ in gate_radii]
     errors = [PoseErrors.unknown(len(queries.frames)) for _ in gate_radii]
     distances = np.empty(is_known.shape)
@@ -163,10 +165,7 @@ def compare_with_gates(
         len(queries.frames),
     )
     for row in rows:
-        descriptor = queries.descriptors[row]
-        offsets = queries.p_WSs[row] - places.p_WSs
-        distances[row] = np.linalg.norm(offsets, axis=1)
-        ungated = score_places(
+        alone[row] = score_places(
             method,
             queries.descriptors[: row + 1],
             queries.clouds[row] if queries.clouds else None,
@@ -175,6 +174,14 @@ def compare_with_gates(
             is_known[row],
             where=f"{query.name}: query at frame {queries.frames[row]}",
         )
+    if length := method.config.sequence:
+        alone = along_the_way(
+            alone, is_known, queries.p_WSs, places.p_WSs, length
+        )
+    for row, ungated in enumerate(alone):
+        descriptor = queries.descriptors[row]
+        offsets = queries.p_WSs[row] - places.p_WSs
+        distances[row] = np.linalg.norm(offsets, axis=1)
         for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
             found = ungated
             if radius is not None:

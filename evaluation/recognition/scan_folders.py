@@ -55,10 +55,16 @@ def write_scores(
         The number of points left out because they are not finite.
 
     Raises:
-        InputError: if a folder or a scan cannot be read, a scan has no point
+        InputError: if the method matches sequences, for which scans need
+            poses, a folder or a scan cannot be read, a scan has no point
             within the limits of the protocol, or the output cannot be
             written.
     """
+    if method.config.sequence:
+        raise InputError(
+            f"{method.name}: sequence: scans of a folder have no poses, and so"
+            " no way"
+        )
     place_files = _scan_files(database)
     query_files = _scan_files(query)
     place_columns = _columns(place_files, columns, on_note)

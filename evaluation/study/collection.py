@@ -8,6 +8,7 @@ from pathlib import Path
 import re
 
 from cns_drake.base.drives.drive import driven_way
+from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.errors import InputError, one_line
 from evaluation.drives import open_drive
 from evaluation.drives.helipr import holds_helipr
@@ -41,6 +42,7 @@ class RecordingInfo:
     way: dict | None
     needs: tuple[str, ...] = ()
     made_by: DriveSource | None = None
+    lidar_field: LidarField | None = None
 
     @property
     def source(self) -> DriveSource:
@@ -175,6 +177,7 @@ def find_recordings(
     folder: Path,
     on_note: Callable[[str], None] = lambda text: None,
     lidar: str | None = None,
+    columns: int | None = None,
 ) -> list[RecordingInfo]:
     """Opens all recordings in a folder and its direct subfolders.
 
@@ -195,7 +198,7 @@ def find_recordings(
     paths = _find_drives(folder)
     if not paths:
         raise InputError(f"{folder}: no recorded drive in it")
-    placed = {path: _place(path, lidar) for path in paths}
+    placed = {path: _place(path, on_note, lidar, columns) for path in paths}
     found = [one for one in placed.values() if one is not None]
     if not found:
         raise InputError(f"{paths[0]}: {_UNPLACED}")
@@ -268,9 +271,16 @@ def _is_exported_drive(path: Path) -> bool:
     )
 
 
-def _place(path: Path, lidar: str | None) -> RecordingInfo | None:
+def _place(
+    path: Path,
+    on_note: Callable[[str], None],
+    lidar: str | None,
+    columns: int | None,
+) -> RecordingInfo | None:
     """Returns a recording; None without its map and stage."""
-    drive = open_drive(path, lidar)
+    drive = open_drive(path, lidar, columns)
+    for note in drive.notes:
+        on_note(note)
     scenario = drive.scenario or {}
     way = driven_way(scenario)
     if {"map", "stage"} <= set(scenario):
@@ -283,9 +293,17 @@ def _place(path: Path, lidar: str | None) -> RecordingInfo | None:
             return None
         map_name, stage = match["map"], match["stage"]
     source = None
-    if lidar is not None:
-        source = RecordedDrive(path.absolute(), lidar)
-    return RecordingInfo(drive.name, path, map_name, stage, way, made_by=source)
+    if (lidar, columns) != (None, None):
+        source = RecordedDrive(path.absolute(), lidar, columns)
+    return RecordingInfo(
+        drive.name,
+        path,
+        map_name,
+        stage,
+        way,
+        made_by=source,
+        lidar_field=drive.lidar_field,
+    )
 
 
 def _make_city(

@@ -382,6 +382,7 @@ def write_report(
     with_costs: bool = False,
     reference_for: Callable[[set[str]], Reference] = lambda maps: NO_REFERENCE,
     lidar: str | None = None,
+    columns: int | None = None,
 ) -> Path:
     """Measures all recordings in a folder; writes tables, figures, a page.
 
@@ -390,10 +391,11 @@ def write_report(
 
     Args:
         own_methods, settings: see `choose_methods`.
-        on_note: gets notes on recordings that are left out, and on cities
-            without a pair to compare.
+        on_note: gets notes on how recordings are read or left out, on what
+            methods take for granted, and on cities without a pair to compare.
         reference_for: returns the reference for the report of some maps.
         lidar: name of the LiDAR, for recordings with several.
+        columns: see `open_drive`.
 
     Returns:
         The path of `report.html`.
@@ -403,7 +405,12 @@ def write_report(
             written.
     """
     methods = choose_methods(own_methods, settings)
-    found = find_recordings(recordings, on_note, lidar)
+    found = find_recordings(recordings, on_note, lidar, columns)
+    for choice in methods:
+        method = choice.make()
+        for note in {method.assumption(one.lidar_field) for one in found}:
+            if note is not None:
+                on_note(note)
     reference = reference_for({one.map_name for one in found})
     study = Study(found, output, methods, protocol, with_costs, reference)
     jobs = study.jobs()

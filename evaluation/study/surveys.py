@@ -104,12 +104,13 @@ class RecordedDrive:
 
     path: Path
     lidar: str | None = None
+    columns: int | None = None
 
     def __call__(self) -> Drive:
-        return open_drive(self.path, self.lidar)
+        return open_drive(self.path, self.lidar, self.columns)
 
     def identity(self) -> list[list]:
-        """Returns LiDAR, and name, size and time of change of each file.
+        """Returns LiDAR, columns, and name, size and time of each file.
 
         The content of the files would be the surest identity, but reading it
         takes as long as evaluating it. A recording of cns-drake has a
@@ -131,7 +132,9 @@ class RecordedDrive:
             raise InputError(
                 f"{self.path}: {error.strerror or error}"
             ) from error
-        chosen: list[list] = [] if self.lidar is None else [[self.lidar]]
+        chosen: list[list] = [
+            [one] for one in (self.lidar, self.columns) if one is not None
+        ]
         return chosen + [
             [
                 path.name,

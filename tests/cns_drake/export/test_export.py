@@ -1,6 +1,7 @@
 """Exports, read back by our readers and by those of others."""
 
 import io
+import itertools
 import json
 import shutil
 import subprocess
@@ -214,6 +215,43 @@ def test_pcd_by_open3d(drive, cns):
         )
 
 
+def test_mulran_reads_back(drive, tmp_path):
+    recorded = drives.open(drive)
+    folder = export_drive(drive, "mulran", tmp_path / "mulran")
+    read = drives.open(folder)
+    assert read.world_frame == "mulran/utm-52n"
+    np.testing.assert_allclose(read.X_WS, recorded.X_WS, rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(read.stamps_ns, recorded.stamps_ns)
+    assert read.scenario == dict(recorded.scenario)
+    assert read.lidar_field == recorded.lidar_field
+    for ours, original in zip(read, recorded, strict=True):
+        for name in XYZI:
+            np.testing.assert_array_equal(ours[name], original[name])
+
+
+def test_mulran_by_plain_means(drive, tmp_path):
+    """By the mount of calib_base2ouster.txt, turned by almost half a turn."""
+    recorded = drives.open(drive)
+    folder = export_drive(drive, "mulran", tmp_path / "mulran")
+    rows = np.loadtxt(folder / "global_pose.csv", delimiter=",", dtype=object)
+    assert rows[:, 0].astype(int).tolist() == recorded.stamps_ns.tolist()
+    X_UB = np.zeros((len(rows), 4, 4))
+    X_UB[:, :3] = rows[:, 1:].astype(float).reshape(-1, 3, 4)
+    X_UB[:, 3, 3] = 1.0
+    X_BS = np.eye(4)
+    turn = Rotation.from_euler("xyz", [0.0001, 0.0003, 179.6654], degrees=True)
+    X_BS[:3, :3] = turn.as_matrix()
+    X_BS[:3, 3] = 1.7042, -0.021, 1.8047
+    X_US = X_UB @ X_BS
+    X_US[:, :3, 3] -= 350_000.0, 4_020_000.0, 0.0
+    np.testing.assert_allclose(X_US, recorded.X_WS, rtol=0, atol=1e-8)
+    file = folder / "Ouster" / f"{recorded.stamps_ns[0]}.bin"
+    values = np.fromfile(file, "<f4").reshape(-1, 4)
+    scan = recorded.scan(0)
+    for name, column in zip(XYZI, values.T, strict=True):
+        np.testing.assert_array_equal(column, scan[name])
+
+
 def test_imu_of_a_simulated_drive(short_recording, tmp_path):
     drive = export_drive(short_recording, "cns", tmp_path / "cns")
     recorded = drives.open(short_recording)
@@ -283,7 +321,7 @@ def test_a_drive_is_not_replaced(drive, tmp_path):
     assert (drive_folder / "times.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("format_name", ["cns", "kitti", "tum"])
+@pytest.mark.parametrize("format_name", ["cns", "kitti", "mulran", "tum"])
 def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     (tmp_path / "file").write_text("")
     (tmp_path / "photos").mkdir()
@@ -355,8 +393,13 @@ def test_a_full_disk_leaves_nothing_half(
     assert left == ["export.yaml"]
 
 
-@pytest.mark.parametrize("format_name", ["cns", "kitti"])
-@pytest.mark.parametrize("depth", [".", "exports"])
+@pytest.mark.parametrize(
+    ("format_name", "depth"),
+    [
+        *itertools.product(("cns", "kitti"), (".", "exports")),
+        ("mulran", "."),
+    ],
+)
 def test_a_report_finds_exports(tmp_path, format_name, depth):
     """It finds them like recordings, by the map and stage in their scenario."""
     for number in ("1", "2"):

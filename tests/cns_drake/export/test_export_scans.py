@@ -47,7 +47,7 @@ def test_motion_is_taken_out(tmp_path, format_name):
     assert "the motion is taken out" in notes[0]
 
 
-@pytest.mark.parametrize("format_name", ["kitti", "cns", "tum"])
+@pytest.mark.parametrize("format_name", ["kitti", "cns", "mulran", "tum"])
 def test_nothing_is_said_of_scans_at_rest(tmp_path, format_name):
     recording = record(tmp_path, {"preset": "cns"})
     notes = []

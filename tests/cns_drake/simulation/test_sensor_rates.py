@@ -234,7 +234,7 @@ def test_kalibrs_file_travels_with_the_recording(recording, tmp_path):
     expected = KALIBR | {"update_rate": 400.0, "rostopic": "/imu/data"}
     assert yaml.safe_load((recording / "imu.yaml").read_text()) == expected
     assert yaml.safe_load(McapDrive(recording).kalibr) == expected
-    for layout in ("cns", "kitti", "tum"):
+    for layout in ("cns", "kitti", "mulran", "tum"):
         drive = export_drive(recording, layout, tmp_path / layout)
         assert yaml.safe_load((drive / "imu.yaml").read_text()) == expected
 

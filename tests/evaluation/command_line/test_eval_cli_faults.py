@@ -69,6 +69,10 @@ def test_points_that_are_not_finite_are_noted(capsys, towns, tmp_path):
     status, _, err = run(capsys, "tcr", town, tmp_path / "holes")
     assert status == 0
     assert err == "holes: 7 points are not finite, and left out\n"
+    both = [tmp_path / "holes", town, "--method", "scan-context++"]
+    status, _, err = run(capsys, "pr", *both, "--radius", "100")
+    assert status == 0
+    assert err == "holes: 7 points are not finite, and left out\n"
     (tmp_path / "scans").mkdir()
     np.save(
         tmp_path / "scans" / "a.npy",

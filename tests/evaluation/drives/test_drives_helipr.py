@@ -21,10 +21,10 @@ from helpers.helipr_drive import (
 import numpy as np
 import pytest
 
+from cns_drake.base.drives.mulran_frames import ORIGIN
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.drives.helipr import HeliprDrive
-from evaluation.drives.scan_files import ORIGIN
 
 FIELDS = {
     "Ouster": ("intensity", "t", "reflectivity", "ring", "ambient"),

@@ -12,9 +12,9 @@ from helpers.mulran_drive import NUM_SCANS, pose_table, scan_stamps, write_drive
 import numpy as np
 import pytest
 
+from cns_drake.base.drives.mulran_frames import ORIGIN
 from cns_drake.base.errors import InputError
 from evaluation.drives import check_same_world, open_drive
-from evaluation.drives.scan_files import ORIGIN
 
 # calib_base2ouster: Rz Ry Rx of 0.0001, 0.0003 and 179.6654 degrees.
 X_BS = np.array(

@@ -208,7 +208,11 @@ def test_metrics_of_a_pair(tmp_path):
     assert values["recall_at_1"] == pytest.approx(3 / 4)
     assert values["places"] == 7
     assert (values["database"], values["query"]) == ("a", "b")
-    assert values["parameters"] == {"sensor_height": 1.6, "place": None}
+    assert values["parameters"] == {
+        "sensor_height": 1.6,
+        "place": None,
+        "sequence": 0.0,
+    }
     filtered = result.counting("filtered").to_json()
     assert filtered["mode"] == "filtered"
     assert filtered["f1_max"] == pytest.approx(2 * 0.75 / 1.75)

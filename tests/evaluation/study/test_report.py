@@ -1,13 +1,13 @@
 import csv
 
-from helpers import studies
+from helpers import dataset_folders, studies
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.small_towns import drive
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.cluster import Cluster, choose_cluster
 from cns_drake.base.jobs.running import run_jobs
 from evaluation.drives import open_drive
 from evaluation.methods import make_method, method, shipped_methods
@@ -102,6 +102,39 @@ def test_what_cannot_be_placed_is_left_out(tmp_path):
     assert found.name == "town_1"
     (note,) = notes
     assert note.startswith(f"{tmp_path / 'unnamed'}: left out: map and")
+
+
+def test_columns_are_the_users_and_what_is_assumed_is_said(tmp_path):
+    folder = tmp_path / "kitti"
+    for number in ("01", "02"):
+        path = folder / "sequences" / number
+        X = dataset_folders.make_poses(2)
+        dataset_folders.write_matrices(path / "poses.txt", None, X, " ")
+        (path / "times.txt").write_text("0\n1\n")
+        text = f"name: town_{number}\nmap: town\nstage: '{number}'\n"
+        (path / "scenario.yaml").write_text(f"{text}lidars: {{}}\n")
+        for k in range(2):
+            file = path / "velodyne" / f"{k:06d}.bin"
+            file.parent.mkdir(exist_ok=True)
+            np.ones(60, "<f4").tofile(file)
+    found = find_recordings(folder, columns=5)
+    assert [len(one.source().scan(0)) for one in found] == [12, 12]
+    others = find_recordings(folder, columns=4)
+    assert [len(one.source().scan(0)) for one in others] == [15, 15]
+    assert found[0].source.identity() != others[0].source.identity()
+    notes = []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file"):
+        # All notes come before the work, for which there is no folder.
+        write_report(
+            folder,
+            tmp_path / "file",
+            choose_cluster(1, None),
+            on_note=notes.append,
+            columns=5,
+        )
+    (note,) = (one for one in notes if one.startswith("solid: "))
+    assert "the LiDAR is not known" in note
 
 
 def test_no_recordings_or_too_many(tmp_path):

@@ -1,0 +1,325 @@
+"""The layouts of existing data sets, and the common part of their exporters.
+
+Frames: world W, vehicle B on the ground, LiDAR S, IMU I."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+import json
+from pathlib import Path, PurePosixPath
+import re
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+import yaml
+
+from cns_drake.base import poses
+from cns_drake.base.drives import mulran_frames
+from cns_drake.base.drives.mcap_drive import McapDrive
+from cns_drake.base.errors import InputError
+from cns_drake.base.points import encode_bin, encode_labels, encode_pcd
+from cns_drake.base.poses import FARTHEST
+from cns_drake.recording.rosbag2_metadata import to_yaml
+
+# Text that may become the name of a folder: it cannot lead out of it.
+_NAME = re.compile(r"\w[\w.-]*")
+_ROUNDING = 1e-9
+_X_CS = np.array(
+    [
+        [0.0, -1.0, 0.0, 0.0],
+        [0.0, 0.0, -1.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+)
+_PROJECTION = np.eye(4)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one format lays out a drive.
+
+    Paths are relative to the folder of all drives.
+
+    Attributes:
+        drive_folder: drive -> its folder.
+        inner_files: drive -> path -> text of the files in that folder, relative
+            to it, without the scans.
+        outer_files: likewise outside that folder.
+        scan_files: drive, frame number, stamp [ns] and scan -> its files: path
+            in the drive's folder -> content. None for layouts without scans.
+        shared_outer_files: whether all drives share the outer files, which must
+            then agree.
+        has_labels: whether points have labels.
+    """
+
+    drive_folder: Callable[[McapDrive], PurePosixPath]
+    inner_files: Callable[[McapDrive], dict[str, str]]
+    outer_files: Callable[[McapDrive], dict[str, str]] = lambda drive: {}
+    scan_files: (
+        Callable[[McapDrive, int, int, np.ndarray], dict[str, bytes]] | None
+    ) = None
+    shared_outer_files: bool = False
+    has_labels: bool = False
+
+
+def checked_name(drive: McapDrive, text: str) -> str:
+    """Returns a name from a recording as a part of a path.
+
+    Raises:
+        InputError: if the name could lead elsewhere.
+    """
+    if not _NAME.fullmatch(text):
+        raise InputError(
+            f"{drive.name}: {text!r} cannot be the name of a folder"
+        )
+    return text
+
+
+def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
+    """Returns `scenario.yaml` under a drive's name, if recorded."""
+    if drive.scenario is None:
+        return {}
+    scenario = {**drive.scenario, "name": name or drive.name}
+    return {"scenario.yaml": to_yaml(scenario)}
+
+
+def imu_files(drive: McapDrive) -> dict[str, str]:
+    """Returns `imu.yaml`, the IMU's noise for Kalibr, if it has noise."""
+    return {} if drive.kalibr is None else {"imu.yaml": drive.kalibr}
+
+
+def structure_files(drive: McapDrive) -> dict[str, str]:
+    """Returns `structures.json`, the table of instances, if recorded."""
+    if drive.instances is None:
+        return {}
+    table = list(drive.instances.values())
+    return {"structures.json": json.dumps(table, indent=1) + "\n"}
+
+
+def unit_quaternions(drive: McapDrive) -> np.ndarray:
+    """Returns the orientations of the odometry, (M, 4) of unit length.
+
+    Quaternions of a recording may have any length; readers of text need unit
+    length.
+
+    Raises:
+        InputError: if a quaternion has no direction, or a position is not
+            finite.
+    """
+    quat_xyzw = drive.odometry["quat_xyzw"]
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
+    position = drive.odometry["position"]
+    bad = ~(np.isfinite(length[:, 0]) & (length[:, 0] > 0.0))
+    bad |= ~(np.abs(position) < FARTHEST).all(axis=1)  # NaN is not.
+    if bad.any():
+        row = int(bad.argmax())
+        raise InputError(
+            f"{drive.name}: the odometry at"
+            f" {drive.odometry['stamp_ns'][row]} ns has the position"
+            f" {position[row]} and the quaternion {quat_xyzw[row]}"
+        )
+    # A length of one, up to rounding, stays as it is.
+    is_wrong = np.abs(length - 1.0) > _ROUNDING
+    return np.where(is_wrong, quat_xyzw / length, quat_xyzw)
+
+
+def seconds(stamp_ns: int) -> str:
+    """Returns a stamp in seconds with all its nanoseconds."""
+    return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+
+
+def stamped_rows(
+    stamps: Iterable[object], columns: Sequence[np.ndarray], separator: str
+) -> str:
+    """Returns N stamps and (N, K) numbers as text; all digits are kept."""
+    rows = zip(stamps, np.hstack(columns).tolist(), strict=True)
+    return "".join(
+        f"{separator.join([str(stamp), *map(repr, row)])}\n"
+        for stamp, row in rows
+    )
+
+
+def _cns_folder(drive: McapDrive) -> PurePosixPath:
+    """Returns <Map>/<Sequence>, e.g. Metropolis/04 of metropolis_04."""
+    scenario = drive.scenario or {}
+    place = scenario.get("map") or scenario.get("world") or "world"
+    name = Path(str(place)).stem
+    number = drive.name.removeprefix(f"{name}_")
+    return PurePosixPath(
+        checked_name(drive, name.capitalize()), checked_name(drive, number)
+    )
+
+
+def _cns_outer_files(drive: McapDrive) -> dict[str, str]:
+    files = {"transformation_lidar.yaml": _mount(drive.X_BS)}
+    if drive.X_BI is not None:
+        files["transformation_imu.yaml"] = _mount(drive.X_BI)
+    return files
+
+
+def _cns_inner_files(drive: McapDrive) -> dict[str, str]:
+    odometry, imu = drive.odometry, drive.imu
+    columns = [odometry["position"], unit_quaternions(drive)]
+    files = {"gt.csv": stamped_rows(odometry["stamp_ns"], columns, ",")}
+    if imu is not None:
+        names = ("quat_xyzw", "angular_velocity", "specific_force")
+        columns = [imu[name] for name in names]
+        files["imu.csv"] = stamped_rows(imu["stamp_ns"], columns, ",")
+    return files | imu_files(drive) | scenario_files(drive)
+
+
+def _mount(X_BC: np.ndarray) -> str:
+    """Returns the pose of a sensor C on the vehicle as YAML."""
+    quat_xyzw = Rotation.from_matrix(X_BC[:3, :3]).as_quat(canonical=True)
+    p_BC, rotation = X_BC[:3, 3].tolist(), quat_xyzw.tolist()
+    values = {"translation": p_BC, "rotation": rotation}
+    return yaml.safe_dump(values, sort_keys=False)
+
+
+CNS = Layout(
+    _cns_folder,
+    _cns_inner_files,
+    outer_files=_cns_outer_files,
+    scan_files=lambda _, frame, stamp_ns, scan: {
+        f"pcd/{stamp_ns}.pcd": encode_pcd(scan)
+    },
+    shared_outer_files=True,
+)
+
+
+def _kitti_number(drive: McapDrive) -> str:
+    """Returns the drive's number: the digits its name ends with, or 00.
+
+    The second LiDAR of a recording adds 100, the third 200: tools for KITTI
+    want numbers.
+    """
+    digits = re.findall(r"\d*$", drive.name)[0]
+    lidar = drive.lidar_names.index(drive.lidar_name)
+    return f"{100 * lidar + int(digits or 0):02d}"
+
+
+def _kitti_inner_files(drive: McapDrive) -> dict[str, str]:
+    elapsed_ns = drive.stamps_ns - drive.stamps_ns[0]
+    # Later LiDARs add their own name.
+    is_first = drive.lidar_name == drive.lidar_names[0]
+    name = drive.name if is_first else f"{drive.name}_{drive.lidar_name}"
+    calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
+    calibration["Tr"] = _X_CS
+    return {
+        # Readers of KITTI look in `poses`, those of SemanticKITTI here.
+        "poses.txt": _kitti_poses(drive),
+        "times.txt": "".join(f"{seconds(ns)}\n" for ns in elapsed_ns.tolist()),
+        "calib.txt": "".join(
+            f"{key}: {_kitti_rows(X[None])}" for key, X in calibration.items()
+        ),
+        "first_pose.txt": _kitti_rows(drive.X_WS[:1]),
+        **imu_files(drive),
+        **structure_files(drive),
+        **scenario_files(drive, name),
+    }
+
+
+def _in_kittis_scale(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
+    """Returns a scan whose calibrated intensities have KITTI's scale.
+
+    That is a byte / 256 in hundredths, at most 0.99, as the scans of KITTI
+    odometry 00 show. Ideal intensities, from 0 to 1, stay as they are, and so
+    do those of other recorders, whose unit is not known.
+    """
+    if drive.lidar_section.get("returns") != "calibrated":
+        return scan
+    # The intensities of this preset are fitted to KITTI's hundredths.
+    is_kittis = drive.lidar_section.get("preset") == "hdl-64e"
+    hundredths = scan["intensity"] * (1.0 if is_kittis else 100.0 / 256.0)
+    scaled = scan.copy()
+    scaled["intensity"] = np.minimum(np.rint(hundredths), 99.0) / 100.0
+    return scaled
+
+
+def _kitti_scan_files(
+    drive: McapDrive, frame: int, stamp_ns: int, scan: np.ndarray
+) -> dict[str, bytes]:
+    del stamp_ns
+    scan = _in_kittis_scale(drive, scan)
+    files = {f"velodyne/{frame:06d}.bin": encode_bin(scan)}
+    if {"label", "instance"} <= set(scan.dtype.names or ()):
+        files[f"labels/{frame:06d}.label"] = encode_labels(scan)
+    return files
+
+
+def _kitti_poses(drive: McapDrive) -> str:
+    """Returns X_C0C of each scan as a row of text."""
+    X_S0S = poses.inverse(drive.X_WS[0]) @ drive.X_WS
+    return _kitti_rows(_X_CS @ X_S0S @ poses.inverse(_X_CS))
+
+
+def _kitti_rows(X: np.ndarray) -> str:
+    """Returns the upper 3 x 4 of each pose (N, 4, 4) as a row of text."""
+    rows = X[:, :3].reshape(-1, 12).tolist()
+    return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
+
+
+def kitti_layout(number: str | None = None) -> Layout:
+    """Returns KITTI's layout; the drive has its own number, or a given one."""
+
+    def of(drive: McapDrive) -> str:
+        return number or _kitti_number(drive)
+
+    return Layout(
+        lambda drive: PurePosixPath("sequences", of(drive)),
+        _kitti_inner_files,
+        outer_files=lambda drive: {
+            f"poses/{of(drive)}.txt": _kitti_poses(drive)
+        },
+        scan_files=_kitti_scan_files,
+        has_labels=True,
+    )
+
+
+KITTI = kitti_layout()
+
+
+def _tum_inner_files(drive: McapDrive) -> dict[str, str]:
+    X_WB, X_WS = drive.odometry, drive.X_WS
+    quat_WS = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat(canonical=True)
+    return {
+        "base_link.tum": stamped_rows(
+            map(seconds, X_WB["stamp_ns"].tolist()),
+            [X_WB["position"], unit_quaternions(drive)],
+            " ",
+        ),
+        "lidar.tum": stamped_rows(
+            map(seconds, drive.stamps_ns.tolist()),
+            [X_WS[:, :3, 3], quat_WS],
+            " ",
+        ),
+        **imu_files(drive),
+    }
+
+
+TUM = Layout(
+    lambda drive: PurePosixPath(checked_name(drive, drive.name)),
+    _tum_inner_files,
+)
+
+
+def _mulran_inner_files(drive: McapDrive) -> dict[str, str]:
+    # The vehicle stands where MulRan's mount has it below this LiDAR.
+    X_UB = drive.X_WS @ poses.inverse(mulran_frames.X_BS)
+    X_UB[:, :3, 3] += mulran_frames.ORIGIN
+    rows = X_UB[:, :3].reshape(-1, 12)
+    return {
+        "global_pose.csv": stamped_rows(drive.stamps_ns.tolist(), [rows], ","),
+        **imu_files(drive),
+        **scenario_files(drive),
+    }
+
+
+MULRAN = Layout(
+    lambda drive: PurePosixPath(checked_name(drive, drive.name)),
+    _mulran_inner_files,
+    scan_files=lambda _, frame, stamp_ns, scan: {
+        f"Ouster/{stamp_ns}.bin": encode_bin(scan)
+    },
+)
