@@ -139,5 +139,25 @@ def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
     return float(is_near[outcomes.has_match].mean())
 
 
+def pose_numbers(
+    errors: PoseErrors, outcomes: QueryOutcomes
+) -> dict[str, float]:
+    """Returns the numbers of the task `pose`; none without any pose.
+
+    Medians are those of all queries with a pose.
+    """
+    success = pose_success(errors, outcomes)
+    if math.isnan(success):
+        return {}
+    known = ~np.isnan(errors.translation)
+    values = {"pose_success": success}
+    if known.any():
+        values |= {
+            "translation_median": float(np.median(errors.translation[known])),
+            "rotation_median_deg": float(np.median(errors.rotation_deg[known])),
+        }
+    return values
+
+
 def _quantile(values: np.ndarray, part: float) -> float:
     return float(np.quantile(values, part)) if len(values) else math.nan

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from cns_drake.studies.tasks.task import Answers, Jobs, Number, Pair, Task
 from evaluation.recognition.place_outcome import PlaceOutcome, place_numbers
-from evaluation.recognition.pose_errors import pose_success
+from evaluation.recognition.pose_errors import pose_numbers, pose_success
 from evaluation.recognition.survival import kept_share
 from evaluation.study.parts import Part
 from evaluation.study.place_outcomes import measure_places
@@ -62,26 +60,13 @@ class PoseTask(PlaceTask):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            value = pose_success(now.pose_errors, now.outcomes)
-            if np.isnan(value):
-                continue
+            values = pose_numbers(now.pose_errors, now.outcomes)
             with_match = int(now.outcomes.has_match.sum())
-            values = {"pose_success": value}
             then = _same(before, now)
-            if then is not None:
-                today = pose_success(then.pose_errors, then.outcomes)
-                values["kept"] = float(kept_share(value, today))
-            known = ~np.isnan(now.pose_errors.translation)
-            if known.any():
-                errors = now.pose_errors
-                values |= {
-                    "translation_median": float(
-                        np.median(errors.translation[known])
-                    ),
-                    "rotation_median_deg": float(
-                        np.median(errors.rotation_deg[known])
-                    ),
-                }
+            if values and then is not None:
+                was = pose_success(then.pose_errors, then.outcomes)
+                share = kept_share(values["pose_success"], was)
+                values["kept"] = float(share)
             for name, one in values.items():
                 yield Number(now.method, now.is_gated, name, one, n=with_match)
 
