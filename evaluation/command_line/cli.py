@@ -375,7 +375,7 @@ def compare(
         for one in found.ranked
     ]
     if rows:
-        where = f"mean of {found.conditions} conditions"
+        where = f"mean of {found.conditions or 'its own'} conditions"
         rows.insert(0, ("method", f"{metric}, {where}  [95 %]"))
     for one in found.differences:
         interval = _interval_text(one.difference.interval)
