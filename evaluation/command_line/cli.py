@@ -19,6 +19,7 @@ from cns_drake.base.terminal import example, number
 from evaluation.command_line import options
 from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_sessions, map_update
+from evaluation.command_line.real import real
 from evaluation.command_line.trajectories import drives, trajectory
 from evaluation.recognition.protocol import DEFAULT_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
@@ -43,7 +44,7 @@ app = terminal.make_program(
     example("cns-eval tcr before.pcd after.pcd"),
     groups={
         "Measure change": ("tcr",),
-        "Recognise places": ("pr", "scores", "report", "compare"),
+        "Recognise places": ("pr", "scores", "report", "compare", "real"),
         "Localise, and keep maps": ("localise", "map-update", "map-sessions"),
         "Look at drives": ("drives", "trajectory"),
     },
@@ -386,7 +387,7 @@ def compare(
         for one in found.ranked
     ]
     if rows:
-        where = f"mean of {found.conditions} conditions"
+        where = f"mean of {found.conditions or 'its own'} conditions"
         rows.insert(0, ("method", f"{metric}, {where}  [95 %]"))
     for one in found.differences:
         interval = _interval_text(one.difference.interval)
@@ -407,6 +408,9 @@ def compare(
     options.show(found.to_json(), rows, json=json)
 
 
+app.command(
+    cls=Command, epilog=example("cns-eval real real_scans --output real")
+)(real)
 app.command(
     cls=Command,
     epilog=example(

@@ -110,13 +110,23 @@ class HeliprDrive(FileDrive):
         )
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        dtype = _RECORDS[self._lidar]
-        if self._lidar == "Aeva" and stamp_ns <= _AEVA_CHANGE_NS:
-            dtype = np.dtype(_AEVA_EARLY)
-        points = read_packed(path, dtype)
-        if self._lidar in _NUM_RINGS:
-            check_below(points, "ring", _NUM_RINGS[self._lidar])
-        return points
+        return read_scan(self._lidar, path, stamp_ns)
+
+
+def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
+    """Returns the points (N,) of a scan of a LiDAR, by its time [ns].
+
+    Raises:
+        ValueError: if the file is not of that LiDAR.
+        InputError: if it cannot be read.
+    """
+    dtype = _RECORDS[lidar]
+    if lidar == "Aeva" and stamp_ns <= _AEVA_CHANGE_NS:
+        dtype = np.dtype(_AEVA_EARLY)
+    points = read_packed(path, dtype)
+    if lidar in _NUM_RINGS:
+        check_below(points, "ring", _NUM_RINGS[lidar])
+    return points
 
 
 def holds_helipr(path: Path) -> bool:

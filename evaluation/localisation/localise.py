@@ -48,6 +48,12 @@ FARTHEST_START = 50.0
 # A query is localised if the map's drive, or a point of the map's file, is this
 # near to its LiDAR [m].
 NEAR = 7.5
+# Of the summary, in a table of results.
+_SHOWN = (
+    *("success_03m_1deg", "success_2m_5deg"),
+    *("translation_median", "translation_95", "rotation_median_deg"),
+    "auroc_own_score",
+)
 # Share of the right ends that a user believes, by the score.
 _BELIEVED = 0.95
 # Queries that wait for a process, of each.
@@ -426,6 +432,27 @@ class Localisation:
         found["unmapped_mean"] = float(rows["unmapped"].mean())
         found["seconds_mean"] = float(rows["seconds"].mean())
         return found
+
+    def numbers(self) -> dict[str, float]:
+        """Returns those of the summary that a table of results has."""
+        found = self.to_json()
+        known = {name: found[name] for name in _SHOWN}
+        return {k: float(v) for k, v in known.items() if v is not None}
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Returns the columns of `queries.csv`."""
+        rows = self.rows
+        scores = rows["own_score"]
+        return {
+            "query_frame": rows["frame"],
+            "query_stamp_ns": rows["stamp_ns"],
+            "correct": is_right(rows),
+            # Queries are where the map is.
+            "has_match": np.ones(len(rows), bool),
+            "score": np.where(np.isfinite(scores), scores, np.nan),
+            "translation_error": rows["translation_error"],
+            "rotation_error_deg": rows["rotation_error_deg"],
+        }
 
 
 def write_rows(rows: np.ndarray, path: Path) -> None:

@@ -141,6 +141,7 @@ def compare_with_gates(
     gate_radii: Collection[float | None],
     track: Track = silent,
     overlaps: np.ndarray | None = None,
+    is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
     """Scores queries once; returns what is retrieved with each gate.
 
@@ -148,12 +149,15 @@ def compare_with_gates(
         method, database, query, track, overlaps: see `compare`.
         protocol: likewise; whether it has a gate does not matter.
         gate_radii: radius of each gate [m]; None is no gate.
+        is_known: (Q, D) bool, which places each query may find; by default as
+            the protocol says.
 
     Raises:
         InputError: if the method returns an invalid result.
     """
     places, queries = database.places, query.queries
-    is_known = _known_places(database, query, protocol)
+    if is_known is None:
+        is_known = _known_places(database, query, protocol)
     indexed = method.build_database(places.descriptors)
     alone = np.empty(is_known.shape)
     scores = [np.empty(is_known.shape) for _ in gate_radii]

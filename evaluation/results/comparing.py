@@ -106,9 +106,11 @@ class Comparison:
     Attributes:
         metric: the number that is compared.
         task: that has it.
-        conditions: number of the conditions that all tables have.
+        conditions: number of the conditions that all tables have; 0 for
+            rankings.
         ranked: methods, the best first. One that also ships, or is in two
-            tables, has the name of its table behind its own.
+            tables, has the name of its table behind its own. For rankings, the
+            methods of each table over its own conditions.
         differences: of each two methods whose answers are there.
         agreements: of each two tables with two or more methods of one name.
         notes: what was left out.
@@ -212,11 +214,17 @@ def compare(
             _Table(_name(path, paths), _by_place(chosen_rows), _by_place(asked))
         )
     pairs = itertools.combinations(own, 2)
+    less = bool(_LESS.fullmatch(metric))
     if rankings:
         if len(own) < 2:
             raise InputError("--rankings: two tables are needed")
         found = [_agreement(*pair, metric) for pair in pairs]
-        return Comparison(metric, task, 0, (), (), found, ())
+        each = [
+            one._replace(method=f"{one.method} ({table.name})")
+            for table in own
+            for one in ranking(table.rows.values(), least_first=less)[0]
+        ]
+        return Comparison(metric, task, 0, each, (), found, ())
     shipped = _shipped(wanted)
     common, notes = _common(own, shipped, paths)
     tables = [_on(table, common) for table in (shipped, *own)]
@@ -241,7 +249,7 @@ def compare(
         for name, (table, method) in entries.items()
         for one in common
     ]
-    ranked, _ = ranking(rows, least_first=bool(_LESS.fullmatch(metric)))
+    ranked, _ = ranking(rows, least_first=less)
     alike = [
         _agreement(*pair, metric)
         for pair in itertools.combinations(tables, 2)

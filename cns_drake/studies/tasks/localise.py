@@ -31,11 +31,6 @@ SHIPPED = tuple(
     name for name in estimators.METHODS if name != estimators.KISS_MATCHER
 )
 _COST = 60.0
-_SHOWN = (
-    *("success_03m_1deg", "success_2m_5deg"),
-    *("translation_median", "translation_95", "rotation_median_deg"),
-    "auroc_own_score",
-)
 
 
 class LocaliseTask(Task):
@@ -111,8 +106,7 @@ class LocaliseTask(Task):
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         then = dict(self._runs(before)) if before is not None else {}
         for method, rows in self._runs(found):
-            numbers = localise.Localisation(rows).to_json()
-            values = {name: numbers[name] for name in _SHOWN}
+            values = localise.Localisation(rows).numbers()
             if method in then:
                 share = kept_share(
                     float(localise.is_right(rows).mean()),
@@ -120,29 +114,12 @@ class LocaliseTask(Task):
                 )
                 values["kept"] = float(share)
             for name, value in values.items():
-                if value is not None:
-                    yield Number(method, False, name, float(value), n=len(rows))
+                yield Number(method, False, name, value, n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answers]:
         for method, rows in self._runs(found):
-            yield Answers(
-                method,
-                False,
-                {
-                    "query_frame": rows["frame"],
-                    "query_stamp_ns": rows["stamp_ns"],
-                    "correct": localise.is_right(rows),
-                    # Queries are where the map is.
-                    "has_match": np.ones(len(rows), bool),
-                    "score": np.where(
-                        np.isfinite(rows["own_score"]),
-                        rows["own_score"],
-                        np.nan,
-                    ),
-                    "translation_error": rows["translation_error"],
-                    "rotation_error_deg": rows["rotation_error_deg"],
-                },
-            )
+            columns = localise.Localisation(rows).columns()
+            yield Answers(method, False, columns)
 
 
 def measure_localisation(

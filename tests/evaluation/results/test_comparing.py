@@ -228,8 +228,20 @@ def test_tau_of_mean_areas(tmp_path, queries):
         {"c": dict(zip(names, (0.6, 0.2, 0.4, 0.1), strict=True))},
         queries=queries,
     )
-    (one,) = compare([simulated, real], rankings=True).agreements
+    found = compare([simulated, real], rankings=True)
+    (one,) = found.agreements
     assert one.methods == tuple(names)
+    # Each table stands beside the other, with its own means.
+    shown = {entry.method: entry.value for entry in found.ranked}
+    assert shown == pytest.approx(
+        dict(
+            zip(
+                [f"{n} ({t})" for t in ("simulated", "real") for n in names],
+                (0.8, 0.8, 0.35, 0.2, 0.6, 0.2, 0.4, 0.1),
+                strict=True,
+            )
+        )
+    )
     # The first two are equal on one side: tau-b divides by the root of the
     # 5 of 6 pairs that are not.
     expected = counted_tau((0.8, 0.8, 0.35, 0.2), (0.6, 0.2, 0.4, 0.1))

@@ -1,0 +1,251 @@
+"""Public data sets of few scans: where each file is from, and how it is read.
+
+Nothing is shipped. A folder holds a folder for each data set, as `docs/real.md`
+lays them out. A data set is known by its folder's name; the digest of its scans
+says whether they are the ones that were measured before.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+import hashlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cns_drake.base.drives.lidar_fields import lidar_field
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from evaluation.clouds.cloud_files import OnNote, read_cloud
+from evaluation.drives import Drive, helipr, nclt, open_drive
+from evaluation.drives.scan_files import FileDrive
+from evaluation.drives.text_tables import read_poses, read_quaternions
+
+# Between scans without poses [m]. No scan reaches so far.
+_APART = 1000.0
+
+
+class DataSet(NamedTuple):
+    """A public data set, or one LiDAR of it.
+
+    Attributes:
+        folder: name of its folder.
+        scans: its files there, as a pattern.
+        world: what data sets of one place share.
+        unit: name of the LiDAR's unit.
+        height: of the LiDAR above the ground [m].
+        origin: repository, and path in it.
+        licence: terms of use.
+        digest: SHA-256 of all scans behind each other, by name.
+        poses: `drive` for a folder of `open_drive`; `matrices` for rows of the
+            upper 3 x 4 of X_WS, and `named` for rows of a scan's name, x y z
+            and quat_xyzw, both in `poses.txt`; "" for none.
+        read: reads a scan.
+        whole: whether the scans have all points that the unit measured.
+    """
+
+    folder: str
+    scans: str
+    world: str
+    unit: str
+    height: float
+    origin: str
+    licence: str
+    digest: str
+    poses: str = ""
+    read: Callable[[Path], np.ndarray] = read_cloud
+    whole: bool = True
+
+
+_NC = "CC BY-NC-SA 3.0"
+DATA_SETS = (
+    DataSet(
+        "kitti_00",
+        "velodyne/*.bin",
+        "kitti_00",
+        "hdl-64e",
+        1.73,
+        "KITTI odometry, sequences/00/velodyne",
+        _NC,
+        "cbe2592584f33df2992d10ebf203b699dff3e19883c19646cc5825c6d0a9ebb6",
+        "drive",
+    ),
+    DataSet(
+        "kitti_00_revisits",
+        "*.npy",
+        "kitti_00",
+        "hdl-64e",
+        1.73,
+        "nubot-nudt/LCR-Net, demo/data_demo",
+        _NC,
+        "ec11803aa6886c2cdcfe415fca0aab549f837e681308f61639887ba3068eda75",
+        "named",
+        whole=False,
+    ),
+    DataSet(
+        "nuscenes_1072",
+        "velodyne/*.bin",
+        "nuscenes_1072",
+        "hdl-32e",
+        1.84,
+        "nubot-nudt/SegNet4D, demo_data/nuScenes_kitti/val/1072",
+        "nuScenes, non-commercial",
+        "8a5a58f5e799eafab56ebf9a7d25c1aa23b1510a26e3a164dce0e8901b6df890",
+        "matrices",
+        partial(read_cloud, columns=4),
+    ),
+    DataSet(
+        "newer_06",
+        "deskewed_*.bin",
+        "newer_06",
+        "os1-64-33",
+        1.0,
+        "Newer College, 06",
+        "CC BY-NC-SA 4.0",
+        "2980972897a68256b3ecd15cd4d4ca1e2960bc932d648fbac88a047806d68fe1",
+        "",
+        partial(read_cloud, columns=3),
+    ),
+    DataSet(
+        "nclt",
+        "*.bin",
+        "nclt",
+        "hdl-32e-upside-down",
+        0.96,
+        "NCLT, 2012-01-15/velodyne_sync",
+        "ODbL",
+        "56c0aead58880ca33625aa75af52579f2c3bf6e5f2a2f8e698a6113f802351c8",
+        "",
+        nclt.read_scan,
+    ),
+    DataSet(
+        "helipr_two_lidars",
+        "avia_*.bin",
+        "helipr",
+        "avia",
+        1.7,
+        "sparolab/SOLiD",
+        "CC BY-NC-SA 4.0",
+        "7fac1a8479ca7d07b10f30b7cb242fe1e473cbfed6ab5e0b2ffedfcdec0991d4",
+        "",
+        partial(helipr.read_scan, "Avia"),
+    ),
+    DataSet(
+        "helipr_two_lidars",
+        "aeva_*.bin",
+        "helipr",
+        "aeva",
+        1.7,
+        "sparolab/SOLiD",
+        "CC BY-NC-SA 4.0",
+        "416e0a252c6827dec4d2e9331a28db0cc8efae8ca710dd022f71616bf82f1730",
+        "",
+        partial(helipr.read_scan, "Aeva"),
+    ),
+)
+
+
+class RealScans(NamedTuple):
+    """The scans of a data set that are there, as a drive."""
+
+    data_set: DataSet
+    drive: Drive
+
+    @property
+    def name(self) -> str:
+        return self.data_set.folder
+
+
+class _Scans(FileDrive):
+    """Files without times, each read by the data set's own function."""
+
+    def __init__(self, read: Callable[[Path], np.ndarray], **drive: Any):
+        self._read_file = read
+        super().__init__(**drive)
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        return self._read_file(path)
+
+
+def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
+    """Opens the data sets that are in a folder.
+
+    Notes name those that are missing, those of another digest, and folders that
+    are not known.
+
+    Raises:
+        InputError: none is there, or one cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    found = []
+    for one in DATA_SETS:
+        files = sorted((folder / one.folder).glob(one.scans))
+        if not files:
+            on_note(f"{one.folder}/{one.scans}: not there, skipped")
+            continue
+        digest = hashlib.sha256()
+        for file in files:
+            digest.update(read_bytes(file))
+        if digest.hexdigest() != one.digest:
+            on_note(
+                f"{folder / one.folder}: other scans than known, still used"
+            )
+        found.append(RealScans(one, _open(folder / one.folder, one, files)))
+    known = {one.folder for one in DATA_SETS}
+    if not found:
+        names = ", ".join(sorted(known))
+        raise InputError(f"{folder}: no data set that is known ({names})")
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and path.name not in known:
+            on_note(f"{path}: not known, left out")
+    return found
+
+
+def _open(folder: Path, one: DataSet, files: Sequence[Path]) -> Drive:
+    if one.poses == "drive":
+        return open_drive(folder)
+    number = len(files)
+    table = folder / "poses.txt"
+    X_WS = np.tile(np.eye(4), (number, 1, 1))
+    X_WS[:, 0, 3] = _APART * np.arange(number)
+    if one.poses == "matrices":
+        X_WS = read_poses(table)
+        if len(X_WS) != number:
+            raise InputError(f"{table}: {len(X_WS)} rows for {number} scans")
+    elif one.poses:
+        X_WS = _named_poses(table, files)
+    return _Scans(
+        one.read,
+        name=one.folder,
+        world_frame=one.world,
+        files=list(files),
+        stamps_ns=np.arange(number),
+        X_WS=X_WS,
+        unit=one.unit,
+    )
+
+
+def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
+    """Returns the pose of each file by the number that is its name."""
+    try:
+        numbers = np.array([int(file.stem) for file in files])
+    except ValueError as error:
+        raise InputError(
+            f"{table.parent}: a scan's name is no number"
+        ) from error
+    return read_quaternions(table, None).at(numbers, 0)
+
+
+def simulated_drives(folder: Path, unit: str) -> list[Drive]:
+    """Returns the drives in a folder that are of a unit.
+
+    Raises:
+        InputError: one cannot be opened.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    paths = sorted(one for one in folder.iterdir() if one.is_dir())
+    drives = [open_drive(path) for path in paths]
+    field = lidar_field(unit)
+    return [one for one in drives if field and one.lidar_field == field]

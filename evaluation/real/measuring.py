@@ -1,0 +1,352 @@
+"""The tasks of a study, measured on public data sets of few scans.
+
+Each scan of a data set with poses is asked. It may find all other scans of its
+LiDAR's unit: those of its data set, of others, and simulated ones. A place is a
+single scan, and queries are turned and tilted as by the protocol `fair`. Each
+scan is also localised, from a drawn start, in the map of the scans around it.
+The judge tells each data set from the simulated scans of its unit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+import importlib.util
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.base.progress import Track
+from evaluation.clouds.cloud_files import OnNote
+from evaluation.drives import Drive
+from evaluation.localisation import estimators, localise
+from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.methods import Method, make_method, shipped_methods
+from evaluation.methods.method import load_method
+from evaluation.real.data_sets import (
+    RealScans,
+    open_data_sets,
+    simulated_drives,
+)
+from evaluation.recognition.description import (
+    DescribedDrive,
+    DescribedScans,
+    describe_drive,
+)
+from evaluation.recognition.metrics import UNKNOWN, Interval
+from evaluation.recognition.overlap_truth import best_overlaps
+from evaluation.recognition.place_outcome import (
+    PlaceOutcome,
+    place_numbers,
+    pose_numbers,
+)
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.retrieval import compare_with_gates
+from evaluation.results.table import Answers, Key, QueryRows, Results, Row
+
+_SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
+# Every real scan is a query and a place.
+_REAL = replace(_SIMULATED, query_spacing=1e-6, place_spacing=1e-6)
+# Between worlds [m]. No scan reaches so far.
+_APART = 1e5
+# A study's default start [m, deg].
+_STARTS = localise.Starts(2.0, 10.0)
+# Scans this near make the map of a query [m].
+_AROUND = 30.0
+_ESTIMATORS = tuple(
+    one for one in estimators.METHODS if one != estimators.KISS_MATCHER
+)
+# Draws of patches for the judge.
+_DRAWS = 4
+
+
+class _Part(NamedTuple):
+    """Described scans that are places: a data set's, or a recording's."""
+
+    name: str
+    world: str
+    described: list[DescribedDrive]
+    scans: list[np.ndarray]
+
+
+class Measuring:
+    """Measures data sets, one after the other.
+
+    Attributes:
+        rows: what was found.
+        answers: likewise, by query.
+    """
+
+    def __init__(self, names: Sequence[str], track: Track, on_note: OnNote):
+        """Chooses what is measured.
+
+        Args:
+            names: methods and estimators, or Python files with one's own
+                methods; all that ship if there is none.
+            track: reports progress.
+            on_note: takes notes.
+
+        Raises:
+            InputError: a method is not known, or its file cannot be used.
+        """
+        self.rows: list[Row] = []
+        self.answers: list[Answers] = []
+        self._track = track
+        self._note = on_note
+        chosen = names or (*shipped_methods(), *_ESTIMATORS)
+        self._methods = [
+            load_method(Path(one)).name if one.endswith(".py") else one
+            for one in chosen
+            if one not in estimators.METHODS
+        ]
+        self._made_for(1.0)
+        settings = estimators.default_settings
+        self._estimators = {
+            one: (estimators.make_estimator(one, settings(one)), settings(one))
+            for one in chosen
+            if one in estimators.METHODS
+        }
+
+    def _made_for(self, height: float) -> list[Method]:
+        """Returns the methods for a height of the LiDAR [m]."""
+        values = {"sensor_height": height}
+        return [make_method(name, values) for name in self._methods]
+
+    def run(self, folder: Path, simulated: Path | None) -> None:
+        """Measures all data sets in a folder.
+
+        Args:
+            folder: see `open_data_sets`.
+            simulated: folder of recordings, which add places, and from which
+                the judge tells.
+
+        Raises:
+            InputError: no data set is there, or one cannot be read.
+        """
+        found = open_data_sets(folder, self._note)
+        for unit in dict.fromkeys(one.data_set.unit for one in found):
+            sets = [one for one in found if one.data_set.unit == unit]
+            made = simulated_drives(simulated, unit) if simulated else []
+            self._recognise(sets, made)
+            for one in sets:
+                if one.data_set.poses:
+                    self._localise(one)
+                if made:
+                    self._judge(one, made)
+            if not made:
+                self._note(f"{unit}: no simulated scan of it to judge")
+
+    def results(self) -> Results:
+        return Results.of(self.rows)
+
+    def queries(self) -> QueryRows:
+        return QueryRows.of(self.answers)
+
+    def _add(
+        self,
+        one: RealScans,
+        task: str,
+        method: str,
+        values: Sequence[tuple[str, float, Interval]],
+        number: int,
+        *,
+        gate: bool = False,
+        database: str = "",
+    ) -> Key:
+        """Adds rows, and returns what identifies them."""
+        key = {
+            "experiment": "real",
+            "map": one.data_set.world,
+            "database": database or one.name,
+            "query": one.name,
+            "seed": _REAL.seed,
+            "factors": {},
+            "task": task,
+            "method": method,
+            "gate": gate,
+            "protocol": _REAL.name,
+        }
+        for metric, value, interval in values:
+            ends = {"low": interval.low, "high": interval.high}
+            row = Row(**key, metric=metric, value=value, **ends, n=number)
+            self.rows.append(row)
+        return Key(**key)
+
+    def _recognise(
+        self, sets: Sequence[RealScans], made: Sequence[Drive]
+    ) -> None:
+        asked = [one for one in sets if one.data_set.poses]
+        if not (asked and self._methods):
+            return
+        methods = self._made_for(asked[0].data_set.height)
+        parts = [
+            self._described(one.drive, one.name, one.data_set.world, methods)
+            for one in sets
+        ]
+        parts += [
+            self._described(one, one.name, one.name, methods, _SIMULATED)
+            for one in made
+        ]
+        for one in asked:
+            self._ask(one, parts, methods)
+
+    def _described(
+        self,
+        drive: Drive,
+        name: str,
+        world: str,
+        methods: Sequence[Method],
+        protocol: RetrievalProtocol = _REAL,
+    ) -> _Part:
+        scans: list[np.ndarray] = []
+        described = describe_drive(
+            drive,
+            methods,
+            {"places", "queries"} if protocol is _REAL else {"places"},
+            protocol,
+            self._track,
+            visit=lambda _, cloud: scans.append(cloud),
+        )
+        return _Part(name, world, described, scans)
+
+    def _ask(
+        self,
+        one: RealScans,
+        parts: Sequence[_Part],
+        methods: Sequence[Method],
+    ) -> None:
+        """Adds the rows of `place` and `pose` of a data set."""
+        world, drive = one.data_set.world, one.drive
+        # The data set itself comes first, then what is of its world.
+        parts = sorted(
+            parts, key=lambda part: (part.name != one.name, part.world != world)
+        )
+        scans = [scan for part in parts for scan in part.scans]
+        worlds = [part.world for part in parts for _ in part.scans]
+        is_known = np.ones((len(drive), len(scans)), bool)
+        np.fill_diagonal(is_known, False)
+        shown = [_REAL.query_scan(drive, k) for k in range(len(drive))]
+        overlaps = None
+        for k, method in enumerate(
+            self._track(methods, one.name, len(methods))
+        ):
+            own = parts[0].described[k]
+            places = _joined(parts, k)
+            both = compare_with_gates(
+                method,
+                replace(own, places=places),
+                own,
+                _REAL,
+                [None, _REAL.radius],
+                is_known=is_known,
+            )
+            asked = own.queries
+            if overlaps is None:
+                overlaps = best_overlaps(
+                    scans, places.X_WS, shown, asked.X_WS, both[0].matches
+                )
+            for gate, found in zip((False, True), both, strict=True):
+                now = PlaceOutcome.of(
+                    method.name,
+                    gate,
+                    found,
+                    (asked.stamps_ns, asked.p_WSs),
+                    worlds,
+                    overlaps,
+                    _REAL.radius,
+                )
+                numbers = [n[2:5] for n in place_numbers(now, None)]
+                key = self._add(
+                    one, "place", method.name, numbers, len(drive), gate=gate
+                )
+                columns = {
+                    # None, in whole numbers, is empty.
+                    name: np.array([-1 if v is None else v for v in values])
+                    for name, values in now.columns().items()
+                }
+                self.answers.append(Answers(**vars(key), columns=columns))
+                poses = [n[2:5] for n in pose_numbers(now, None)]
+                self._add(
+                    one,
+                    "pose",
+                    method.name,
+                    poses,
+                    int(now.outcomes.has_match.sum()),
+                    gate=gate,
+                )
+
+    def _localise(self, one: RealScans) -> None:
+        """Adds the rows of `localise`: each scan, in a map of the others."""
+        drive, X_WS = one.drive, one.drive.X_WS
+        R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
+        found: dict[str, list[np.ndarray]] = {n: [] for n in self._estimators}
+        frames = range(len(drive)) if found else ()
+        for k in self._track(frames, f"localising {one.name}", len(frames)):
+            apart = np.linalg.norm(X_WS[:, :3, 3] - X_WS[k, :3, 3], axis=1)
+            apart[k] = math.inf
+            if apart.min() > localise.NEAR:
+                continue
+            mapped = VoxelAccumulator(estimators.Settings.voxel)
+            for other in np.flatnonzero(apart < _AROUND).tolist():
+                mapped.add(drive.scan(other), X_WS[other])
+            surroundings = estimators.map_of(
+                mapped.to_map().centroids_W, one.name, estimators.Settings()
+            )
+            for name, (estimator, settings) in self._estimators.items():
+                by = localise.Localiser(surroundings, estimator, settings)
+                row, _ = by.query(
+                    k, k, drive.scan(k), X_WS[k], R_WT[k], *_STARTS.draw(k)
+                )
+                found[name].append(row)
+        for name, rows in found.items():
+            if rows:
+                result = localise.Localisation(np.array(rows))
+                values = [(n, v, UNKNOWN) for n, v in result.numbers().items()]
+                key = self._add(one, "localise", name, values, len(rows))
+                columns = result.columns()
+                self.answers.append(Answers(**vars(key), columns=columns))
+
+    def _judge(self, one: RealScans, made: Sequence[Drive]) -> None:
+        """Adds the rows of `judge`, by groups of features."""
+        if not one.data_set.whole:
+            self._note(f"{one.name}: thinned scans, not judged")
+            return
+        if importlib.util.find_spec("sklearn") is None:
+            self._note(
+                f"{one.name}: not judged; a package is not installed (pip"
+                " install 'cns-drake[judge]')"
+            )
+            return
+        from evaluation.real import judge
+
+        found = judge.judge_draws(
+            judge.places_of(one.drive),
+            [place for drive in made for place in judge.places_of(drive)],
+            _DRAWS,
+            self._track,
+        )
+        for group, auc in found["auc"].items():
+            values = {"auc": auc, "auc_control": found["control"][group]}
+            known = [(n, v, UNKNOWN) for n, v in values.items() if v == v]
+            number = found["patches"][0]
+            self._add(one, "judge", group, known, number, database="simulated")
+        if math.isnan(found["auc"]["all"]):
+            self._note(f"{one.name}: one place, not judged")
+
+
+def _joined(parts: Sequence[_Part], method: int) -> DescribedScans:
+    """Returns all places, those of other worlds far away."""
+    worlds = list(dict.fromkeys(part.world for part in parts))
+    every = [part.described[method].places for part in parts]
+    poses = []
+    for part, one in zip(parts, every, strict=True):
+        X_WS = one.X_WS.copy()
+        X_WS[:, 0, 3] += _APART * worlds.index(part.world)
+        poses.append(X_WS)
+    return DescribedScans(
+        frames=np.concatenate([one.frames for one in every]),
+        stamps_ns=np.concatenate([one.stamps_ns for one in every]),
+        X_WS=np.concatenate(poses),
+        descriptors=[d for one in every for d in one.descriptors],
+        clouds=[cloud for one in every for cloud in one.clouds],
+    )

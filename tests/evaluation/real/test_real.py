@@ -1,0 +1,185 @@
+"""`cns-eval real` on folders that the test fills: towns of boxes."""
+
+import hashlib
+
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.eval_program import run
+from helpers.layered_scans import matrix, seen_from, town
+import numpy as np
+import pytest
+
+from cns_drake.base.progress import silent
+from evaluation.real import data_sets
+from evaluation.real.measuring import Measuring
+from evaluation.results.table import QueryRows, Results
+
+# Frames of KITTI 00 by name: seed of the town, yaw, x, y. The first and the
+# third are of one place, as the second and the fourth are.
+FRAMES = {
+    "000026": (1, 0.1, 0.0, 0.0),
+    "000560": (2, 1.0, 400.0, 0.0),
+    "003528": (1, 2.5, 2.0, 1.0),
+    "004481": (2, 1.2, 401.0, 2.0),
+}
+METHODS = ("layered-overlap", "plane-icp")
+
+
+def fill(root, frames=FRAMES):
+    """Writes the frames as revisits of KITTI 00; returns the folder's root."""
+    folder = root / "kitti_00_revisits"
+    folder.mkdir(parents=True)
+    rows = ["# frame x y z qx qy qz qw"]
+    for name, (seed, yaw, x, y) in frames.items():
+        # A town stands about its first frame.
+        origin = [200.0 * (2 * seed - 2), 0.0]
+        scan = seen_from(town(seed), yaw, x - origin[0], y - origin[1])
+        four = np.c_[scan, np.full(len(scan), 0.5)].astype("<f4")
+        np.save(folder / f"{name}.npy", four)
+        cells = x, y, 1.6, 0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)
+        rows.append(" ".join(map(str, (int(name), *cells))))
+    (folder / "poses.txt").write_text("\n".join(rows) + "\n")
+    return root
+
+
+def ask(capsys, folder, output, *words, methods=METHODS):
+    """Runs the command; returns status, stdout, stderr."""
+    chosen = [word for one in methods for word in ("--method", one)]
+    return run(capsys, "real", folder, "--output", output, *chosen, *words)
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """Both tables, and the notes."""
+    notes = []
+    measuring = Measuring(METHODS, silent, notes.append)
+    measuring.run(fill(tmp_path_factory.mktemp("real")), None)
+    return measuring.results(), measuring.queries(), notes
+
+
+def values(results, **columns):
+    return {
+        row.metric: row.value
+        for row in results.where(experiment="real", gate=False, **columns).rows
+    }
+
+
+def test_each_scan_finds_the_other_of_its_place(measured):
+    results, queries, _ = measured
+    place = values(results, task="place")
+    assert (place["places"], place["with_match"]) == (4, 4)
+    assert place["r1"] == place["auc"] == 1.0
+    answers = queries.answers[0].columns
+    # Scan 0 finds scan 2, and so on; a scan never finds itself.
+    assert answers["match_frame"].tolist() == [2, 3, 0, 1]
+    wanted = [np.hypot(2, 1), np.hypot(1, 2)] * 2
+    np.testing.assert_allclose(answers["distance"], wanted, atol=1e-6)
+    assert values(results, task="pose")["rotation_median_deg"] < 6.0
+
+
+def test_each_scan_is_localised_in_the_map_of_the_others(measured):
+    results, _, _ = measured
+    found = values(results, task="localise", method="plane-icp")
+    assert found["success_03m_1deg"] == 1.0
+    assert found["translation_median"] < 0.1
+    rows = results.where(task="localise").rows
+    assert {row.n for row in rows} == {4}
+    assert {row.protocol for row in results.rows} == {"fair"}
+
+
+def test_what_is_missing_or_another_is_named(measured):
+    lines = measured[2]
+    for name in ("kitti_00/velodyne/*.bin", "nclt/*.bin"):
+        assert f"{name}: not there, skipped" in lines
+    assert any(
+        line.endswith("kitti_00_revisits: other scans than known, still used")
+        for line in lines
+    )
+    assert "hdl-64e: no simulated scan of it to judge" in lines
+
+
+def test_simulated_scans_add_places(tmp_path, capsys):
+    folder = fill(tmp_path / "scans")
+    drives = tmp_path / "drives"
+    for name, preset in (("one", "hdl-64e"), ("two", "hdl-32e")):
+        scenario = {"map": name, "lidars": {"lidar": {"preset": preset}}}
+        write_recording(
+            drives / f"{name}_01",
+            [make_scan(town(7 + k)) for k in range(3)],
+            [yaw_pose(20.0 * k, 0.0, 0.0, 0.0) for k in range(3)],
+            attachments={"scenario.json": scenario},
+        )
+    output = tmp_path / "out"
+    options = ("--simulated", drives)
+    status, out, err = ask(
+        capsys, folder, output, *options, methods=METHODS[:1]
+    )
+    assert (status, out) == (0, f"{output / 'results.csv'}\n"), err
+    results = Results.read(output)
+    # Those of the other unit stay away.
+    place = values(results, task="place")
+    assert (place["places"], place["r1"]) == (7, 1.0)
+    assert "kitti_00_revisits: thinned scans, not judged" in err
+    assert len(QueryRows.read(output).answers) == 2
+    # Beside another table, each has its own values.
+    status, out, err = run(capsys, "compare", "--rankings", output, output)
+    assert status == 2
+    assert "fewer than two methods" in err
+
+
+def test_the_digest_is_that_of_all_scans(tmp_path, monkeypatch):
+    folder = fill(tmp_path / "scans")
+    files = sorted((folder / "kitti_00_revisits").glob("*.npy"))
+    whole = b"".join(file.read_bytes() for file in files)
+    known = next(
+        one for one in data_sets.DATA_SETS if one.folder == "kitti_00_revisits"
+    )._replace(digest=hashlib.sha256(whole).hexdigest())
+    monkeypatch.setattr(data_sets, "DATA_SETS", (known,))
+    notes = []
+    (found,) = data_sets.open_data_sets(folder, notes.append)
+    assert notes == []
+    X_WS = found.drive.X_WS[3]
+    np.testing.assert_allclose(X_WS[:3, 3], [401.0, 2.0, 1.6])
+    np.testing.assert_allclose(X_WS[:3, :3], matrix(1.2), atol=1e-12)
+    files[0].write_bytes(whole)
+    (folder / "more").mkdir()
+    data_sets.open_data_sets(folder, notes.append)
+    assert [note.rpartition(": ")[2] for note in notes] == [
+        "other scans than known, still used",
+        "not known, left out",
+    ]
+
+
+def test_matrices_and_scans_without_times(tmp_path, capsys):
+    folder = tmp_path / "nuscenes_1072"
+    (folder / "velodyne").mkdir(parents=True)
+    rows = []
+    for k in range(3):
+        scan = town(1) - [4.0 * k, 0.0, 0.0]
+        four = np.c_[scan, np.full(len(scan), 17.0)].astype("<f4")
+        four.tofile(folder / "velodyne" / f"{k:06d}.bin")
+        rows.append(f"1 0 0 {4 * k} 0 1 0 0 0 0 1 1.84")
+    (folder / "poses.txt").write_text("\n".join(rows))
+    (one,) = data_sets.open_data_sets(tmp_path, lambda note: None)
+    np.testing.assert_array_equal(one.drive.X_WS[:, 0, 3], [0.0, 4.0, 8.0])
+    assert one.drive.scan(2).dtype.names == ("x", "y", "z", "intensity")
+    assert one.drive.lidar_field.rings == 32
+    (folder / "poses.txt").write_text("\n".join(rows[:2]))
+    status, out, err = ask(capsys, tmp_path, tmp_path / "out")
+    assert (status, out) == (2, "")
+    assert err.endswith("poses.txt: 2 rows for 3 scans\n")
+
+
+def test_faults_are_one_line(tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    output = tmp_path / "out"
+    for folder, fault in (
+        ("none", "none: no such folder"),
+        ("empty", "empty: no data set that is known (helipr_two_lidars, kit"),
+    ):
+        status, out, err = ask(capsys, tmp_path / folder, output)
+        assert (status, out) == (2, "")
+        assert fault in err.splitlines()[-1]
+        assert not (output / "results.csv").exists()
+    status, out, err = ask(capsys, tmp_path, output, methods=("nothing",))
+    assert (status, out) == (2, "")
+    assert "no method 'nothing'" in err
