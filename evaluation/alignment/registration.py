@@ -60,6 +60,11 @@ class Surface:
         return np.sort(rng.choice(count, number, replace=False))
 
     @cached_property
+    def covariances(self) -> np.ndarray:
+        """(N, 3, 3) of the neighbours of each point, flattened as for GICP."""
+        return covariances(self.cloud)
+
+    @cached_property
     def is_upright(self) -> np.ndarray:
         """(N,) bool, which points are on walls rather than the ground."""
         return np.abs(self.normals[:, 2]) < _UPRIGHT
@@ -83,6 +88,11 @@ class Registration:
     fitness: float
     structure: float
     covariance: np.ndarray
+
+
+def covariances(cloud: small_gicp.PointCloud) -> np.ndarray:
+    """Returns the covariances (N, 3, 3) that small_gicp has estimated."""
+    return np.reshape(cloud.covs(), (-1, 4, 4))[:, :3, :3]
 
 
 def make_surface(

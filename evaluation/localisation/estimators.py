@@ -1,8 +1,9 @@
 """Estimators: each moves a scan onto a map, from a start.
 
 Shipped are those of small_gicp (K. Koide, "small_gicp: Efficient and parallel
-algorithms for point cloud registration", JOSS 2024) and, as an optional extra,
-KISS-Matcher (H. Lim et al., ICRA 2025). An own one is a Python function.
+algorithms for point cloud registration", JOSS 2024), two with a robust kernel,
+and, as an optional extra, KISS-Matcher (H. Lim et al., ICRA 2025). An own one
+is a Python function.
 
 small_gicp's point to plane multiplies the offset of a pair by the normal along
 each axis of the world. It is the usual error on surfaces that are parallel to
@@ -26,14 +27,17 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import Track, silent
-from evaluation.alignment.registration import Surface, make_surface
+from evaluation.alignment.registration import (
+    Surface,
+    covariances,
+    make_surface,
+)
 from evaluation.clouds.cloud_files import OnNote, no_note, read_blocks
 from evaluation.drives.sampling import sample_frames, within_range
+from evaluation.localisation.robust import MAX_RANGE, align_robustly
 from evaluation.maps.voxel_maps import VoxelAccumulator, thin
 from evaluation.methods.method import run_module, with_named_faults
 
-# Points of scans are used up to here, along each axis of the LiDAR [m].
-MAX_RANGE = 100.0
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
 # A normal is fitted to no fewer points.
@@ -63,7 +67,7 @@ class Settings:
         width: greatest distance of a pair of points [m]. VGICP pairs a point
             with the Gaussian of its own voxel at any distance.
         last_width: width of a second alignment from the end of the first [m];
-            0 for none.
+            0 for none. The robust estimators shrink their width down to it.
         resolution: side of the voxels of VGICP and of KISS-Matcher [m].
         neighbours: number of points that a normal or a covariance is fitted
             to.
@@ -321,6 +325,34 @@ def _by_small_gicp(
     return Estimate(poses.inverse(X_VW) @ X, None, iterations)
 
 
+def _by_robust(
+    kind: str,
+    settings: Settings,
+    surroundings: LocalisationMap,
+    scan: np.ndarray,
+    measured: np.ndarray,
+    start: np.ndarray,
+) -> Estimate:
+    del measured
+    spread = None
+    if kind == "GICP":
+        source = small_gicp.PointCloud(scan)
+        small_gicp.estimate_covariances(
+            source, num_neighbors=settings.neighbours
+        )
+        spread = covariances(source)
+    X, iterations = align_robustly(
+        surroundings.surface,
+        scan,
+        start,
+        (settings.width, settings.last_width or settings.width),
+        settings.iterations,
+        _STILL,
+        spread,
+    )
+    return Estimate(X, None, iterations)
+
+
 def _by_kiss_matcher(
     package: ModuleType,
     settings: Settings,
@@ -395,13 +427,15 @@ _KINDS = {
     "gicp": "GICP",
     "vgicp": "VGICP",
 }
+_ROBUST = {"robust-plane-icp": "PLANE_ICP", "robust-gicp": "GICP"}
 KISS_MATCHER = "kiss-matcher"
-METHODS = (*_KINDS, KISS_MATCHER)
+METHODS = (*_KINDS, *_ROBUST, KISS_MATCHER)
 # The best on unchanged cities; see docs/localisation.md.
 _DEFAULTS = {
     "gicp": Settings(width=8.0),
     "plane-icp": Settings(width=4.0),
     "vgicp": Settings(resolution=1.0),
+    **dict.fromkeys(_ROBUST, Settings(width=6.0, last_width=0.5)),
 }
 
 
@@ -423,6 +457,8 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
     """
     if method in _KINDS:
         return partial(_by_small_gicp, _KINDS[method], settings)
+    if method in _ROBUST:
+        return partial(_by_robust, _ROBUST[method], settings)
     if method == KISS_MATCHER:
         try:
             import kiss_matcher

@@ -10,11 +10,14 @@ from helpers.eval_program import assert_refused, run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+import small_gicp
 
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
+from evaluation.alignment.registration import make_surface
 from evaluation.drives import open_drive
+from evaluation.localisation import robust
 from evaluation.localisation.estimators import (
     METHODS,
     Estimate,
@@ -36,6 +39,7 @@ from evaluation.localisation.localise import (
     mapped_frames,
     way_axes,
 )
+from evaluation.localisation.robust import _step
 from evaluation.recognition.query_outcomes import auroc
 
 SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
@@ -54,20 +58,20 @@ def sheet(origin, u, v, seed, density=4.0):
     return np.asarray(origin, float) + parts @ np.stack([u, v])
 
 
-def street(seed=0, *, ends=True):
+def street(seed=0, *, ends=True, density=4.0):
     """Returns a street along x between fronts, with ends and some blocks."""
+    length, up = (60.0, 0.0, 0.0), (0.0, 0.0, 12.0)
     parts = [
-        sheet((-30.0, -10.0, 0.0), (60.0, 0.0, 0.0), (0.0, 20.0, 0.0), seed),
-        sheet(
-            (-30.0, -10.0, 0.0), (60.0, 0.0, 0.0), (0.0, 0.0, 12.0), seed + 1
-        ),
-        sheet((-30.0, 10.0, 0.0), (60.0, 0.0, 0.0), (0.0, 0.0, 12.0), seed + 2),
+        sheet((-30.0, -10.0, 0.0), length, (0.0, 20.0, 0.0), seed, density),
+        sheet((-30.0, -10.0, 0.0), length, up, seed + 1, density),
+        sheet((-30.0, 10.0, 0.0), length, up, seed + 2, density),
     ]
     if ends:
         for k, x in enumerate((-22.0, -9.0, 4.0, 15.0, 27.0)):
             side = (-1.0) ** k
+            corner = x, 6.0 * side, 0.0
             parts.append(
-                sheet((x, 6.0 * side, 0), (0, 4 * side, 0), (0, 0, 12), 10 + k)
+                sheet(corner, (0.0, 4.0 * side, 0.0), up, 10 + k, density)
             )
     return np.concatenate(parts)
 
@@ -106,7 +110,9 @@ def test_the_truth_on_a_perfect_map_stays(method):
     assert row["unmapped"] == 0.0
 
 
-@pytest.mark.parametrize("method", ["plane-icp", "gicp", "vgicp"])
+@pytest.mark.parametrize(
+    "method", ["plane-icp", "gicp", "vgicp", "robust-gicp"]
+)
 def test_another_sample_of_the_same_street_is_found(method):
     found = localiser(street(0), method, default_settings(method))
     starts = Starts(0.5, 2.0)
@@ -119,6 +125,96 @@ def test_another_sample_of_the_same_street_is_found(method):
         errors.append(one_query(found, X_WS, near, offset, turn))
     right = is_right(np.array(errors, QUERY))
     assert right.mean() >= 0.98
+
+
+ROBUST = ("robust-plane-icp", "robust-gicp")
+
+
+@pytest.mark.parametrize("method", ROBUST)
+@pytest.mark.parametrize("frame", range(2))
+def test_a_moved_wall_misleads_only_plain_estimators(method, frame):
+    points = street()
+    moved = points + [0.0, 0.5, 0.0] * (points[:, 1:2] >= 10.0)
+    X_WS = a_pose(-5.0, 1.0, 1.7)
+    errors = {}
+    for one in (method, method.removeprefix("robust-")):
+        found = localiser(moved, one, default_settings(one))
+        start = Starts(0.5, 2.0).draw(frame)
+        errors[one] = one_query(found, X_WS, street(50), *start)
+    plain = errors.pop(method.removeprefix("robust-"))["translation_error"]
+    row = errors[method]
+    assert row["translation_error"] < 0.02 < 2.0 * plain
+    assert row["rotation_error_deg"] < 0.1
+    assert row["iterations"] > 3
+
+
+@pytest.mark.parametrize("method", ROBUST)
+def test_a_step_is_that_of_weighted_least_squares(method):
+    surface = make_surface(street(density=1.0))
+    X = a_pose(1.0, 2.0, 1.7)
+    scan = poses.transform(poses.inverse(X), street(9, density=0.1)) + 0.05
+    width, spread = 1.5, None
+    if method == "robust-gicp":
+        cloud = small_gicp.PointCloud(scan)
+        small_gicp.estimate_covariances(cloud, num_neighbors=10)
+        spread = np.array(cloud.covs())[:, :3, :3]
+    rows, wanted = [], []
+    for k, p in enumerate(scan):
+        arm = X[:3, :3] @ p
+        gaps = np.linalg.norm(surface.points - arm - X[:3, 3], axis=1)
+        near = gaps.argmin()
+        if gaps[near] >= width:
+            continue
+        off = arm + X[:3, 3] - surface.points[near]
+        root = surface.normals[near][None]
+        if spread is not None:
+            C = np.array(surface.cloud.covs()[near])[:3, :3]
+            C = (C + X[:3, :3] @ spread[k] @ X[:3, :3].T) / 2e-3
+            root = np.linalg.cholesky(np.linalg.inv(C)).T
+        kernel = width / 9.0
+        weight = kernel / (kernel + ((root @ off) ** 2).sum())
+        x, y, z = arm
+        turn = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+        rows.append(weight * root @ np.hstack([turn, np.eye(3)]))
+        wanted.append(-weight * root @ off)
+    least, *_ = np.linalg.lstsq(
+        np.concatenate(rows), np.concatenate(wanted), rcond=None
+    )
+    # The step is held by a little, where nothing else holds it.
+    np.testing.assert_allclose(
+        _step(surface, scan, X, width, spread), least, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("p", "width", "aligned"), [(1.999, 2.0, True), (2.001, 2.0, False)]
+)
+def test_a_pair_is_within_the_width(p, width, aligned):
+    surface = make_surface(sheet((0, 0, 0), (9, 0, 0), (0, 9, 0), 1, 20.0))
+    scan = surface.points[:40]
+    X = poses.make_pose(np.eye(3), np.array([0.0, 0.0, p]))
+    step = _step(surface, scan, X, width, None)
+    assert (np.abs(step).max() > 1.0) == aligned
+
+
+def test_the_search_is_narrowed_to_the_last_width(monkeypatch):
+    widths = []
+
+    def still(surface, scan, X, width, spread):
+        widths.append(width)
+        return np.array([0, 0, 0, 0.3, 0, 0]) * (len(widths) == 1)
+
+    monkeypatch.setattr(robust, "_step", still)
+    surface = make_surface(street())
+    start = np.eye(4)
+    end, steps = robust.align_robustly(
+        surface, street(), start, (6.0, 0.5), 50, (1e-4, 1e-5)
+    )
+    # Three times a deviation of 0.3 m, then of none.
+    assert widths == pytest.approx([6.0, 6.0, 0.9, 0.5])
+    assert steps == 4
+    np.testing.assert_allclose(end[:3, 3], [0.3, 0.0, 0.0])
+    np.testing.assert_array_equal(start, np.eye(4))
 
 
 @pytest.mark.parametrize("method", ["icp", "plane-icp", "gicp"])

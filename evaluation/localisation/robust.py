@@ -1,0 +1,111 @@
+"""Point to plane and GICP with a robust kernel and a shrinking search.
+
+What has changed makes wrong pairs, which small_gicp's wheel weighs like all
+others. Here a pair at a distance d off its surface weighs (k / (k + d^2))^2
+(Geman and McClure), and k falls with the width of the search.
+
+Width and kernel follow KISS-ICP (Vizzo et al., RA-L 2023): 3 s and s / 3 for a
+deviation s, that of the last alignment from its start, where a turn counts by
+what it moves a point at the greatest range. KISS-ICP takes it from the scans
+before; a scan that is localised by itself has none. It is aligned again and
+again from its own end, each time with at most half the width, until the least.
+"""
+
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base import poses
+from evaluation.alignment.registration import Surface
+
+# Points of scans are used up to here, along each axis of the LiDAR [m].
+MAX_RANGE = 100.0
+# Variance of small_gicp's covariances across their planes, of two points; along
+# them it is a thousand times as large.
+_ACROSS = 2e-3
+# An alignment with fewer pairs ends: they do not determine a pose.
+_FEWEST_PAIRS = 6
+
+
+def align_robustly(
+    surface: Surface,
+    scan: np.ndarray,
+    start: np.ndarray,
+    widths: tuple[float, float],
+    iterations: int,
+    still: tuple[float, float],
+    covariances: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
+    """Moves a scan onto a map.
+
+    Args:
+        surface: the map.
+        scan: (N, 3) in S [m].
+        start: X_WS (4, 4).
+        widths: greatest distance of a pair at first, and in the end [m].
+        iterations: greatest number of steps of each alignment.
+        still: an alignment ends with a step below these [m, rad].
+        covariances: (N, 3, 3) of the scan's points in S, for GICP; None for
+            point to plane.
+
+    Returns:
+        The end X_WS; the number of steps.
+    """
+    X, width, total = start.copy(), widths[0], 0
+    while True:
+        begin = X
+        for _ in range(iterations):
+            total += 1
+            step = _step(surface, scan, X, width, covariances)
+            R = Rotation.from_rotvec(step[:3]).as_matrix() @ X[:3, :3]
+            X = poses.make_pose(R, X[:3, 3] + step[3:])
+            move, turn = (np.linalg.norm(step[k : k + 3]) for k in (3, 0))
+            if move < still[0] and turn < still[1]:
+                break
+        if width <= widths[1]:
+            return X, total
+        difference = poses.inverse(begin) @ X
+        turn = Rotation.from_matrix(difference[:3, :3]).magnitude()
+        deviation = 2.0 * MAX_RANGE * math.sin(turn / 2.0)
+        deviation += float(np.linalg.norm(difference[:3, 3]))
+        width = max(widths[1], min(3.0 * deviation, width / 2.0))
+
+
+def _step(
+    surface: Surface,
+    scan: np.ndarray,
+    X_WS: np.ndarray,
+    width: float,
+    covariances: np.ndarray | None,
+) -> np.ndarray:
+    """Returns a Gauss-Newton step (6,) in W: turn about the LiDAR, move."""
+    arms = scan @ X_WS[:3, :3].T
+    found, squares = surface.tree.batch_nearest_neighbor_search(
+        arms + X_WS[:3, 3]
+    )
+    near = np.asarray(squares) < width**2
+    nearest = np.asarray(found, dtype=np.int64)[near]
+    if len(nearest) < _FEWEST_PAIRS:
+        return np.zeros(6)
+    arms = arms[near]
+    off = arms + X_WS[:3, 3] - surface.points[nearest]
+    if covariances is None:
+        n = surface.normals[nearest]
+        omega = n[:, :, None] * n[:, None]
+    else:
+        R = X_WS[:3, :3]
+        spread = surface.covariances[nearest] + R @ covariances[near] @ R.T
+        omega = _ACROSS * np.linalg.inv(spread)
+    pull = np.einsum("nij,nj->ni", omega, off)
+    kernel = width / 9.0
+    squares = np.einsum("ni,ni->n", off, pull)
+    weights = (kernel / (kernel + squares)) ** 2
+    # A small turn w moves a point by w x arm.
+    J = np.zeros((len(arms), 3, 6))
+    J[:, :, :3] = np.cross(np.eye(3), arms[:, None]).transpose(0, 2, 1)
+    J[:, :, 3:] = np.eye(3)
+    weighted = (J.transpose(0, 2, 1) @ omega) * weights[:, None, None]
+    H = np.einsum("nij,njk->ik", weighted, J) + 1e-6 * np.eye(6)
+    g = np.einsum("nij,nj->i", weighted, off)
+    return np.linalg.solve(H, -g)
