@@ -149,8 +149,13 @@ def new_building(
 ) -> Structure | None:
     """Draws another building for a plot; None if none fits.
 
-    It has about a height [m], and is not of the banned archetype. Footprints of
-    its neighbours are in W. Its name is the archetype with an ending.
+    Args:
+        plot: where it stands.
+        height: of the building, about [m].
+        banned: the archetype that it does not have.
+        neighbours: footprints of its neighbours in W.
+        rng: draws the building.
+        ending: of its name, after the archetype.
     """
     x0, y0, x1, y1 = plot.room().bounds
     names = [name for name in _BUILT_TODAY if name != banned]
@@ -303,8 +308,12 @@ def annex_to(
 ) -> Structure | None:
     """Returns an annex of one storey behind a building; None without room.
 
-    The building on the plot has triangles (M, 3, 3) in W [m]. Whether an area
-    in W may be built on is `is_free`.
+    Args:
+        plot: that of the building.
+        triangles: (M, 3, 3) of the building in W [m].
+        name: of the annex.
+        is_free: whether an area in W may be built on.
+        rng: draws its size.
     """
     cut = section(plot.triangles(triangles), 1.3)
     x0, _, x1, _ = plot.inside(plot.area).bounds

@@ -145,10 +145,17 @@ def extruded(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns walls and roof of a footprint, (M, 3, 3) each [m].
 
-    The roof is flat; pyramidal on any footprint; gabled or hipped on one of
-    four corners. Others are made flat, and counted as faults of the object.
-    Heights are those of the lowest and highest point, and that of the roof
-    above the eaves [m].
+    A roof that its footprint does not allow is made flat, and counted as a
+    fault.
+
+    Args:
+        polygon: the footprint.
+        low, high: heights of the lowest and the highest point [m].
+        name: of the object, for faults.
+        faults: counts what was made otherwise.
+        roof: `flat`; `pyramidal`, on any footprint; `gabled` or `hipped`, on
+            one of four corners.
+        roof_height: height of the roof above the eaves [m].
     """
     polygon = orient(polygon)
     eaves = high - roof_height

@@ -190,9 +190,17 @@ def make_imported(
 ) -> Imported:
     """Returns a structure of triangles in the world.
 
-    Its name is unique in the city. Each part of its surface has triangles (M,
-    3, 3) [m]; empty parts are left out, and not all are empty. A part without a
-    colour has that of the class, a key of `scene.semantics.CLASS_IDS`.
+    Args:
+        name: unique in the city.
+        semantic_class: a key of `scene.semantics.CLASS_IDS`.
+        kind: of object, as the file calls it.
+        surfaces: part of its surface -> triangles (M, 3, 3) [m]; empty parts
+            are left out, and not all are empty.
+        colours: part -> its colour; without one it has that of the class.
+        year: in which it was built; None if unknown.
+        until: year until which it stands; None if unknown.
+        tags: of the object in its file.
+        lod: its level of detail.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))

@@ -52,6 +52,13 @@ def write_world(
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
 
+    Args:
+        draft: folder of the map.
+        source: file that is imported, named in errors.
+        city: the structures of each stage.
+        bottom: structures of the ground, in all stages.
+        dressing: what was added to buildings and streets.
+
     Returns:
         Stage -> its numbers of structures and triangles.
     """
@@ -115,7 +122,12 @@ def city_facts(
 ) -> dict:
     """Returns the place of a city's map, and counts of drawn parts.
 
-    If the first stage was drawn, its changes are among them.
+    Args:
+        city: the city as the file has it.
+        options: of the import.
+        stages: names of the stages.
+        changes: of the first stage, if it was drawn at random.
+        dressing: what was added to buildings and streets.
     """
     facts: dict[str, object] = {
         "reference_system": city.reference_system or "unknown",
@@ -143,7 +155,15 @@ def write_facts(
     comment: str = "# Where this map comes from. A place of the map plus the"
     " origin is one of the\n# source [m].\n",
 ) -> None:
-    """Writes what is remembered of an import."""
+    """Writes what is remembered of an import.
+
+    Args:
+        draft: folder of the map.
+        source: file that is imported.
+        facts: what is remembered, by name.
+        faults: counts of repaired and omitted parts.
+        comment: first lines of the file.
+    """
     if "axes" in facts:
         comment += (
             "# Places of the source are brought to metres east, north and up"

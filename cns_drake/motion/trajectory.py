@@ -94,9 +94,11 @@ class BodyRide:
     ):
         """Makes the motion.
 
-        The (N, 3) heave [m], roll and pitch [rad], their rates and their
-        accelerations are given at N times a step [s] apart, from zero on. The
-        body turns about x = pivot in F [m].
+        Args:
+            q: (N, 3) heave [m], roll and pitch [rad], from time zero on.
+            dq, ddq: (N, 3) first and second derivatives of q.
+            step: time between two rows [s].
+            pivot: x in F of the axes about which the body turns [m].
         """
         self._pivot = pivot
         from scipy.interpolate import PPoly

@@ -398,11 +398,15 @@ class MeshcatRecorder(LeafSystem):
         shown: ShownStages | None = None,
         scan_spacing: float = 15.0,
     ):
-        """Declares the ports and the schedule, for frames a period [s] apart.
+        """Declares the ports and the schedule.
 
-        `X_BSs` has the pose in B of each LiDAR's frame S by its name. All
-        frames are recorded, or `num_frames`. `scan_spacing` is the distance
-        between two shown scans [m].
+        Args:
+            world: the world that is drawn.
+            X_BSs: name of a LiDAR -> pose of its frame S on the body B.
+            period: time between two frames [s].
+            num_frames: frames that are recorded; all if None.
+            shown: stages whose change the page shows.
+            scan_spacing: way between two shown scans [m].
         """
         super().__init__()
         self._world = world

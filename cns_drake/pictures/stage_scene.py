@@ -146,10 +146,15 @@ def render(
 ) -> np.ndarray:
     """Renders a view with sun, shadows, sky light and haze.
 
-    The scene is that of the geometries. The camera looks along x, y is left, z
-    up. Width and height are in pixels, `samples` is the number of rays per
-    pixel and axis. Haze has taken two thirds of the contrast at `haze_length`
-    [m]; infinite is clear air.
+    Args:
+        scene: the scene of the geometries, for rays.
+        geometries: what is drawn, with colours.
+        X_WC: pose of the camera: x ahead, y left, z up.
+        width, height: size of the image in pixels.
+        fov_y_deg: vertical field of view.
+        samples: rays for each pixel and axis.
+        haze_length: distance at which haze has taken two thirds of the contrast
+            [m]; infinite is clear air.
 
     Returns:
         (height, width, 3) uint8 sRGB image.

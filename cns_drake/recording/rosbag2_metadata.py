@@ -46,7 +46,15 @@ def describe_topic(
     metadata: Mapping[str, str],
     encoding: str = "cdr",
 ) -> dict:
-    """Returns the description of a topic and its messages."""
+    """Returns the description of a topic and its messages.
+
+    Args:
+        name: of the topic.
+        message_type: such as `sensor_msgs/msg/Imu`.
+        count: number of messages.
+        metadata: of its channel in the MCAP.
+        encoding: of the messages.
+    """
     return {
         "topic_metadata": {
             "name": name,
@@ -69,8 +77,11 @@ def make_bag_information(
 ) -> dict:
     """Returns the description of a recording of one file in its folder.
 
-    Topics are as `describe_topic` gives them. The first and the last message
-    are at start and end [ns]; `ros2 bag info` shows the custom data.
+    Args:
+        file_name: of the MCAP.
+        topics: as `describe_topic` returns them.
+        start_ns, end_ns: times of the first and the last message.
+        custom_data: what `ros2 bag info` shows besides.
     """
     count = sum(topic["message_count"] for topic in topics)
     span = {

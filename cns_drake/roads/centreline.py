@@ -126,13 +126,18 @@ def blend(
     spacing: float = 1.0,
     max_radius: float = np.inf,
 ) -> np.ndarray:
-    """Returns a smooth curve between two directed points.
+    """Returns a smooth curve between directed points, (N, 2) with both ends.
 
     If the straight continuations meet ahead of the start and behind the end,
     the curve is the widest allowed arc that touches both, with lines in front
     of and behind it, as a driver turns. Otherwise (parallel lanes that are
-    offset, S-bends) it is a cubic Hermite curve. Its (N, 2) points, ends
-    included, are about a spacing apart [m]; headings are in rad.
+    offset, S-bends) it is a cubic Hermite curve.
+
+    Args:
+        p_start, p_end: the points [m].
+        heading_start, heading_end: directions there [rad].
+        spacing: distance between two points of the curve, about [m].
+        max_radius: greatest radius of the arc [m].
     """
     p_start, p_end = np.asarray(p_start, float), np.asarray(p_end, float)
     d_start = _direction(heading_start)

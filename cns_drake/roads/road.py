@@ -168,10 +168,14 @@ class Road:
         setbacks: Sequence[float],
         heights: Sequence[float],
     ):
-        """Makes a road between two junctions of some heights [m].
+        """Makes a road between two junctions.
 
-        The curve is its whole centreline, and setbacks are the distances of its
-        ends from their junctions [m].
+        Args:
+            name: of the road.
+            entry: what the plan says of it.
+            curve: its whole centreline.
+            setbacks: distances of its two ends from their junctions [m].
+            heights: of the two junctions [m].
 
         Raises:
             ValueError: the setbacks leave nothing of the road, or its heights

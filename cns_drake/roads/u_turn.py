@@ -45,9 +45,14 @@ def loop_corners(
 
     A car comes along a line, leaves it to the right, goes round the centre to
     the left, and joins the line on which it leaves, again from the right. It
-    turns by more than 90 degrees. The bends at its ends have the loop's radius;
-    its centre is at most as far to the left of the lines [m]. Headings are
-    those of the lines [rad].
+    turns by more than 90 degrees. The bends at its ends have the loop's radius.
+
+    Args:
+        centre: of the loop [m].
+        heading_in, heading_out: directions of the two lines [rad].
+        radius: of the loop [m].
+        aside_in, aside_out: distance of the centre to the left of each line, at
+            most the radius [m].
     """
     swing_in = math.acos(min(1.0, (radius + aside_in) / (2 * radius)))
     swing_out = math.acos(min(1.0, (radius + aside_out) / (2 * radius)))
@@ -177,7 +182,11 @@ def outlines(
 ) -> np.ndarray:
     """Returns the (..., 4, 2) corners of cars seen from above [m].
 
-    Their frames are at (..., 2) places [m], with unit vectors ahead.
+    Args:
+        places: (..., 2) positions of their frames [m].
+        ahead: (..., 2) unit vectors in which they head.
+        rear, front: x of their ends in their frames [m].
+        half_width: half of their width [m].
     """
     left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
     corners = [

@@ -232,8 +232,11 @@ def ApplyImuConfig(
     They are `lcmt_drake_signal` on the channel `DRAKE_IMU_<name>`: specific
     force [m/s^2] and angular velocity [rad/s] in its frame.
 
-    The config is an `ImuConfig`. Other arguments and errors are those of
-    `ApplyLidarConfig`; the `scene_graph` is not used.
+    Args:
+        config: the IMU.
+        builder: of the diagram.
+        plant, lcm_buses, lcm: as of `ApplyLidarConfig`.
+        scene_graph: not used.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -284,6 +287,12 @@ def ApplyOdometryConfig(
         from cns_drake import ApplyOdometryConfig, OdometryConfig
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
+
+    Args:
+        config: the odometry.
+        builder: of the diagram.
+        plant, lcm_buses, lcm: as of `ApplyLidarConfig`.
+        scene_graph: not used.
     """
     section = _section(config, OdometrySection)
     rate = _checked_rate(config, section.rate)

@@ -34,8 +34,16 @@ def distracting_drives(
     These are the shipped drives of other maps, each through its own stage;
     then those of this map, along the same streets between other buildings, if
     it is shipped; then the drives of other maps through the other stages; then
-    through those cities drawn anew. The LiDARs of the query, whose city is left
-    out, measure all of them. Places are `spacing` apart [m].
+    through those cities drawn anew.
+
+    Args:
+        query: the drive whose LiDARs measure all of them, and whose city is
+            left out.
+        number: of places, about.
+        spacing: between two places [m].
+        output: folder for cities that are drawn anew.
+        cluster: runs the jobs.
+        on_note: takes what a user should know.
 
     Raises:
         InputError: a shipped map cannot be used.

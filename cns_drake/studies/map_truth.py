@@ -453,7 +453,15 @@ def write_page(
     table: Sequence[StructureChange],
     names: tuple[str, str],
 ) -> None:
-    """Writes the page: both maps from above, and the changed structures."""
+    """Writes the page: both maps from above, and the changed structures.
+
+    Args:
+        path: of the page.
+        pair: both maps.
+        truth: labels of the points of each map.
+        table: the changed structures.
+        names: of the two drives.
+    """
     low, step, shape = _frame(pair)
     maps = []
     for session, labels, name in zip(pair, truth, names, strict=True):

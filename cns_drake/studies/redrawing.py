@@ -60,9 +60,14 @@ def redraw_cities(
 ) -> dict[int, Path]:
     """Draws the city of a map anew, with progress on stderr.
 
-    An existing city of the same inputs and program is kept. The map needs
-    `roads.yaml` and `city.yaml`. The result is seed -> map folder of that city,
-    `<output>/<map>_c<seed>`, absolute.
+    An existing city of the same inputs and program is kept.
+
+    Args:
+        map_folder: has `roads.yaml` and `city.yaml`.
+        stage: the stage that is drawn.
+        seeds: one for each city.
+        output: folder for the cities.
+        cluster: runs the jobs.
 
     Raises:
         InputError: the map cannot be used, another file or folder has the name

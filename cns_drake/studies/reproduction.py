@@ -49,6 +49,18 @@ def reproduce_maps(
     With `quick`, only the report is made, of the same frames: drives that are
     not recorded yet are evaluated while they are simulated, and not recorded.
 
+    Args:
+        maps: names or folders; all shipped ones if None.
+        output: folder for all results.
+        cluster: runs the jobs.
+        with_pages: whether drives get web pages.
+        quick: whether only the report is made.
+        protocol: of place recognition.
+        own_methods: Python files of further methods.
+        settings: `METHOD.NAME=VALUE` each.
+        with_costs: whether times are measured.
+        on_note: takes what a user should know.
+
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step
             failed.

@@ -281,6 +281,15 @@ def train(
 
     Returns the weights, and (steps, 2) loss and share of right best places.
 
+    Args:
+        scans: images of scans and which of them are of one place.
+        steps: number of batches.
+        seed: of all draws.
+        state: file from which an interrupted training goes on.
+        digest: of the scans; a state of others is refused.
+        track: reports progress.
+        on_step: takes the number of a step and the weights.
+
     Raises:
         InputError: there is nothing to pair, the state is another training's,
             or JAX is not installed.
@@ -446,6 +455,13 @@ def make_weights(
 
     `<output>.training` keeps the scans and the state: an interrupted training
     goes on there.
+
+    Args:
+        plan: cities, drives and steps.
+        output: file of weights.
+        command: text that the file keeps.
+        cluster: runs the jobs.
+        track: reports progress.
 
     Returns:
         The picture of the curve, `<output>` with the ending `.png`.

@@ -218,9 +218,17 @@ def play_trace(
     """Returns the traffic of a trace, whose first time is that of the drive.
 
     Road users that would collide with the ego car, which is not part of SUMO's
-    simulation, are left out. Errors name the trace's path, the map's graph and
-    walkways give heights, and the seed is that of the kinds of cars. The last
-    frame is at `duration` [s], and the ego car arrives at `end` [s].
+    simulation, are left out.
+
+    Args:
+        trace: what SUMO wrote.
+        path: its file, named in errors.
+        graph, walkways: of the map; they give heights.
+        seed: of the kinds of cars.
+        duration: time of the last frame [s].
+        end: time at which the ego car arrives [s].
+        ego: motion of the ego car.
+        ego_box: its size.
 
     Raises:
         InputError: the trace is shorter than the drive, or is of another map.

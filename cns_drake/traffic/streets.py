@@ -366,8 +366,12 @@ def is_ego_far(
 ) -> bool:
     """Returns whether a vehicle can leave a lane before the ego car is there.
 
-    At the k-th time it is at a distance s along the lane [m]. It may have to
-    wait at the lane's end [s].
+    Args:
+        streets: all lanes, with the times of the ego car.
+        k: number of the time.
+        lane: number of the lane.
+        s: distance of the vehicle along the lane [m].
+        wait: time that it may have to wait at the lane's end [s].
     """
     until = streets.until[k, lane]
     if until == 0.0:

@@ -177,11 +177,20 @@ def plan_traffic(
     ego_box: EgoBox,
     drive: Trajectory | None = None,
 ) -> TrafficPlan:
-    """Plans traffic of wanted numbers for a drive of some duration [s].
+    """Plans traffic of wanted numbers for a drive.
 
-    Equal arguments give an equal plan. If the ego car follows other vehicles,
-    it has a `drive`, `ego` stands at its first place, and `duration` is the
-    longest. The plan has no collisions, but maybe fewer bodies than wanted.
+    Equal arguments give an equal plan. The plan has no collisions, but maybe
+    fewer bodies than wanted.
+
+    Args:
+        graph: lanes and crossings.
+        walkways: sidewalks, where walkers walk, and crossings.
+        vehicles, walkers: wanted numbers.
+        seed: of kinds, places and ways.
+        duration: of the drive [s]; the longest if the ego car follows others.
+        ego: motion of the ego car; at its first place if it follows others.
+        ego_box: its size.
+        drive: its path and speeds if it follows others, else None.
     """
     # Traffic goes on after the drive, for a LiDAR that is turning then.
     num_steps = _FIRST + int(np.ceil(duration / STEP)) + 4
@@ -403,8 +412,14 @@ def plan_queues(
 ) -> TrafficPlan:
     """Returns vehicles that stand in queues in all lanes between junctions.
 
-    A vehicle is not there while the ego car is at its place. For arguments, see
-    `plan_traffic`.
+    A vehicle is not there while the ego car is at its place.
+
+    Args:
+        graph: lanes and crossings.
+        seed: of kinds and gaps.
+        duration: of the drive [s].
+        ego: motion of the ego car.
+        ego_box: its size.
     """
     rng = np.random.default_rng(seed)
     kinds, rows = [], []

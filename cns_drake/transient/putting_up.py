@@ -207,9 +207,18 @@ class _Stretch:
         turn: float = 0.0,
         length: float = 0.0,
     ) -> None:
-        """Adds a thing at a place, turned, both ends on the ground [m, rad].
+        """Adds a thing at a place, both ends on the ground.
 
-        Without a length it stands upright. Without ground it is left out.
+        Without ground it is left out.
+
+        Args:
+            around: the ground and what stands on it.
+            suffix: of its name.
+            semantic_class: its class.
+            model: its shape.
+            x, y: its place [m].
+            turn: its heading [rad].
+            length: distance of its two ends [m]; without one it stands upright.
         """
         ground, yaw = around.ground, self.yaw + turn
         middle = self.place(x, y)

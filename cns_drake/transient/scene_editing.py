@@ -123,7 +123,15 @@ class SceneEditing:
         X_WS: RigidTransform,
         cause: str,
     ) -> None:
-        """Adds a structure of a unique name, a model of the city generator."""
+        """Adds a structure.
+
+        Args:
+            name: unique in the world.
+            semantic_class: its class.
+            model: a model of the city generator.
+            X_WS: its pose.
+            cause: the switch that adds it.
+        """
         for part in model.parts:
             self._register(
                 f"{name}/{part.name}",
@@ -167,7 +175,12 @@ class SceneEditing:
     ) -> None:
         """Adds a part of triangles to the structure of another part.
 
-        They are (M, 3) indices of (N, 3) vertices in the world [m].
+        Args:
+            part: the other part.
+            name: of the new part.
+            p_WVs: (N, 3) vertices [m].
+            triangles: (M, 3) indices of vertices.
+            look: its colour and material.
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
         mesh = _memory_mesh(product(p_WVs - p, R), triangles)
@@ -183,7 +196,16 @@ class SceneEditing:
         look: Look,
         cause: str,
     ) -> None:
-        """Adds a structure of triangles, see `add_triangles`."""
+        """Adds a structure of triangles.
+
+        Args:
+            name: unique in the world.
+            semantic_class: its class.
+            p_WVs: (N, 3) vertices [m].
+            triangles: (M, 3) indices of vertices.
+            look: its colour and material.
+            cause: the switch that adds it.
+        """
         middle = np.round(p_WVs.mean(axis=0))
         self._register(
             f"{name}/surface",

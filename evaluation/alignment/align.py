@@ -153,6 +153,14 @@ def in_one_world(
     "auto" aligns drives whose world frames differ by name. With `across_maps`
     they may be of maps of different names.
 
+    Args:
+        first, second: the drives.
+        when: `auto` aligns drives whose world frames differ by name; `always`,
+            `never`.
+        track: reports progress.
+        hold_first: as of `align`.
+        across_maps: whether the drives may be of maps of different names.
+
     Raises:
         InputError: if they should be aligned and cannot be.
     """

@@ -130,7 +130,14 @@ def run(
 ) -> PlaceRecognition:
     """Runs a method on a pair of drives.
 
-    All but the mode, which says which queries count, is as for `retrieve`.
+    Args:
+        database, query: the drives.
+        method: the method.
+        mode: which queries count.
+        protocol: as for `retrieve`.
+        track: reports progress.
+        across_maps: whether the drives may be of maps of different names.
+        overlaps: as for `retrieve`.
 
     Raises:
         InputError: as `retrieve` does, or if no query has a match.
@@ -158,6 +165,13 @@ def judge_retrieval(
     mode: Mode = "all",
 ) -> PlaceRecognition:
     """Returns the numbers of a method's retrieval.
+
+    Args:
+        method: the method.
+        database, query: names of the drives.
+        retrieval: what the method found.
+        protocol: by which it was asked.
+        mode: which queries count.
 
     Raises:
         InputError: if no query has a match.

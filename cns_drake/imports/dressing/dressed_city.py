@@ -246,10 +246,18 @@ def dress_buildings(
 
     A building looks the same in each stage and each import, since its random
     draws depend on its name. Only the choice of walls with windows depends on
-    the drives, whose neighbourhood gets them. Structures of all stages,
-    `always`, hide what is behind them; all structures do if it is None. Doors
-    and shops face streets, and doors stand above the paving, triangles (M, 3,
-    3) of terrain, streets and sidewalks [m].
+    the drives, whose neighbourhood gets them. Doors and shops face streets.
+
+    Args:
+        structures: the structures of the city, of which buildings are dressed.
+        drives: the drives, whose distance decides the detail.
+        streets: the streets that doors and shops face.
+        ground: the ground on which buildings stand.
+        seed: of all random draws.
+        always: structures that stand in all stages and hide what is behind
+            them; all structures if None.
+        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
+            which doors stand [m].
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = all_laid_bare(buildings, ground, seed)
@@ -416,6 +424,13 @@ def dress_city(
     """Dresses buildings and streets.
 
     Things that get a place are removed from the faults of the city.
+
+    Args:
+        staged: the structures of each stage.
+        city: the city as the file has it.
+        drives: the drives, whose distance decides the detail.
+        ground: the ground.
+        seed: of all random draws.
 
     Raises:
         InputError: if there are more structures than a map may have.

@@ -144,8 +144,12 @@ def plan_facade(
 ) -> FacadePlan:
     """Returns a wall full of windows.
 
-    Base and ground are the heights of the lowest floor of the building, and of
-    the ground before the panel; the nearest drive is `to_drive` away [m].
+    Args:
+        panel: the wall.
+        style: the style of its building.
+        base: height of the lowest floor of the building [m].
+        ground: height of the ground before the panel [m].
+        to_drive: distance of the nearest drive [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
     cells = bays.stretches(panel.length, style.pitch, _MARGIN)

@@ -156,6 +156,15 @@ class StreetRoom:
         bottom: Sequence[Structure],
         found: StreetThings,
     ):
+        """Prepares what stands already.
+
+        Args:
+            structures: structures of the city.
+            drives: the drives, which are kept free.
+            ground: the ground on which things stand.
+            bottom: structures of the ground.
+            found: gets the things that are placed.
+        """
         self.found = found
         self._ground = ground
         self.paths = MultiLineString([drive.path for drive in drives])
@@ -205,6 +214,13 @@ class StreetRoom:
         """Places an object on the lowest ground below it, if there is room.
 
         Only cars stand on carriageways.
+
+        Args:
+            name: of the new structure.
+            kind: of object, the name of its mesh.
+            xy: its place [m].
+            yaw: its heading [rad].
+            rng: draws its variant and colours.
         """
         builder = OBJECTS[kind]
         at = np.array([xy])
@@ -378,6 +394,15 @@ def dress_streets(
 
     Those of the file come first. Drives are kept free of things; without any
     nothing is placed.
+
+    Args:
+        structures: what stands already.
+        things: small things of the file.
+        streets: the streets along which things are added.
+        drives: the drives, which are kept free.
+        ground: the ground on which things stand.
+        bottom: structures of the ground.
+        seed: of all random draws.
     """
     found = StreetThings()
     if not drives:

@@ -127,8 +127,15 @@ def make_style(
 ) -> Style:
     """Draws the style of a building; its tags take precedence.
 
-    The area of its footprint, about, and the height of its walls matter [m^2,
-    m]. The number of draws does not depend on the tags.
+    The number of draws does not depend on the tags.
+
+    Args:
+        tags: tags of the building, as in OpenStreetMap.
+        year: of construction; None if unknown.
+        area: of its footprint, about [m^2].
+        height: of its walls [m].
+        is_flat: whether its roof is flat.
+        rng: draws everything that no tag says.
     """
     use, is_tagged = building_use(tags, area, height)
     by_tag = {"use"} if is_tagged else set()

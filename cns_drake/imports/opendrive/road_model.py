@@ -103,10 +103,13 @@ class Cubic:
     ):
         """Prepares the arc length.
 
-        Each coordinate has four coefficients, of p^0 first [m], and p is `last`
-        at the end, or the distance itself by `by_parameter`. The whole curve is
-        stretched to its length in the file [m], or else ends where that is
-        reached.
+        Args:
+            u, v: four coefficients of each coordinate, of p^0 first [m].
+            last: p at the end.
+            length: of the curve in the file [m].
+            by_parameter: whether p is the distance itself.
+            stretched: whether the whole curve is stretched to that length; else
+                it ends where the length is reached.
         """
         self._u, self._v = (np.polynomial.Polynomial(one) for one in (u, v))
         self._du, self._dv = self._u.deriv(), self._v.deriv()

@@ -359,7 +359,13 @@ def make_buildings(
 ) -> Iterator[Imported]:
     """Yields buildings; parts replace the area that they cover.
 
-    With `once`, buildings that lie in each other are joined.
+    Args:
+        areas: outlines and parts.
+        local: turns degrees into metres.
+        year_attribute: tag that has the year of construction; None for the
+            usual ones.
+        faults: counts what was repaired or omitted.
+        once: whether buildings that lie in each other are joined.
     """
     outlines: list[_Block] = []
     parts: list[_Block] = []

@@ -106,8 +106,12 @@ def tag_value(
 ) -> float | None:
     """Returns the value of a tag, as read; None if it has no valid one.
 
-    A valid one is plausible, from least to most. Others are counted for a
-    thing, whose name and counts are `where`, unless that is None.
+    Args:
+        tags: of a thing.
+        key: of the tag.
+        read: reads the text; None if it cannot.
+        most, least: limits of a plausible value. Others are counted.
+        where: name of the thing and counts of faults; None to count nothing.
     """
     text = tags.get(key)
     if text is None:

@@ -503,6 +503,15 @@ def lanes_of_streets(
 
     Traffic keeps to the streets near drives. Parked cars and other things that
     were added beside the streets are named in the file if they stand in a lane.
+
+    Args:
+        streets: streets of the file.
+        places: where the streets, sidewalks and crossings lie.
+        structures: what stands beside them, from the file.
+        added: things that were added, which the text names if they stand in a
+            lane.
+        drives: the drives, near which there is traffic.
+        drive_on: side of the road; None for that of each street.
     """
     if not drives:
         return None

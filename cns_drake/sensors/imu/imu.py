@@ -158,6 +158,15 @@ def add_described_imu(
 ) -> dict[str, OutputPort]:
     """Adds the IMU that a description describes to a diagram.
 
+    Args:
+        config: the description.
+        builder: of the diagram.
+        body: that carries the IMU.
+        trajectory: motion of that body.
+        motion: the system that moves it.
+        scan_rate: scans per second, the rate of an IMU without one.
+        seed: of its errors.
+
     Returns:
         The ports `specific_force` and `angular_velocity`; and `imu_samples`
         of an IMU with a rate or errors of its own.
@@ -252,10 +261,14 @@ class VehicleImu(LeafSystem):
     ):
         """Declares the ports.
 
-        Gravity is the acceleration of free fall [m/s^2], the rate the samples
-        per second. `measure` adds errors: it takes the number of the first
-        sample and (N, 6) exact specific forces and angular velocities, and
-        returns the measured ones. By default there are no errors.
+        Args:
+            trajectory: motion of the body B.
+            X_BI: pose of the IMU.
+            gravity_W: acceleration of free fall [m/s^2].
+            rate: samples per second.
+            measure: adds errors: takes the number of the first sample and (N,
+                6) exact specific forces and angular velocities, and returns the
+                measured ones. By default there are no errors.
         """
         super().__init__()
         self._trajectory = trajectory

@@ -793,9 +793,17 @@ def assemble_points(
 ) -> None:
     """Fills a scan, one point of `POINT_DTYPE` for each of N returns.
 
-    `met` has the (N,) int32 index of the hit geometry in the uint16 labels and
-    instances; negative for the weather. Coordinates are rounded to multiples of
-    the step [m]; not rounded if it is 0. NumPy takes a fifth of a frame.
+    Compiled, since NumPy would take a fifth of a frame.
+
+    Args:
+        scan: (N,) points, filled here.
+        table: beams of the pattern.
+        returns: what the beams met.
+        met: (N,) int32 index of the hit geometry in labels and instances;
+            negative for the weather.
+        label, instance: uint16 of each geometry.
+        step: coordinates are rounded to its multiples [m]; not rounded if it is
+            0.
     """
     # As names of their own, fields are fast.
     beams, ranges, intensity = returns.beams, returns.ranges, returns.intensity

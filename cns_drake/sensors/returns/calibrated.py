@@ -143,11 +143,19 @@ class CalibratedReturns:
         times: np.ndarray,
         frame: int,
     ) -> Reported:
-        """Returns the reported points of a turn, the `frame`-th.
+        """Returns the reported points of a turn.
 
-        Ray i of the order of casting takes the (K, 3) positions and (K, 3, 3)
-        orientations of S, and the (T,) times, at i mod K and i mod T. Times are
-        parts of the turn.
+        Ray i of the order of casting takes pose i mod K and time i mod T.
+
+        Args:
+            scene: what rays meet.
+            materials: of its geometries.
+            pattern: the beams of a turn.
+            turn: what is drawn for the turn.
+            p_WSset: (K, 3) positions of S [m].
+            R_WSset: (K, 3, 3) orientations of S.
+            times: (T,) parts of the turn.
+            frame: number of the turn.
         """
         key = frame_key(self.seed, self.sensor_name, frame)
         reach = self.reach(pattern.max_range)
@@ -309,7 +317,16 @@ class CalibratedTurn:
         range_error: np.ndarray,
         gain: np.ndarray,
     ):
-        """Takes the attributes, all in firing order."""
+        """Takes the attributes, all in firing order.
+
+        Args:
+            beams: of the pattern.
+            d_Sset: their directions.
+            reported: directions that the unit reports.
+            height: of each laser above the origin [m].
+            range_error: of each laser [m].
+            gain: of each laser.
+        """
         self.range_error, self.gain = range_error, gain
         self.reported = reported
         self.p_SLset = np.outer(height, (0.0, 0.0, 1.0))

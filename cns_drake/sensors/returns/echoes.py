@@ -96,8 +96,14 @@ def report_echoes(
 
     Light less than a pulse apart is one echo, whose distance is the mean by
     energy. An echo is detected by the probability of its SNR, and its distance
-    has the standard deviation that belongs to that. The (N,) errors of range
-    [m] and gains are those of each beam's laser.
+    has the standard deviation that belongs to that.
+
+    Args:
+        light: what came back.
+        receiver: of the unit.
+        key: of the random draws.
+        range_error: (N,) error of range of each beam's laser [m].
+        gain: (N,) gain of each beam's laser.
     """
     num_beams = len(gain)
     unit = receiver.budget, receiver.extinction, receiver.sheet.resolution

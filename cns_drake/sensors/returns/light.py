@@ -116,8 +116,13 @@ def reflect(
 ) -> Light:
     """Returns the light of N rays that surfaces reflect.
 
-    Each stands for a share of its beam, and `distance` is the whole way of the
-    light to the surface [m]. The cosine is that of the angle of incidence.
+    Args:
+        beam: (N,) number of the beam of each ray.
+        share: (N,) part of its beam for which a ray stands.
+        distance: (N,) whole way of the light to the surface [m].
+        geometry: (N,) number of the geometry that each ray meets.
+        cosine: (N,) cosine of the angle of incidence.
+        materials: of the geometries.
     """
     energy = np.empty(len(beam))
     for k in range(len(beam)):

@@ -83,8 +83,12 @@ def start_ways(
 ) -> tuple[list[Light], Ways, BeamHits]:
     """Returns what opaque surfaces send back, and the rays that meet others.
 
-    The axis of a beam represents the (N,) rest of its light. Misses at sides do
-    not count.
+    Args:
+        shots: the beams.
+        rest: (N,) part of its light for which the axis of a beam stands.
+        hits: what the axes meet.
+        sides: additional rays at edges.
+        side_hits: what these meet; misses do not count.
 
     Returns:
         The light, the rays that meet panes or leaves, and what they meet.

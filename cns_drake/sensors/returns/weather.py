@@ -149,9 +149,14 @@ def tabulate_scattering(
     """Returns the detected echoes of the weather.
 
     Drops are a Poisson process in distance and diameter. Each is detected by
-    the probability of its own SNR, which thins it to another such process. The
-    divergence is half the angle of a beam [rad], the resolution the length of a
-    pulse, there and back [m].
+    the probability of its own SNR, which thins it to another such process.
+
+    Args:
+        weather: fog, rain and snowfall.
+        budget: of the unit: SNR by distance and reflectivity.
+        divergence: half the angle of a beam [rad].
+        resolution: length of a pulse, there and back [m].
+        min_range: least range of the unit [m].
     """
     distances = _DISTANCES[min_range < _DISTANCES]
     distances = np.concatenate([[min_range], distances])

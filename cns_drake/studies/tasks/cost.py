@@ -54,6 +54,13 @@ def measure_costs(
 
     `query_ms` is the median CPU time of some queries, `build_ms` that of a
     database from descriptions.
+
+    Args:
+        reporter: reports progress.
+        database, query: described drives, one part for each method.
+        distractors: described drives through other cities.
+        num_distractors: number of their places.
+        methods: those that are measured.
     """
     found = {}
     for k, choice in enumerate(reporter.track(methods, "", len(methods))):

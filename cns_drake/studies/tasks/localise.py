@@ -133,9 +133,16 @@ def measure_localisation(
 ) -> list[np.ndarray]:
     """Localises the queries of a pair of drives in one world.
 
-    Each scan is read once, since a drive may be made while it is read. Methods
-    are names, or Python files, whose texts make them other inputs. The spacing
-    is between two queries [m].
+    Each scan is read once, since a drive may be made while it is read.
+
+    Args:
+        reporter: reports progress.
+        database: the drive of the map.
+        query: the drive whose scans are localised.
+        methods: names, or Python files.
+        texts: contents of those files, which make them other inputs.
+        starts: how far away and how often each query starts.
+        spacing: between two queries [m].
 
     Returns:
         (K,) of `QUERY` for each method and start, the starts of a method side

@@ -156,7 +156,15 @@ class Jobs:
         needs: Iterable[str] = (),
         cost: float = 20.0,
     ) -> Part:
-        """Adds the job of a part, named like it; returns the part."""
+        """Adds the job of a part, named like it; returns the part.
+
+        Args:
+            part: its file and name.
+            function: what the job runs.
+            arguments: of the function.
+            needs: names of jobs that come first.
+            cost: of the job, about [s].
+        """
         name = f"{part.path.parent.name} {part.path.stem}"
         step = MakePart(part, function, arguments)
         self.jobs[name] = Job(name, step, tuple(needs), cost)

@@ -88,7 +88,11 @@ def measure_maps(
 ) -> dict[str, dict[str, float | None]]:
     """Maps two drives and scores methods like `score_methods`.
 
-    Scans are `spacing` apart [m].
+    Args:
+        reporter: reports progress.
+        database, query: the older and the newer drive.
+        methods: names of change detectors.
+        spacing: way between two scans [m].
     """
     a, b = (
         map_truth.simulate_survey(source.scenario)
