@@ -1,6 +1,5 @@
 """How both programs make commands of functions, and the options they share."""
 
-
 from collections.abc import Callable, Mapping
 import functools
 import inspect
