@@ -1,6 +1,5 @@
 """The commands that run studies: what change costs each method."""
 
-
 from pathlib import Path
 from typing import Annotated, Any
 

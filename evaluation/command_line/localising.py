@@ -1,6 +1,5 @@
 """The command `localise`."""
 
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
