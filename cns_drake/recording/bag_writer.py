@@ -243,19 +243,13 @@ class BagWriter:
             return
         self._check_order(topic, stamp_ns)
         channel_id = self._channel_ids[topic]
-        # The block of `_writing`, written out: a context manager would take
-        # a third of the time of a small message.
-        self._intact = False
-        try:
+        with self._writing():
             if stamp_ns - self._flushed_ns >= _FLUSH_PERIOD_NS:
                 self._writer.flush()
                 self._flushed_ns = stamp_ns
             self._writer.add_message(
                 channel_id, stamp_ns, data, stamp_ns, sequence
             )
-        except OSError as error:
-            raise files.file_error(self._part, error) from error
-        self._intact = True
         self._counts[topic] += 1
         self._latest_ns[topic] = stamp_ns
         first_ns = self._span_ns[0] if self._span_ns else stamp_ns
