@@ -31,18 +31,18 @@ from cns_drake.sensors.imu.noise import ImuNoise as ImuNoise
 from cns_drake.sensors.lidar.adding import add_lidar as add_lidar
 from cns_drake.sensors.lidar.adding import add_lidar_view as add_lidar_view
 from cns_drake.sensors.lidar.lidar import Lidar as Lidar
-from cns_drake.sensors.lidar.livox_patterns import (
-    NoddingPattern as NoddingPattern,
-)
-from cns_drake.sensors.lidar.livox_patterns import (
-    RosettePattern as RosettePattern,
-)
 from cns_drake.sensors.lidar.measurement import (
     MeasurementModel as MeasurementModel,
 )
 from cns_drake.sensors.lidar.patterns import BeamPattern as BeamPattern
 from cns_drake.sensors.lidar.patterns import (
     DirectionPattern as DirectionPattern,
+)
+from cns_drake.sensors.lidar.patterns import (
+    NoddingPattern as NoddingPattern,
+)
+from cns_drake.sensors.lidar.patterns import (
+    RosettePattern as RosettePattern,
 )
 from cns_drake.sensors.lidar.patterns import SpinningPattern as SpinningPattern
 from cns_drake.sensors.lidar.patterns import (

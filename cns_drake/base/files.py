@@ -43,12 +43,7 @@ def user_errors(path: Path | str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise file_error(path, error) from error
-
-
-def file_error(path: Path | str, error: OSError) -> InputError:
-    """Returns an error of the file system as one line that names the file."""
-    return InputError(f"{path}: {error.strerror or error}")
+        raise InputError(f"{path}: {error.strerror or error}") from error
 
 
 @contextlib.contextmanager

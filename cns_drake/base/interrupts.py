@@ -13,6 +13,7 @@ from typing import NoReturn
 INTERRUPTED = 130
 # The signals that interrupt.
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_Handler = Callable[[int, FrameType | None], object]
 
 
 def interrupt_on_termination(once: bool = False) -> None:
@@ -31,6 +32,28 @@ def interrupt_on_termination(once: bool = False) -> None:
 
 
 @contextlib.contextmanager
+def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
+    """Has a function handle signals meanwhile; yields what did so before.
+
+    Signals that are ignored, or that end the process, stay so. Handlers can be
+    set, and run, in the main thread only.
+    """
+    before: dict[int, _Handler] = {
+        number: handler
+        for number in SIGNALS
+        if threading.current_thread() is threading.main_thread()
+        and callable(handler := signal.getsignal(number))
+    }
+    for number in before:
+        signal.signal(number, handle)
+    try:
+        yield before
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
     """Makes interrupts wait; for imports.
 
@@ -39,18 +62,10 @@ def uninterrupted() -> Iterator[None]:
     help: a library's threads can receive them as well.
     """
     waiting: list[int] = []
-    before = {}
-    # Handlers can be set, and run, in the main thread only.
-    if threading.current_thread() is threading.main_thread():
-        before = {
-            number: signal.signal(number, lambda n, frame: waiting.append(n))
-            for number in SIGNALS
-        }
     try:
-        yield
+        with _handled_by(lambda number, frame: waiting.append(number)):
+            yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         if waiting:
             signal.raise_signal(waiting[0])
 
@@ -62,17 +77,8 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
     Raised anywhere, its exception can come up inside the conversion of
     arguments for a C++ function, which takes it for a type that does not fit
     and goes on with another error. A second one, before the first has
-    struck, strikes at once; later ones do not disturb the closing. Signals
-    that are ignored, or that end the process, stay so.
+    struck, strikes at once; later ones do not disturb the closing.
     """
-    handlers: dict[int, Callable[[int, FrameType | None], object]] = {}
-    # Handlers can be set, and run, in the main thread only.
-    if threading.current_thread() is threading.main_thread():
-        handlers = {
-            number: handler
-            for number in SIGNALS
-            if callable(handler := signal.getsignal(number))
-        }
     waiting: list[int] = []
     struck: list[int] = []
 
@@ -87,13 +93,10 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
             struck.append(waiting[0])
             raise KeyboardInterrupt
 
-    for number in handlers:
-        signal.signal(number, wait)
     try:
-        yield strike
+        with _handled_by(wait) as handlers:
+            yield strike
     finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
         if waiting and not struck:
             signal.raise_signal(waiting[0])
 

@@ -1,7 +1,5 @@
 """What a process may use: processors, and Python's search for garbage."""
 
-from collections.abc import Iterator
-import contextlib
 import gc
 import os
 
@@ -15,22 +13,6 @@ def num_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-@contextlib.contextmanager
-def uncollected() -> Iterator[None]:
-    """Has Python look for no garbage meanwhile.
-
-    A process that builds up millions of objects, and drops few, looks through
-    all of them again and again. What no reference cycle holds is freed as ever.
-    """
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 def look_seldom() -> None:

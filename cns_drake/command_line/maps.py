@@ -14,7 +14,6 @@ import typer
 from cns_drake.base.csv_files import whole_number
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.process import uncollected
 from cns_drake.base.terminal import note, print_rows
 from cns_drake.imports.options import (
     REPORT_NAME,
@@ -217,14 +216,13 @@ def import_city(
         from cns_drake.imports import import_map
         from cns_drake.scenarios.drive_table import write_table
 
-    with uncollected():
-        report = import_map.import_city(
-            path,
-            output,
-            options,
-            note,
-            finish=lambda folder, sizes: write_table(folder, note, sizes),
-        )
+    report = import_map.import_city(
+        path,
+        output,
+        options,
+        note,
+        finish=lambda folder, sizes: write_table(folder, note, sizes),
+    )
     for line in _shortcomings(report, output, options):
         note(f"{output}: {line}")
     print_rows(_report_rows(report, output, options.years))
@@ -388,18 +386,17 @@ def age(
             f"{maps[0]}: neither a shipped map ({', '.join(shipped_maps())}) "
             "nor a folder"
         )
-    with uncollected():
-        aged = age_map(
-            folder,
-            wanted,
-            seed,
-            read_rates(rates, rate),
-            output,
-            note,
-            finish=lambda draft, one: (
-                draw_pictures(draft, one, note) if pictures else None
-            ),
-        )
+    aged = age_map(
+        folder,
+        wanted,
+        seed,
+        read_rates(rates, rate),
+        output,
+        note,
+        finish=lambda draft, one: (
+            draw_pictures(draft, one, note) if pictures else None
+        ),
+    )
     rows = [
         (f"stage {stage}", f"year {year}" if year else "today")
         for stage, year in aged.years.items()

@@ -73,15 +73,12 @@ class MarkedDrive(McapDrive):
                 f"{self._path}: {self._lidar_topic}: scan {index}: no field "
                 "label, or no field instance"
             )
-        points = np.empty(
-            len(recorded),
+        points = recorded.astype(
             [
                 (name, np.uint16 if name == "label" else recorded.dtype[name])
                 for name in names
-            ],
+            ]
         )
-        for name in names:
-            points[name] = recorded[name]
         for label, instances in self._absent_by_label.items():
             points["label"][np.isin(points["instance"], instances)] = label
         return points

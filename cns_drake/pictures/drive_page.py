@@ -513,12 +513,7 @@ def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:
 def _thinned(p_WRset: np.ndarray) -> np.ndarray:
     """Returns an evenly spread part of a point set."""
     cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
-    # One number for each cube, in the order of x, y, z: it is sorted in a
-    # fraction of the time of three.
-    cubes -= cubes.min(axis=0, initial=0)
-    _, num_y, num_z = cubes.max(axis=0, initial=0) + 1
-    numbers = (cubes[:, 0] * num_y + cubes[:, 1]) * num_z + cubes[:, 2]
-    _, first = np.unique(numbers, return_index=True)
+    _, first = np.unique(cubes, axis=0, return_index=True)
     count = min(len(first), _MAX_POINTS_PER_SCAN)
     # Points are dropped evenly over the sorted cubes, so on all sides alike.
     kept = first[np.linspace(0, len(first) - 1, count).astype(int)]

@@ -32,8 +32,6 @@ _ZENITH_RGB = np.array([0.42, 0.60, 0.84])
 # Distance at which haze has taken two thirds of the contrast [m].
 HAZE_LENGTH = 1200.0
 _FAR = 5000.0
-# Rows that are drawn at once.
-_ROWS = 16
 _DEFAULT_RGB = (0.7, 0.7, 0.7)
 
 
@@ -162,27 +160,23 @@ def render(
     rgb = np.array(
         [_DEFAULT_RGB if g.rgb is None else g.rgb for g in geometries]
     )
-    image = np.zeros((height, width, 3))
+    image = np.zeros((height * width, 3))
     half_height = np.tan(np.deg2rad(fov_y_deg) / 2.0)
     half_width = half_height * width / height
-    # What belongs to a block of rows stays in the processor's cache.
-    for first in range(0, height, _ROWS):
-        block = image[first : first + _ROWS]
-        for k in range(samples**2):
-            row = first + np.arange(len(block)) + (k // samples + 0.5) / samples
-            column = np.arange(width) + (k % samples + 0.5) / samples
-            y = half_width * (1.0 - 2.0 * column / width)
-            z = half_height * (1.0 - 2.0 * row / height)
-            d_C = np.stack(
-                np.broadcast_arrays(1.0, y[None, :], z[:, None]), axis=-1
-            ).reshape(-1, 3)
-            d_C /= _lengths(d_C)
-            d_W = d_C @ X_WC.rotation().matrix().T
-            block += _shade(
-                scene, rgb, X_WC.translation(), d_W, haze_length
-            ).reshape(block.shape)
+    for k in range(samples**2):
+        row = np.arange(height) + (k // samples + 0.5) / samples
+        column = np.arange(width) + (k % samples + 0.5) / samples
+        y = half_width * (1.0 - 2.0 * column / width)
+        z = half_height * (1.0 - 2.0 * row / height)
+        d_C = np.stack(
+            np.broadcast_arrays(1.0, y[None, :], z[:, None]), axis=-1
+        ).reshape(-1, 3)
+        d_C /= np.linalg.norm(d_C, axis=1, keepdims=True)
+        d_W = d_C @ X_WC.rotation().matrix().T
+        image += _shade(scene, rgb, X_WC.translation(), d_W, haze_length)
     srgb = np.clip(image / samples**2, 0.0, 1.0) ** (1.0 / 1.6)
-    return np.round(255.0 * srgb).astype(np.uint8)
+    pixels = np.round(255.0 * srgb).astype(np.uint8)
+    return pixels.reshape(height, width, 3)
 
 
 def _shade(
@@ -227,15 +221,6 @@ def _openness(
     tilts = ([0.6, 0.3, 0.4], [-0.5, 0.6, 0.5], [0.1, -0.8, 0.3])
     for tilt in tilts:
         d_W = normal + np.asarray(tilt)
-        d_W /= _lengths(d_W) + 1e-9
+        d_W /= np.linalg.norm(d_W, axis=1, keepdims=True) + 1e-9
         total += np.minimum(scene.cast_rays(p_W, d_W, reach).ranges, reach)
     return total / (len(tilts) * reach)
-
-
-def _lengths(vectors: np.ndarray) -> np.ndarray:
-    """Returns (N, 1) lengths of vectors (N, 3).
-
-    `numpy.linalg.norm` gives the same, and is slow along a short axis.
-    """
-    x, y, z = vectors.T
-    return np.sqrt(x * x + y * y + z * z)[:, None]

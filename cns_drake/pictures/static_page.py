@@ -13,9 +13,6 @@ from cns_drake.base.files import write_text
 
 # Higher levels take many times as long for a few percent.
 _LEVEL = 4
-# The quickest, a few percent larger; it decides about a sample of each command.
-_QUICK_LEVEL = 1
-_SAMPLE_BYTES = 1 << 16
 # Bytes of a vertex or of a triangle: rows differ little from their
 # predecessors, and their differences compress well.
 _ROW = 12
@@ -123,21 +120,13 @@ def filter_rows(data: bytes) -> bytes:
 
 def _compressed(command: re.Match) -> str:
     raw = base64.b64decode(command[1])
-    if _is_smaller_filtered(raw[:_SAMPLE_BYTES]):
-        filtered = zlib.compress(filter_rows(raw), _LEVEL)
-        data = base64.b64encode(filtered).decode()
-        return f'    enqueue("{data}", {len(raw)});'
-    plain = zlib.compress(raw, _LEVEL)
-    return f'    enqueue("{base64.b64encode(plain).decode()}");'
-
-
-def _is_smaller_filtered(sample: bytes) -> bool:
-    """Returns whether bytes compress better filtered, at a quick look."""
     plain, filtered = (
-        len(zlib.compress(data, _QUICK_LEVEL))
-        for data in (sample, filter_rows(sample))
+        base64.b64encode(zlib.compress(data, _LEVEL)).decode()
+        for data in (raw, filter_rows(raw))
     )
-    return filtered < plain
+    if len(filtered) < len(plain):
+        return f'    enqueue("{filtered}", {len(raw)});'
+    return f'    enqueue("{plain}");'
 
 
 def _replace(html: str, old: str, new: str) -> str:

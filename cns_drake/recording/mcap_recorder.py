@@ -25,8 +25,7 @@ from pydrake.systems.sensors import (
 from cns_drake.base.drives import ros_types
 from cns_drake.base.drives.point_layouts import to_labels, to_layout
 from cns_drake.recording import messages, object_messages, recorded_topics
-from cns_drake.recording.background_writer import BackgroundWriter
-from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.bag_writer import BackgroundWriter, BagWriter
 from cns_drake.recording.recorded_topics import (
     IMU_TOPIC,
     ODOMETRY_TOPIC,

@@ -14,8 +14,11 @@ from cns_drake.base.files import check_writable, write_text
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.version import __version__
 from cns_drake.pictures.drive_page import MeshcatRecorder, ShownStages
-from cns_drake.recording.background_writer import BackgroundWriter
-from cns_drake.recording.bag_writer import BagWriter, take_over_frames
+from cns_drake.recording.bag_writer import (
+    BackgroundWriter,
+    BagWriter,
+    take_over_frames,
+)
 from cns_drake.recording.recorded_topics import make_calibration
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.schedule import START_NS

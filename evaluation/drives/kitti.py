@@ -28,6 +28,7 @@ from pathlib import Path
 import re
 
 import numpy as np
+from numpy.lib.recfunctions import append_fields
 
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import index_instances, read_scenario
@@ -151,13 +152,9 @@ class KittiDrive(BinDrive):
             raise ValueError(
                 f"{len(stored)} points, but {len(labels)} in {labels_path}"
             )
-        points = np.empty(
-            len(stored), dtype=[*stored.dtype.descr, *_LABEL.descr]
-        )
-        for part in (stored, labels):
-            for name in part.dtype.names or ():
-                points[name] = part[name]
-        return points
+        names = list(_LABEL.names or ())
+        columns = [labels[name] for name in names]
+        return append_fields(stored, names, columns, usemask=False)
 
 
 def holds_kitti(path: Path) -> bool:

@@ -46,7 +46,7 @@ from cns_drake.base.drives.mcap_records import (
     uncompress,
 )
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular
+from cns_drake.base.files import check_regular, user_errors
 
 # An index or a table of structures has a few megabytes, of which Python makes a
 # hundred times as much.
@@ -431,17 +431,18 @@ class McapFile:
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator:
-        with self._faults(), open(self.path, "rb") as stream:
+        with (
+            user_errors(self.path),
+            self._faults(),
+            open(self.path, "rb") as stream,
+        ):
             yield stream
 
     @contextlib.contextmanager
     def _faults(self) -> Iterator[None]:
-        """Turns what a missing or damaged file raises into one line."""
+        """Turns what a damaged file raises into one line."""
         try:
             yield
-        except OSError as error:
-            fault = error.strerror or str(error)
-            raise InputError(f"{self.path}: {fault}") from error
         except (
             McapError,
             EOFError,

@@ -10,6 +10,7 @@ import itertools
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.lib.recfunctions import repack_fields
 
 # Datatype constant of sensor_msgs/msg/PointField -> NumPy type, without the
 # order of bytes.
@@ -18,7 +19,6 @@ _DATATYPES = dict(
 )
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
-_LABEL_FIELDS = ("label", "instance")
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
 _LONGEST_NS = 2.0**32
@@ -228,11 +228,7 @@ def to_layout(
 
 def to_labels(points: np.ndarray) -> np.ndarray:
     """Returns the labels and instances of points alone, (N,)."""
-    dtype = np.dtype([(name, points.dtype[name]) for name in _LABEL_FIELDS])
-    labels = np.empty(len(points), dtype)
-    for name in _LABEL_FIELDS:
-        labels[name] = points[name]
-    return labels
+    return repack_fields(points[["label", "instance"]])
 
 
 def from_layout(

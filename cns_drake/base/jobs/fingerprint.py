@@ -16,7 +16,6 @@ import hashlib
 import importlib.util
 import json
 from pathlib import Path
-import re
 from typing import NamedTuple
 
 from cns_drake.base.files import user_errors
@@ -176,17 +175,9 @@ def _files(
 @functools.cache
 def _find_imports(text: bytes, package: str) -> _Imports:
     """Returns the imports in the source of a module of a package."""
-    # To parse takes long: what is below the last import is left out if what is
-    # above is whole.
-    below = re.compile(rb"^[^\s)]", re.MULTILINE)
-    end = below.search(text, text.rfind(b"import") + 1)
-    for part in (text[: end.start()] if end else text, text):
-        try:
-            tree = ast.parse(part)
-            break
-        except (SyntaxError, ValueError):
-            continue
-    else:
+    try:
+        tree = ast.parse(text)
+    except (SyntaxError, ValueError):
         return _Imports((), {})  # Running the file reports it.
     names: list[tuple[str, str]] = []
     offered: dict[str, str] = {}

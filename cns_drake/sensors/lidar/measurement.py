@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 from enum import Enum
-import math
 import numbers
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -87,16 +87,17 @@ class MeasurementModel:
         Raises:
             ValueError: a value is out of range.
         """
-        for name in ("resolution", "range_noise"):
+        for name, most, kind in (
+            ("resolution", sys.float_info.max, "length"),
+            ("range_noise", sys.float_info.max, "length"),
+            ("dropout", 1.0, "probability"),
+            ("faint_dropout", 1.0, "probability"),
+        ):
             value = getattr(self, name)
-            real = isinstance(value, numbers.Real)
-            if not (real and math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name}: {value!r} is not a length")
-        for name in ("dropout", "faint_dropout"):
-            value = getattr(self, name)
-            real = isinstance(value, numbers.Real)
-            if not (real and 0.0 <= value <= 1.0):
-                raise ValueError(f"{name}: {value!r} is not a probability")
+            if not (
+                isinstance(value, numbers.Real) and 0.0 <= float(value) <= most
+            ):
+                raise ValueError(f"{name}: {value!r} is not a {kind}")
         if not isinstance(self.seed, numbers.Integral) or self.seed < 0:
             raise ValueError(f"seed: {self.seed!r} is not an integer from 0 on")
 

@@ -9,13 +9,10 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.sensors.lidar import livox_patterns
-from cns_drake.sensors.lidar.patterns import SpinningPattern
+from cns_drake.sensors.lidar import patterns
 
 UnitPattern: TypeAlias = (
-    SpinningPattern
-    | livox_patterns.RosettePattern
-    | livox_patterns.NoddingPattern
+    patterns.SpinningPattern | patterns.RosettePattern | patterns.NoddingPattern
 )
 
 
@@ -32,7 +29,7 @@ class LidarPreset(NamedTuple):
         """Returns a unit of its fields in presets.yaml."""
         fields["min_range"], fields["max_range"] = ranges
         if "pattern" in fields:
-            kind = getattr(livox_patterns, fields.pop("pattern"))
+            kind = getattr(patterns, fields.pop("pattern"))
             for name, value in fields.items():
                 if isinstance(value, list):
                     fields[name] = tuple(value)
@@ -44,7 +41,7 @@ class LidarPreset(NamedTuple):
             np.linspace(*part) if isinstance(part, list) else [part]
             for part in fields.pop("rings_deg")
         ]
-        pattern = SpinningPattern(
+        pattern = patterns.SpinningPattern(
             elevations_rad=tuple(np.deg2rad(np.concatenate(rings)).tolist()),
             num_columns=fields.pop("columns"),
             period=fields.pop("period", 0.05),

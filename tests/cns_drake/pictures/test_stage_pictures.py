@@ -7,7 +7,6 @@ from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.pictures import stage_scene
 from cns_drake.pictures.stage_pictures import draw_stages, load_views
 from cns_drake.pictures.stage_scene import look_at, render
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
@@ -57,20 +56,6 @@ def test_balls_appear_where_they_are_and_in_their_colours():
         assert pixel[channel] > 2 * np.delete(pixel, channel).max()
     sky = picture[5, 5]
     assert sky[2] >= sky[0] > 100
-
-
-def test_pictures_do_not_depend_on_the_blocks_of_their_rows(monkeypatch):
-    geometries = [ball([10, 2.5, 0], (0.9, 0.1, 0.1)), ball([9, 0, 1], None)]
-    frames = {geometry.frame_id for geometry in geometries}
-    scene = RayCastingScene(geometries, frames, lambda f: RigidTransform())
-    pictures = []
-    for rows in (7, 30, 100):
-        monkeypatch.setattr(stage_scene, "_ROWS", rows)
-        pictures.append(
-            render(scene, geometries, RigidTransform(), width=40, height=30)
-        )
-    np.testing.assert_array_equal(pictures[0], pictures[1])
-    np.testing.assert_array_equal(pictures[1], pictures[2])
 
 
 def test_stages_are_drawn_side_by_side(small_map, tmp_path):

@@ -7,13 +7,11 @@ from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 import pytest
 
-from cns_drake.sensors.lidar.livox_patterns import (
-    NoddingPattern,
-    RosettePattern,
-)
 from cns_drake.sensors.lidar.patterns import (
     BeamPattern,
     DirectionPattern,
+    NoddingPattern,
+    RosettePattern,
     SpinningPattern,
     make_flash_pattern,
 )
