@@ -67,4 +67,4 @@ from cns_drake.simulation.sensor_recording import (
 from cns_drake.simulation.simulation import Run as Run
 from cns_drake.simulation.simulation import simulate as simulate
 from cns_drake.simulation.station import make_station as make_station
-from cns_drake.traffic.traffic_adding import add_traffic as add_traffic
+from cns_drake.traffic.traffic_motion import add_traffic as add_traffic

@@ -1,7 +1,5 @@
 """The map folder of a city that ages: a stage for today and for each year."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, replace
@@ -23,7 +21,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder, is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, stage_name
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.city.generation.generate import MAX_STRUCTURES, stage_sdf
+from cns_drake.city.generation.generate import stage_sdf
 from cns_drake.city.geometry import Mesh, Structure
 from cns_drake.city.growth import stage_structures
 from cns_drake.imports.map_files import YEAR_COLUMN, stage_size, triangles_in
@@ -35,6 +33,7 @@ from cns_drake.scenarios.scenario_files import (
     find_files,
     load_scenario,
 )
+from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.semantics import CLASS_IDS
 
 HISTORY_NAME = "history.csv"
@@ -256,10 +255,10 @@ class _Writing:
         ids = [int(row["instance"]) for row in world.rows.values()]
         others = {n: o for n, o in self._past.items() if n not in new}
         first = max(ids, default=0) + 1
-        if first + len(new) + len(others) > MAX_STRUCTURES:
+        if first + len(new) + len(others) > MAX_INSTANCE:
             raise InputError(
                 f"{world.path}: {first + len(new)} structures are more than "
-                f"instance ids can count ({MAX_STRUCTURES})"
+                f"instance ids can count ({MAX_INSTANCE})"
             )
         for k, one in enumerate((*new.values(), *others.values())):
             x, y, z = (f"{value:.3f}" for value in one.xyz)

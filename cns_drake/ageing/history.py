@@ -5,8 +5,6 @@ numbers of its own for each year and event, so that a longer history begins as
 a shorter one does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools

@@ -1,7 +1,5 @@
 """Options of an import, the faults that it counts, and its report."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path

@@ -16,7 +16,6 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry import Mesh, MeshShape
 from cns_drake.imports.building_years import stands_today
 from cns_drake.imports.drives.search import WaypointDrive
@@ -27,6 +26,7 @@ from cns_drake.imports.foreign_city import (
     random_share,
 )
 from cns_drake.imports.options import ImportFaults, ImportOptions
+from cns_drake.scene.labels import MAX_INSTANCE
 
 # A building that shares so much of the smaller outline stands in the place of
 # the other.
@@ -219,10 +219,10 @@ def stage_city(
             kind = f"building {_why_never(one, options)}, left out"
             city.faults.add(kind, one.structure.name)
     kept = [one for one in found if one in ever]
-    if len(kept) >= MAX_STRUCTURES:
+    if len(kept) >= MAX_INSTANCE:
         raise InputError(
             f"{source}: {len(kept)} objects are more than instance ids can"
-            f" count ({MAX_STRUCTURES})"
+            f" count ({MAX_INSTANCE})"
         )
     if not kept:
         raise InputError(

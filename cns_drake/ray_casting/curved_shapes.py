@@ -9,16 +9,16 @@ most rays that point along their axis, up to an angle of 1e-3 rad. Only rays
 that start in line with a capsule can be of these.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
+from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
@@ -27,10 +27,6 @@ from cns_drake.scene.surfaces import (
     TriangleSurface,
     tessellate,
 )
-
-if TYPE_CHECKING:
-    from cns_drake.ray_casting.moving_groups import Placed
-    from cns_drake.ray_casting.rays import Hits, Rays
 
 CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
 

@@ -1,7 +1,5 @@
 """Geometry in groups that move as one, for the ray casters."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field

@@ -30,7 +30,7 @@ from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox
-from cns_drake.traffic.traffic_adding import traffic_structures
+from cns_drake.traffic.traffic_motion import traffic_structures
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.transient.changing import change_world

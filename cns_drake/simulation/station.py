@@ -32,8 +32,11 @@ from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation import loaded_drive, recording_schedule
-from cns_drake.traffic.traffic_adding import add_traffic, connect_traffic
-from cns_drake.traffic.traffic_motion import TrafficMotion
+from cns_drake.traffic.traffic_motion import (
+    TrafficMotion,
+    add_traffic,
+    connect_traffic,
+)
 from cns_drake.traffic.traffic_plan import TrafficPlan
 
 

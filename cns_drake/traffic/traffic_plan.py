@@ -1,24 +1,318 @@
-"""Plans the motion of all traffic before a drive."""
+"""Plans the motion of all traffic before a drive, of the ego car as well."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from cns_drake.base.elementary import arcsin, arctan2
+from cns_drake.motion.path_geometry import REACH
+from cns_drake.motion.speed_profile import KNOT_PERIOD
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.traffic import vehicles as motion
-from cns_drake.traffic.follower import Follower
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.streets import STEP, EgoBox, Streets, make_streets
-from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind, draw_kinds
+from cns_drake.traffic.vehicle_kinds import (
+    KINDS,
+    STANDSTILL_GAP,
+    VehicleKind,
+    draw_kinds,
+)
+from cns_drake.traffic.vehicles import CURRENT, SIGHT, Traffic, find_ahead
 from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
+
+# Distance of the places at which the car's lane is known [m].
+_STEP = 1.0
+# The car's lane is at most this far away [m], in its direction within 45 deg.
+_REACHES, _ALIGNED = 3.0, 0.7
+# Cost of a metre on no lane, as that of a lane's square distance [m^2], and of
+# a change of lane, and to no lane or back.
+_NO_LANE, _SIDEWAYS, _AWAY = 4.0, 8.0, 20.0
+# The car is in both lanes for this distance before and behind a change [m], and
+# asks for a way from its lane, in which it is for this distance before [m].
+_CHANGES, _ASKS = 12.0, 25.0
+# Parameters of the Intelligent Driver Model, and the part of the drive's
+# greatest acceleration that it uses.
+_ACCELERATION, _DECELERATION, _HEADWAY, _PART_OF_BOUND = 1.5, 1.8, 1.3, 0.95
+# The bounds of speed are looked up at least this far ahead [m].
+_AHEAD = 0.05
+
+
+class _Run(NamedTuple):
+    """A part of the way on one piece.
+
+    Attributes:
+        piece: its number, -1 on no lane.
+        first, last: where the front bumper enters and leaves it [m].
+        s: place on the piece where it enters [m].
+        beside: the lane from which the car changes to this one, or -1.
+        parts: where the car has left that lane [m].
+    """
+
+    piece: int
+    first: float
+    last: float
+    s: float
+    beside: int = -1
+    parts: float = 0.0
+
+
+def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
+    """Returns the pieces along a way, those that fit best as a whole.
+
+    The way is through (N, 2) points, `_STEP` apart [m].
+    """
+    lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
+    tree = shapely.STRtree(lines)
+    rows, found = tree.query(shapely.points(points), "dwithin", _REACHES)
+    near, columns = np.unique(found, return_inverse=True)
+    here, on = shapely.points(points[rows]), np.array(lines)[found]
+    places = shapely.line_locate_point(on, here)
+    along = np.subtract(
+        *(
+            shapely.get_coordinates(
+                shapely.line_interpolate_point(on, np.maximum(places + d, 0.0))
+            )
+            for d in (0.5, -0.5)
+        )
+    )
+    ahead = np.gradient(points, axis=0)[rows]
+    size = np.linalg.norm(along, axis=1) * np.linalg.norm(ahead, axis=1)
+    fits = np.sum(along * ahead, axis=1) > _ALIGNED * size
+    off = len(near)
+    misfit = np.full((len(points), off + 1), np.inf)
+    misfit[:, off] = _NO_LANE
+    distance = shapely.distance(on, here)
+    misfit[rows[fits], columns[fits]] = distance[fits] ** 2
+    place = np.zeros(misfit.shape)
+    place[rows, columns] = places
+    change = np.full((off + 1, off + 1), np.inf)
+    change[off], change[:, off] = _AWAY, _AWAY
+    for row, number in enumerate(near):
+        piece = graph.pieces[number]
+        for others, cost in (
+            (piece.after, 0.0),
+            ((piece.left, piece.right), _SIDEWAYS),
+        ):
+            change[row, :off][np.isin(near, others)] = cost
+    np.fill_diagonal(change, 0.0)
+    # The cheapest sequence of pieces, by dynamic programming.
+    cost, before = misfit[0], np.zeros(misfit.shape, int)
+    for row in range(1, len(points)):
+        costs = cost[:, None] + change
+        before[row] = costs.argmin(axis=0)
+        cost = costs.min(axis=0) + misfit[row]
+    best = np.zeros(len(points), int)
+    best[-1] = cost.argmin()
+    for row in range(len(points) - 1, 0, -1):
+        best[row - 1] = before[row, best[row]]
+    starts = np.flatnonzero(np.diff(best, prepend=-1))
+    pieces = np.append(near, -1)[best[starts]].tolist()
+    firsts, s = _STEP * starts, place[starts, best[starts]]
+    for k, (before_it, piece) in enumerate(pairwise(pieces), 1):
+        if before_it >= 0 and piece in graph.pieces[before_it].after:
+            # The boundary is between two of the points.
+            firsts[k], s[k] = firsts[k] - s[k], 0.0
+    firsts = np.append(firsts, _STEP * len(points))
+    runs: list[_Run] = []
+    for k, piece in enumerate(pieces):
+        enters, leaves = firsts[k : k + 2].tolist()
+        run = _Run(piece, enters, leaves, float(s[k]))
+        last = runs[-1] if runs else run
+        lane = graph.pieces[last.piece]
+        if min(last.piece, piece) >= 0 and piece in (lane.left, lane.right):
+            earlier = min(run.first - run.last + _ASKS, run.s)
+            earlier = max(0.0, min(earlier, run.first - last.first - _STEP))
+            first = run.first - earlier
+            runs[-1] = last._replace(last=first)
+            run = run._replace(
+                first=first,
+                s=run.s - earlier,
+                beside=last.piece,
+                parts=run.first + _CHANGES,
+            )
+        runs.append(run)
+    return runs
+
+
+class Follower:
+    """The ego car in a simulation of traffic.
+
+    It follows its path by the Intelligent Driver Model, asks for its ways as
+    the others do, and keeps the bounds of its drive. At each step so far it was
+    at the place u on the path [m]; it has arrived when it stands at the end.
+    """
+
+    def __init__(
+        self, graph: LaneGraph, trajectory: Trajectory, box: EgoBox, start: int
+    ):
+        """Puts a car to the beginning of its path.
+
+        Its drive has the bounds of a trajectory, and begins at the step of a
+        number.
+        """
+        self._path, self._profile = trajectory.path, trajectory.speed_profile
+        self._square = self._profile.speed**2
+        # The way of the front bumper, which goes on straight beyond the path.
+        u = _STEP * np.arange(int((self._path.end + box.front) / _STEP) + 1)
+        jet = self._path.evaluate(u)
+        beyond = np.maximum(u - self._path.end, 0.0)[:, None]
+        self._runs = find_runs(graph, jet.p[:, :2] + beyond * jet.dp[:, :2])
+        self._box, self._start = box, start
+        # The drive begins with a rest, as any other.
+        self._leaves = start + round(REACH * KNOT_PERIOD / STEP)
+        self._run = 0
+        self._held: _Run | None = None
+        self.u = [0.0]
+        self.arrived = False
+
+    def record(self, streets: Streets) -> np.ndarray:
+        """Returns the (1,) record `VEHICLE` of the car at its first place."""
+        car = np.zeros(1, motion.VEHICLE)
+        bound = _PART_OF_BOUND * self._profile.acceleration
+        for name, value in (
+            ("length", self._box.front - self._box.rear),
+            ("top", self._profile.speed.max()),
+            ("factor", 1.0),
+            ("a", min(_ACCELERATION, bound)),
+            ("b", min(_DECELERATION, bound)),
+            ("headway", _HEADWAY),
+            ("guided", True),
+            ("held", -1),
+            ("since", np.inf),
+            ("change_length", 1.0),
+        ):
+            car[name] = value
+        self._place(streets, car[0])
+        return car
+
+    def step(self, traffic: Traffic, k: int) -> None:
+        """Moves the car on, the last of the vehicles, at the k-th step."""
+        car, u = traffic.cars[-1], self.u[-1]
+        if k < self._leaves or self.arrived:
+            self.u.append(u)
+            return
+        wanted = motion.free_acceleration(car, car["top"])
+        gap, speed, line = self._ahead(traffic, car)
+        stop, gap_2, speed_2 = motion.find_prior(traffic, len(traffic.cars) - 1)
+        line = min(line, stop)
+        if gap_2 < gap:
+            gap, speed = gap_2, speed_2
+        loss = motion.interaction(
+            car, line + STANDSTILL_GAP - motion.BEFORE_LINE, float(car["v"])
+        )
+        if gap < SIGHT:
+            loss = max(loss, motion.interaction(car, gap, car["v"] - speed))
+        bound = _PART_OF_BOUND * self._profile.acceleration
+        v = max(0.0, car["v"] + max(wanted - loss, -bound) * STEP)
+        ahead = u + max(car["v"] * STEP, _AHEAD)
+        v = min(v, np.interp(ahead, self._profile.u, self._square) ** 0.5)
+        u += 0.5 * (car["v"] + v) * STEP
+        if u > self._path.end - 2 * _AHEAD and v < 0.1:
+            u, v, self.arrived = self._path.end, 0.0, True
+        self.u.append(u)
+        car["v"] = v
+        self._place(traffic.streets, car)
+
+    def _ahead(
+        self, traffic: Traffic, car: np.void
+    ) -> tuple[float, float, float]:
+        """Returns the gap to the car ahead [m], its speed, and the stop line.
+
+        The distance of the stop line is inf where the car may go on [m].
+        """
+        front = self.u[-1] + self._box.front
+        who, pieces = len(traffic.cars) - 1, traffic.streets.pieces
+        gap, speed = np.inf, 0.0
+        other = int(car["left_lane"])
+        if other >= 0:
+            length = pieces["length"]
+            scale = length[other] / length[car["path"][CURRENT]]
+            gap, speed = find_ahead(traffic, other, car["s"] * scale, who)
+        for run in self._runs[self._run :]:
+            if run.piece < 0 or run.first - front > SIGHT:
+                break
+            is_next = run.first > front and run is not self._held
+            if is_next and pieces[run.piece]["is_way"]:
+                return gap, speed, run.first - front
+            gap_2, speed_2 = find_ahead(
+                traffic, run.piece, run.s + front - run.first, who
+            )
+            if gap_2 < gap:
+                gap, speed = gap_2, speed_2
+        return gap, speed, np.inf
+
+    def _place(self, streets: Streets, car: np.void) -> None:
+        """Notes the pieces on which the car is now."""
+        front, runs = self.u[-1] + self._box.front, self._runs
+        while self._run < len(runs) - 1 and front >= runs[self._run].last:
+            self._run += 1
+        run = runs[self._run]
+        piece = run.piece
+        path = car["path"]
+        path[:] = -1
+        is_way = piece >= 0 and bool(streets.pieces[piece]["is_way"])
+        after = runs[self._run + 1] if self._run < len(runs) - 1 else None
+        car["left_lane"] = run.beside if front < run.parts else -1
+        if car["held"] < 0:
+            self._held = None
+        if car["granted"] and self._held is None:
+            self._held = after
+        if self._held is not None and front >= self._held.last:
+            car["granted"] = False
+            if front - car["length"] >= self._held.last:
+                car["held"], self._held = -1, None
+        if piece < 0:
+            return
+        path[CURRENT] = piece
+        car["s"] = run.s + front - run.first
+        column, before = CURRENT, run
+        for other in runs[: self._run][::-1]:
+            column -= 1
+            if column < 0 or other.piece < 0:
+                break
+            if not _leads(streets, other.piece, before.piece):
+                break
+            path[column], before = other.piece, other
+        way = piece
+        if not is_way:
+            if after is None or after.piece < 0:
+                return
+            way = after.piece
+            if not streets.pieces[way]["is_way"]:
+                if run.last - front < _CHANGES:
+                    car["left_lane"] = way
+                return
+            path[CURRENT + 1] = way
+        first = streets.pieces[way]["after_first"]
+        path[CURRENT + 1 + (not is_way)] = streets.after[first]
+
+    def poses(self, steps: np.ndarray) -> np.ndarray:
+        """Returns (N, 3) x, y [m], yaw of the box's middle at (N,) steps."""
+        u = np.interp(steps, np.arange(len(self.u)), self.u)
+        jet = self._path.evaluate(u)
+        return self._box.middles(jet.p[:, :2], jet.yaw)
+
+    def positions(self) -> np.ndarray:
+        """Returns places on the path at each `KNOT_PERIOD` of the drive [m]."""
+        every = round(KNOT_PERIOD / STEP)
+        u = np.array(self.u[self._start :: every])
+        return u[: np.count_nonzero(u < self._path.end) + REACH + 1]
+
+
+def _leads(streets: Streets, piece: int, other: int) -> bool:
+    """Returns whether one piece leads to another."""
+    row = streets.pieces[piece]
+    first = row["after_first"]
+    return other in streets.after[first : first + row["after_count"]]
+
 
 # A walker's box, with limbs that swing [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)

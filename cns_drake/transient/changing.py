@@ -1,26 +1,431 @@
-"""Applies all passing changes to a world."""
+"""Applies all passing changes to a world: cars, snow, furniture, leaves."""
 
 from dataclasses import replace
 import math
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 import shapely
+from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.elementary import product, sin
+from cns_drake.city.furniture.parked_cars import PARKED_CARS
+from cns_drake.city.geometry.structures import Model, part_triangles
+from cns_drake.city.geometry.upper_sides import (
+    from_above,
+    quartered,
+    turned_up,
+    unit_normals,
+)
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient import putting_up
-from cns_drake.transient.parked_cars import change_parked_cars
-from cns_drake.transient.scene_editing import SceneEditing, Surroundings
-from cns_drake.transient.snow_cover import lay_snow
+from cns_drake.transient.scene_editing import Look, SceneEditing, Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
+    GroundSurface,
+    Obstacles,
+    Structure,
     StructurePart,
     draws,
     read_structures,
+    triangle_corners,
 )
+
+_PARKED_CARS = "parked_cars"
+_PARKED = frozenset({"car", "truck", "bus"})
+# Shares of changed bays: the car is gone; the car has moved. The rest have
+# another car.
+_GONE = 0.3
+_MOVED = 0.2
+# Greatest room of a bay before and behind a car, and beside it [m].
+_LENGTHWISE = 0.5
+_SIDEWAYS = 0.25
+# Greatest turn of a car against its bay [rad].
+_SKEW = 0.03
+# Distance of cars from all other things [m].
+_GAP = 0.05
+# Least distance of a moved car from its old place [m].
+_LEAST_MOVE = 0.1
+_CAR_TRIES = 12
+# Kinds of parked vehicles, with relative shares.
+_FORMS = {
+    "city_car": 3,
+    "hatchback": 4,
+    "saloon": 3,
+    "estate": 3,
+    "suv": 3,
+    "pickup": 1,
+    "van": 2,
+}
+
+
+class Bay:
+    """The room of a parked car, which overlaps no other bay.
+
+    Attributes:
+        middle: (2,) of the car [m].
+        yaw: heading of its long axis [rad].
+        reach: (4,) of the bay from there: front, back, left, right [m].
+    """
+
+    def __init__(self, car: Structure):
+        """A bay as large as the car."""
+        hull = shapely.MultiPoint(car.p_WPs[:, :2])
+        corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
+        sides = np.diff(corners, axis=0)[:2]
+        lengths = np.linalg.norm(sides, axis=1)
+        along = sides[int(lengths.argmax())]
+        self.middle = corners.mean(axis=0)
+        self.yaw = math.atan2(along[1], along[0])
+        self.reach = np.repeat([lengths.max() / 2, lengths.min() / 2], 2)
+
+    def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
+        """Returns the bay, extended, seen from above [m].
+
+        `beyond` has lengths at front, back, left and right [m].
+        """
+        front, back, left, right = self.reach + beyond
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        corners = np.array(
+            [(front, left), (-back, left), (-back, -right), (front, -right)]
+        )
+        return Polygon(
+            product(corners, np.array([[c, s], [-s, c]])) + self.middle
+        )
+
+    def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
+        """Grows towards other things, and half the way towards other cars."""
+        own = (car.name,)
+        box = self.box()
+        growth = np.zeros(4)
+        for k, most in enumerate((_LENGTHWISE,) * 2 + (_SIDEWAYS,) * 2):
+            reach = np.zeros(4)
+            reach[k] = 2 * most + _GAP
+            around = self.box(reach)
+            room = min(
+                cars.distance(box, around, own) / 2,
+                others.distance(box, around, own),
+                most + _GAP,
+            )
+            growth[k] = max(room - _GAP, 0.0)
+        self.reach = self.reach + growth
+
+    def place(
+        self, half_size: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, float] | None:
+        """Returns middle and yaw of a car in the bay; None if it is too big.
+
+        It has (2,) half its length and width [m].
+        """
+        skew = float(rng.uniform(-_SKEW, _SKEW))
+        across, turned = rng.uniform(size=2), rng.uniform() < 0.5
+        c, s = math.cos(skew), abs(math.sin(skew))
+        half = half_size * c + half_size[::-1] * s
+        low, high = half - self.reach[1::2], self.reach[::2] - half
+        if (low > high).any():
+            return None
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        x, y = low + across * (high - low)
+        offset = np.array([c * x - s * y, s * x + c * y])
+        yaw = self.yaw + skew + np.pi * turned
+        return self.middle + offset, float(yaw)
+
+
+def make_bays(around: Surroundings) -> dict[str, Bay]:
+    """Returns the bays of all parked cars, by the cars' names."""
+    cars = {car.name: car for car in around.of_classes(_PARKED)}
+    bays = {name: Bay(car) for name, car in cars.items()}
+    if not bays:
+        return {}
+    standing = Obstacles((n, bay.box()) for n, bay in bays.items())
+    others = around.obstacles(ignored=_PARKED | GROUND_CLASSES)
+    grown = {}
+    for name, car in cars.items():
+        grown[name] = Bay(car)
+        grown[name].grow(car, standing, others)
+    # Two bays that meet at a corner both stay as they are.
+    boxes = [bay.box() for bay in grown.values()]
+    names = list(grown)
+    first, second = shapely.STRtree(boxes).query(boxes, "intersects")
+    for a, b in zip(first, second, strict=True):
+        if a != b:
+            grown[names[a]] = bays[names[a]]
+    return grown
+
+
+def change_parked_cars(around: Surroundings, share: float) -> None:
+    """Changes a share of the parked cars, from 0 to 1."""
+    editing, bays = around.editing, make_bays(around)
+    if not bays:
+        editing.note("parked_cars: the world has no car, truck or bus")
+    cars = [around.things[name] for name in bays]
+    for car, rng in around.chosen(_PARKED_CARS, cars, share):
+        bay, fate = bays[car.name], rng.uniform()
+        if fate < _GONE:
+            editing.remove(car, _PARKED_CARS)
+        elif fate < _GONE + _MOVED:
+            X_new = _moved_car(bay, car, around.ground, rng)
+            editing.move(car, X_new, f"parked_{car.name}", _PARKED_CARS)
+        else:
+            _replace_car(around, car, bay, rng)
+
+
+def _moved_car(
+    bay: Bay, car: Structure, ground: GroundSurface, rng: np.random.Generator
+) -> RigidTransform:
+    """Returns the transformation of a moved car's points."""
+    own = Bay(car)
+    half_size = own.reach[::2]
+    middle, yaw = own.middle, own.yaw + np.pi  # At least turned round.
+    for _ in range(_CAR_TRIES):
+        found = bay.place(half_size, rng)
+        if (
+            found is not None
+            and np.linalg.norm(found[0] - own.middle) >= _LEAST_MOVE
+        ):
+            middle, yaw = found
+            break
+    X_WC = RigidTransform(RollPitchYaw(0, 0, own.yaw), [*own.middle, 0])
+    rise = ground.rise(own.middle, middle)
+    X_new = RigidTransform(RollPitchYaw(0, 0, yaw), [*middle, rise])
+    return X_new @ X_WC.inverse()
+
+
+def _replace_car(
+    around: Surroundings, car: Structure, bay: Bay, rng: np.random.Generator
+) -> None:
+    """Puts another car into a bay, or none if the bay is too small."""
+    editing, forms = around.editing, list(_FORMS)
+    shares = np.array(list(_FORMS.values()), float)
+    for k in rng.choice(len(forms), len(forms), False, shares / shares.sum()):
+        builder = PARKED_CARS[forms[k]]
+        model = builder.build(rng)
+        low, high = _extent(model)
+        found = bay.place((high - low) / 2, rng)
+        if found is None:
+            continue
+        middle, yaw = found
+        R = RollPitchYaw(0, 0, yaw)
+        # The origin of the model is not exactly in the middle of the car.
+        offset = R.ToRotationMatrix() @ [*((low + high) / 2), 0.0]
+        z = car.bottom + around.ground.rise(Bay(car).middle, middle)
+        X_WS = RigidTransform(R, [*middle, z] - offset)
+        editing.remove(car, _PARKED_CARS)
+        editing.add(
+            f"parked_{car.name}",
+            builder.semantic_class,
+            model,
+            X_WS,
+            _PARKED_CARS,
+        )
+        return
+    editing.remove(car, _PARKED_CARS)
+
+
+def _extent(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the lowest and highest x and y of a car's model [m]."""
+    corners = np.concatenate(
+        [part_triangles(part, model.meshes)[0] for part in model.parts]
+    )[:, :2]
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+_SNOW = "snow"
+# Snow near 900 nm: Warren, "Optical properties of snow", 1982.
+_LOOK = Look((0.93, 0.95, 0.97), 0.9)
+# Snow slides from steeper surfaces: cosine of 45 degrees.
+_LEAST_UP = 0.707
+# Smaller surfaces bear no snow [m^2].
+_LEAST_AREA = 0.3
+_BARE = frozenset(
+    {"vegetation", "trunk", "pole", "traffic-sign", "fence", "bicycle", "road"}
+)
+# Longest side of triangles at the edge of a cleared road [m].
+_FINE = 0.7
+# A bank along a kerb: its reach to both sides as a multiple of its height, its
+# greatest height in depths of snow, and in [m].
+_INSIDE, _CREST, _OUTSIDE = 0.3, 0.3, 1.1
+_HIGHEST, _MOST_HEIGHT = 2.5, 0.9
+_SPACING = 1.5
+# Wave lengths of its height along the street [m].
+_WAVES = (9.0, 3.7)
+
+
+def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
+    """Lays snow of a depth [m], except on roads, plants and thin things.
+
+    Ground, which is that before earlier changes, is raised. Roads are cleared,
+    with banks along their kerbs.
+    """
+    editing = around.editing
+    for thing in around.things.values():
+        if thing.semantic_class in _BARE:
+            continue
+        is_ground = thing.semantic_class in GROUND_CLASSES
+        if not is_ground and not thing.outline.intersects(ground.near):
+            continue
+        changed = False
+        for part in thing.parts:
+            if is_ground and not _is_below_road(part, ground):
+                editing.cover_part(part, np.array([0.0, 0.0, depth]), _LOOK)
+                changed = True
+            else:
+                changed |= _cover(editing, part, ground, depth, is_ground)
+        if changed:
+            editing.blame(thing.name, _SNOW)
+    if ground.carriageway.is_empty:
+        editing.note(
+            "snow: no structure of class road along the drive: no road is "
+            "cleared, and no bank lies along a kerb"
+        )
+    else:
+        _lay_banks(around, ground, depth)
+
+
+def _is_below_road(part: StructurePart, ground: GroundSurface) -> bool:
+    """Returns whether ground continues below a carriageway."""
+    corners = turned_up(triangle_corners(part))
+    corners = corners[unit_normals(corners)[:, 2] > 0.0]
+    inner = ground.carriageway.buffer(-0.5)
+    if inner.is_empty or len(corners) == 0:
+        return False
+    shapely.prepare(inner)
+    return bool(shapely.intersects(from_above(corners), inner).any())
+
+
+def _cover(
+    editing: SceneEditing,
+    part: StructurePart,
+    ground: GroundSurface,
+    depth: float,
+    is_ground: bool,
+) -> bool:
+    """Puts a slab on a part's faces below the sky; returns if it has any."""
+    corners = triangle_corners(part)
+    if is_ground:
+        corners = turned_up(corners)
+    corners = corners[unit_normals(corners)[:, 2] > _LEAST_UP]
+    if is_ground:
+        corners = _beside(corners, ground)
+    if len(corners) == 0:
+        return False
+    vertices, triangles = _merged(corners)
+    triangles = triangles[_is_large(vertices, triangles)]
+    if len(triangles) == 0:
+        return False
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    keys = np.sort(edges, axis=1)
+    _, first, count = np.unique(
+        keys, axis=0, return_index=True, return_counts=True
+    )
+    rim = edges[first[count == 1]]
+    up = len(vertices)
+    slab = np.concatenate(
+        [
+            triangles + up,
+            np.column_stack([rim[:, 0], rim[:, 1], rim[:, 1] + up]),
+            np.column_stack([rim[:, 0], rim[:, 1] + up, rim[:, 0] + up]),
+        ]
+    )
+    risen = vertices + np.array([0.0, 0.0, depth])
+    raised = np.concatenate([vertices, risen])
+    editing.add_triangles(part, f"{part.name}_snow", raised, slab, _LOOK)
+    return True
+
+
+def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
+    """Returns triangles beside the carriageway, finer along its edge."""
+    corners = corners[shapely.intersects(from_above(corners), ground.near)]
+    road = ground.carriageway
+    shapely.prepare(road)
+    done = [np.zeros((0, 3, 3))]
+    while len(corners):
+        areas = from_above(corners)
+        meets = shapely.intersects(areas, road)
+        done.append(corners[~meets])
+        corners = corners[meets]
+        corners = corners[~shapely.covers(road, areas[meets])]
+        sides = np.linalg.norm(
+            corners - np.roll(corners, -1, axis=1), axis=2
+        ).max(axis=1)
+        fine = sides <= _FINE
+        last = corners[fine]
+        middles = last[:, :, :2].mean(axis=1)
+        done.append(last[~shapely.contains_xy(road, middles)])
+        corners = quartered(corners[~fine])
+    return np.concatenate(done)
+
+
+def _merged(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns vertices and triangles, equal corners as one vertex."""
+    rounded = np.round(corners.reshape(-1, 3), 4)
+    _, first, inverse = np.unique(
+        rounded, axis=0, return_index=True, return_inverse=True
+    )
+    return corners.reshape(-1, 3)[first], inverse.reshape(-1, 3)
+
+
+def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Returns the triangles of connected areas that bear snow."""
+    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_matrix(
+        (np.ones(len(edges)), (edges[:, 0], edges[:, 1])),
+        (len(vertices),) * 2,
+    )
+    piece = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.bincount(piece, areas)[piece] >= _LEAST_AREA
+
+
+def _lay_banks(
+    around: Surroundings, ground: GroundSurface, depth: float
+) -> None:
+    phases = draws(around.seed, _SNOW, "banks").uniform(0, 2 * np.pi, 4)
+    way = around.drive.buffer(1.4 + _INSIDE)
+    shapely.prepare(way)
+    meshes = []
+    for kerb in ground.kerbs(_SPACING):
+        xy, out = kerb.points, kerb.outwards
+        road = ground.heights(xy - 0.1 * out, of_road=True)
+        beside = ground.heights(xy + _OUTSIDE * out, of_road=False)
+        beside = np.where(np.isfinite(beside), beside, road)
+        waves = (
+            sin(2 * np.pi * (xy / _WAVES[0]) + phases[:2]).sum(axis=1)
+            + sin(2 * np.pi * (xy / _WAVES[1]) + phases[2:]).sum(axis=1)
+        ) / 4
+        most = min(_HIGHEST * depth, _MOST_HEIGHT + depth)
+        crest = beside + depth + (most - depth) * (0.6 + 0.4 * waves)
+        # A profile: on the road, on the crest, on the snow beside it.
+        profile = np.stack(
+            [
+                np.column_stack([xy - _INSIDE * out, road]),
+                np.column_stack([xy, (road + crest) / 2]),
+                np.column_stack([xy + _CREST * out, crest]),
+                np.column_stack([xy + _OUTSIDE * out, beside + depth - 0.01]),
+            ],
+            axis=1,
+        )
+        free = np.isfinite(road) & ~shapely.contains_xy(way, xy)
+        use = np.flatnonzero(free[:-1] & free[1:])
+        here, there = profile[use], profile[use + 1]
+        for k in range(3):
+            a, b = here[:, k], there[:, k]
+            c, d = there[:, k + 1], here[:, k + 1]
+            meshes += [np.stack([a, d, c], 1), np.stack([a, c, b], 1)]
+    if meshes:
+        corners = np.concatenate(meshes)
+        if np.median(unit_normals(corners)[:, 2]) < 0.0:
+            corners = corners[:, ::-1]
+        around.editing.add_mesh(
+            "snow_banks", "terrain", *_merged(corners), _LOOK, _SNOW
+        )
+
 
 _FURNITURE = frozenset({"pole", "traffic-sign"})
 # Greatest move of furniture [m].

@@ -55,10 +55,8 @@ class BandedTower(Building):
                 z = _add_garden(self, plan, inner, z, gap, k)
         rim = round(self.height - z, 3)
         crown = Facade(rim, (Band(rim - 0.4, rim, -min(0.3, self.ledge)),))
-        roof = tiers.add_crown(
-            self, plan, crown, z, min(0.9, rim - 0.1), thickness=0.3
-        )
-        equip_roof(self, plan, roof, self.roof_items)
+        parapet = min(0.9, rim - 0.1)
+        tiers.add_crown(self, plan, crown, z, parapet, items=self.roof_items)
 
 
 def _add_lobby(p: BandedTower, plan: np.ndarray) -> float:

@@ -11,7 +11,6 @@ from cns_drake.city.facades import (
     Wing,
     bays,
     details,
-    equip_roof,
     free_stretches,
     massing,
     roofs,
@@ -67,8 +66,7 @@ def _add_classes(p: School, bar: np.ndarray) -> float:
         return top
     rim = 0.7
     crown = Facade(rim, (Band(rim - 0.3, rim, -0.15),))
-    z = tiers.add_crown(p, bar, crown, top, 0.5, thickness=0.3)
-    equip_roof(p, bar, z, p.roof_items)
+    tiers.add_crown(p, bar, crown, top, 0.5, items=p.roof_items)
     return top
 
 

@@ -49,8 +49,8 @@ class SlabTower(Building):
         walls = _storey(self, storey)
         top = tiers.add_storeys(self, slab, walls, top, groups, per_group)
         bands = (Band(0.0, 0.25, -0.12), Band(1.0, _PARAPET, -0.12))
-        roof = tiers.add_crown(self, slab, Facade(_PARAPET, bands), top, 0.9)
-        equip_roof(self, slab, roof, _ROOF_ITEMS)
+        crown = Facade(_PARAPET, bands)
+        tiers.add_crown(self, slab, crown, top, 0.9, items=_ROOF_ITEMS)
         shaft = massing.rectangle(stair[0], front + 1.2, stair[1], back - 1.2)
         _add_stair(self, shaft)
         room = front - y0 if self.at_back else y1 - back
@@ -329,8 +329,9 @@ class GalleryFlats(Building):
         stack = (groups, per_group, storey)
         _add_galleries(self, slab, open_edge, stack)
         crown = Facade(0.6, (Band(0.4, 0.6, -0.1),))
-        roof = tiers.add_crown(self, slab, crown, top, 0.5, thickness=0.25)
-        equip_roof(self, slab, roof, self.roof_items)
+        tiers.add_crown(
+            self, slab, crown, top, 0.5, thickness=0.25, items=self.roof_items
+        )
         left = x0 if self.stair_left else b - 0.05
         right = left + self.stair_width + 0.05
         low, high = slab[0, 1] + 0.8, slab[2, 1] - 0.8

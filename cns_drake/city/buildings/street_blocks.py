@@ -51,8 +51,9 @@ class BrickBlock(Building):
             self.pitch, [corbel if self.corbels else bays.blank], 0.9
         )
         frieze = Facade(crown, cornice, layout, plain=blind)
-        roof = tiers.add_crown(self, outline, frieze, top, self.parapet)
-        equip_roof(self, outline, roof, self.roof_items)
+        tiers.add_crown(
+            self, outline, frieze, top, self.parapet, items=self.roof_items
+        )
         if self.stairs_edge is not None and groups * per_group <= _MOST_FLIGHTS:
             wall = details.WallFrame(outline, self.stairs_edge)
             _add_fire_stairs(self, wall, bottom, storey, top)

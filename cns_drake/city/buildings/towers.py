@@ -10,7 +10,6 @@ from cns_drake.city.facades import (
     Facade,
     bays,
     details,
-    equip_roof,
     massing,
     tiers,
 )
@@ -147,8 +146,7 @@ def _add_glass_skyscraper_crown(
     )
     parapet = 0.7 * height if p.crown == "screen" else 1.0
     walls = Facade(height, louvres)
-    roof = tiers.add_crown(p, plan, walls, z0, parapet)
-    equip_roof(p, plan, roof, _ROOF_ITEMS)
+    tiers.add_crown(p, plan, walls, z0, parapet, items=_ROOF_ITEMS)
 
 
 _FORECOURT_M = 7.0
@@ -176,8 +174,8 @@ class Hotel(Building):
         h = round(self.height - roof, 3)
         bands = (Band(0.4, h - 1.2, 0.3), Band(h - 0.9, h - 0.5, -1.3))
         walls = Facade(h, bands, glass=(0.3,))
-        roof = tiers.add_crown(self, bar, walls, roof, 0.4, part="bar")
-        equip_roof(self, bar, roof, _HOTEL_ROOF_ITEMS)
+        items = _HOTEL_ROOF_ITEMS
+        tiers.add_crown(self, bar, walls, roof, 0.4, part="bar", items=items)
         _add_sign(self, plan)
 
 
@@ -306,8 +304,7 @@ def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
     crown = round(p.height - top, 3)
     louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
     screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
-    roof = tiers.add_crown(p, plan, screen, top, 2.2)
-    equip_roof(p, plan, roof, p.roof_items)
+    tiers.add_crown(p, plan, screen, top, 2.2, items=p.roof_items)
 
 
 def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from cns_drake.city.facades import bays, details, massing
 from cns_drake.city.facades.assembly import Assembly, Building, pick
 from cns_drake.city.facades.bays import Bay
+from cns_drake.city.facades.roofs import equip_roof
 from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -193,24 +194,25 @@ def add_crown(
     facade: Facade,
     z0: float,
     parapet: float,
-    extras: Sequence[Mesh] = (),
     part: str = "crown",
     thickness: float = 0.3,
+    items: Sequence[str] = (),
 ) -> float:
     """Adds the top of the walls and the roof; returns the roof's height [m].
 
-    The roof lies `parapet` below the top of the facade; `extras` are given
-    in heights above z0.
+    The roof lies `parapet` below the top of the facade, with the items of its
+    equipment, see `equip_roof`.
     """
     roof = round(facade.height - parapet, 3)
     mesh = merge_meshes(
         facade_mesh(outline, facade),
         massing.roof_pan(outline, roof, facade.height, thickness),
-        *extras,
     )
     out.add(part, mesh, z=z0)
     _add_glass(out, outline, facade, z0, part)
-    return round(z0 + roof, 3)
+    level = round(z0 + roof, 3)
+    equip_roof(out, np.asarray(outline), level, items)
+    return level
 
 
 def _add_glass(

@@ -1,32 +1,243 @@
 """Writes a city's stages, meshes and table of structures."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
+import re
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
-from cns_drake.base.csv_files import csv_text
+import numpy as np
+from scipy.spatial import cKDTree
+import yaml
+
+from cns_drake.base.csv_files import csv_text, read_records
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors, write_text
+from cns_drake.base.files import read_bytes, user_errors, write_text
 from cns_drake.base.map_folder import (
     MESH_FOLDER,
     STAGES_NAME,
     STRUCTURES_NAME,
     stage_name,
 )
+from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.city_structures import City, make_city, meshes_of
-from cns_drake.city.generation.renaming import find_renaming, renamed_text
 from cns_drake.city.geometry.structures import (
-    BoxShape,
-    CylinderShape,
     MeshShape,
     Part,
     Shape,
-    SphereShape,
     Structure,
 )
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
+from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.semantics import CLASS_IDS, CLASS_RGB
+
+# A structure that has moved farther than this is a new one [m].
+_SAME_PLACE = 0.3
+_COLUMNS = ("name", "class", "x", "y", "tags")
+
+
+class Renaming(NamedTuple):
+    """The new names of the structures that a file of stages names.
+
+    Structures that have kept their place are `renamed`; others are `lost`, even
+    if another one has the name now. Patterns are `unclear` if they match other
+    structures than before.
+    """
+
+    renamed: dict[str, str]
+    lost: list[str]
+    unclear: list[str]
+
+
+class _Row(NamedTuple):
+    name: str
+    semantic_class: str
+    xy: tuple[float, float]
+    tags: str
+
+    @property
+    def stem(self) -> str:
+        return re.sub(r"_\d+$", "", self.name)
+
+
+def find_renaming(
+    stages: Path, table: Path, structures: Sequence[Structure]
+) -> Renaming:
+    """Finds new names in a `stages.yaml` for structures of the city of today.
+
+    The table is the `structures.csv` of the city for which it was written.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    before = {row.name: row for row in _read(table)}
+    today = [
+        _Row(one.name, one.semantic_class, one.xyz[:2], " ".join(one.tags))
+        for one in structures
+    ]
+    successor = _successors(list(before.values()), today)
+    names = {row.name for row in today}
+    renamed: dict[str, str] = {}
+    lost: list[str] = []
+    unclear: list[str] = []
+    for name in dict.fromkeys(node.value for node in _name_nodes(stages)):
+        if "*" in name or "?" in name:
+            if _has_changed(name, before, names, successor):
+                unclear.append(name)
+        elif name not in before:
+            # A new name, or a slip, which generating reports.
+            continue
+        elif name not in successor:
+            lost.append(name)
+        elif successor[name] != name:
+            renamed[name] = successor[name]
+    return Renaming(renamed, lost, unclear)
+
+
+def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
+    """Returns the text of a file of stages with other names in it.
+
+    Comments and order stay as they are.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    text = _text(stages)
+    nodes = _name_nodes(stages)
+    for node in sorted(nodes, key=lambda node: -node.start_mark.index):
+        if node.value in renamed:
+            start, end = node.start_mark.index, node.end_mark.index
+            # The scalar may have an anchor in front of it.
+            head, _, tail = text[start:end].rpartition(node.value)
+            new = head + renamed[node.value] + tail
+            text = text[:start] + new + text[end:]
+    return text
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_bytes(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8") from error
+
+
+def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
+    """Returns the scalars of a file of stages that name structures."""
+    read_yaml(path)  # Errors in one line.
+    # Only the slower loader has the place of a node in the text.
+    root = yaml.compose(_text(path), yaml.SafeLoader)
+    lists = [
+        node
+        for _, stage in _items(root, "stages")
+        for node in (
+            *(group for _, group in _items(stage, "absent")),
+            *(
+                part
+                for kind in ("lower", "sites")
+                for _, growth in _items(stage, kind)
+                for key, part in _pairs(growth)
+                if key in ("structures", "but")
+            ),
+        )
+    ]
+    lists += [node for _, node in _items(root, "lots")]
+    # The node of an alias is visited once.
+    scalars = {
+        id(node): node
+        for group in lists
+        if isinstance(group, yaml.SequenceNode)
+        for node in group.value
+        if isinstance(node, yaml.ScalarNode)
+    }
+    return list(scalars.values())
+
+
+def _items(node: yaml.Node | None, key: str) -> list[tuple[str, yaml.Node]]:
+    """Returns the pairs of the mapping that a mapping has under a key."""
+    return [
+        pair
+        for name, value in _pairs(node)
+        if name == key
+        for pair in _pairs(value)
+    ]
+
+
+def _pairs(node: yaml.Node | None) -> list[tuple[str, yaml.Node]]:
+    """Returns the pairs of a mapping, with those merged into it."""
+    if not isinstance(node, yaml.MappingNode):
+        return []
+    pairs = []
+    for key, value in node.value:
+        if key.value == "<<":
+            merged = (
+                value.value if isinstance(value, yaml.SequenceNode) else [value]
+            )
+            pairs += [pair for part in merged for pair in _pairs(part)]
+        else:
+            pairs.append((key.value, value))
+    return pairs
+
+
+def _has_changed(
+    pattern: str,
+    before: Iterable[str],
+    today: Iterable[str],
+    successor: Mapping[str, str],
+) -> bool:
+    """Returns whether a pattern matches others, besides new or lost ones."""
+    meant = {
+        successor[name]
+        for name in before
+        if name in successor and fnmatchcase(name, pattern)
+    }
+    known = set(successor.values())
+    return meant != {
+        name for name in today if name in known and fnmatchcase(name, pattern)
+    }
+
+
+def _read(table: Path) -> list[_Row]:
+    rows = []
+    for line, row in read_records(table, _COLUMNS):
+        try:
+            xy = float(row["x"]), float(row["y"])
+        except ValueError:
+            xy = np.nan, np.nan
+        if not np.isfinite(xy).all():
+            raise InputError(f"{table}: line {line}: no finite x and y")
+        rows.append(_Row(row["name"], row["class"], xy, row["tags"]))
+    return rows
+
+
+def _successors(
+    before: Sequence[_Row], today: Sequence[_Row]
+) -> dict[str, str]:
+    """Returns the new name of a structure that has kept its place."""
+    if not before or not today:
+        return {}
+    tree = cKDTree([row.xy for row in today])
+    pairs = []
+    for row in before:
+        for k in tree.query_ball_point(row.xy, _SAME_PLACE):
+            other = today[k]
+            # At one place there is one structure of a kind. Where there are
+            # two, such as the grounds of two districts, their names decide.
+            if (
+                row.stem == other.stem
+                and row.semantic_class == other.semantic_class
+            ):
+                gap = float(np.hypot(*np.subtract(row.xy, other.xy)))
+                unlike = (row.name != other.name, row.tags != other.tags)
+                pairs.append((gap > 0.01, unlike, gap, row.name, other.name))
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for *_, old, new in sorted(pairs):
+        if old not in found and new not in taken:
+            found[old] = new
+            taken.add(new)
+    return found
 
 
 # Meshes are named relative to the SDF file, so that a stage needs no package
@@ -95,28 +306,18 @@ def _geometry(shape: Shape) -> str:
             return f"<mesh>{uri}</mesh>"
         scale = " ".join(_number(value, 5) for value in shape.scale)
         return f"<mesh>{uri}<scale>{scale}</scale></mesh>"
-    if isinstance(shape, BoxShape):
-        size = " ".join(_number(value, 3) for value in shape.size)
-        return f"<box><size>{size}</size></box>"
-    if isinstance(shape, CylinderShape):
-        radius, length = _number(shape.radius, 3), _number(shape.length, 3)
-        return (
-            f"<cylinder><radius>{radius}</radius>"
-            f"<length>{length}</length></cylinder>"
-        )
-    if isinstance(shape, SphereShape):
-        radius = _number(shape.radius, 3)
-        return f"<sphere><radius>{radius}</radius></sphere>"
-    raise TypeError(f"no SDF geometry for {type(shape).__name__}")
+    tag = type(shape).__name__.removesuffix("Shape").lower()
+    sizes = [
+        (name, " ".join(_number(v, 3) for v in np.atleast_1d(value)))
+        for name, value in vars(shape).items()
+    ]
+    inner = "".join(f"<{name}>{size}</{name}>" for name, size in sizes)
+    return f"<{tag}>{inner}</{tag}>"
 
 
 def _number(value: float, decimals: int) -> str:
     text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
-
-
-# Instance ids are stored as uint16; 0 means no structure.
-MAX_STRUCTURES = 2**16 - 1
 
 
 def structure_table(structures: Iterable[Structure]) -> str:
@@ -182,11 +383,11 @@ def render_stages(
             asked, or the city has too many structures.
     """
     growing = GrowingCity(city.structures, stages, city.cars)
-    if len(growing.structures) > MAX_STRUCTURES:
+    if len(growing.structures) > MAX_INSTANCE:
         raise InputError(
             f"{source.parent / 'city.yaml'}: {len(growing.structures)} "
             "structures are more than instance ids can count "
-            f"({MAX_STRUCTURES})"
+            f"({MAX_INSTANCE})"
         )
     comment = origin or (
         f"Generated by cns-drake city {world}; change roads.yaml, city.yaml "

@@ -67,9 +67,8 @@ def place_buildings(draft: Draft, district: District) -> None:
         house = _single_house(draft, district, plan, fault_at)
         _build(draft, name, plan.kind, house, rng, fault_at)
     for index, row in enumerate(district.plan.rows):
-        draft.open_range()
         fault_at = f"{draft.source}: districts.{name}.rows.{index}"
-        rng = draft.rng(name, "row", index)
+        rng = draft.task(name, "row", index)
         for k, house in enumerate(_row_houses(draft, district, row, rng)):
             rng = draft.rng(name, "row", index, k)
             _build(draft, name, row.kind, house, rng, fault_at)

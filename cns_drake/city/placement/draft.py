@@ -82,6 +82,11 @@ class Draft:
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
 
+    def task(self, *words: str | int) -> np.random.Generator:
+        """Starts a task: see `open_range` and `rng`."""
+        self.open_range()
+        return self.rng(*words)
+
     def open_range(self) -> None:
         """Starts a new range of numbers in names, for the next task.
 

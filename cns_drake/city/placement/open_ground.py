@@ -46,15 +46,13 @@ def furnish(draft: Draft, district: District) -> None:
         rng = draft.rng(plan.name, "object", index)
         _place_object(draft, plan.name, index, one, rng)
     for index, line in enumerate(plan.lines):
-        draft.open_range()
-        _place_line(draft, district, line, draft.rng(plan.name, "line", index))
+        rng = draft.task(plan.name, "line", index)
+        _place_line(draft, district, line, rng)
     for index, parking in enumerate(plan.parking):
-        draft.open_range()
-        rng = draft.rng(plan.name, "parking", index)
+        rng = draft.task(plan.name, "parking", index)
         _place_cars(draft, plan.name, parking, rng)
     for index, scatter in enumerate(plan.scatter):
-        draft.open_range()
-        rng = draft.rng(plan.name, "scatter", index)
+        rng = draft.task(plan.name, "scatter", index)
         _scatter(draft, district, scatter, rng)
 
 

@@ -32,8 +32,7 @@ _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
     """Places lights, stop signs and name signs at all arms, then signs."""
     for junction in network.junctions.values():
-        draft.open_range()
-        rng = draft.rng("junction", junction.name)
+        rng = draft.task("junction", junction.name)
         for arm in junction.arms:
             _furnish_arm(draft, network.roads[arm.road], junction, arm, rng)
 
@@ -109,17 +108,15 @@ def furnish_sidewalks(
             draft.areas.carriageway, draft.areas.sidewalks, distance
         )
         for index, line in enumerate(lines):
-            draft.open_range()
-            rng = draft.rng("sidewalk", task, index)
+            rng = draft.task("sidewalk", task, index)
             _walk(draft, districts, task, line, keep_off, rng)
 
 
 def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
     """Parks cars in the bays at the sides of the roads."""
     for (name, side), bay in network.areas.parking_bays.items():
-        draft.open_range()
         road = network.roads[name]
-        rng = draft.rng("bays", name, side)
+        rng = draft.task("bays", name, side)
         sign = 1 if side == "left" else -1
         offset = sign * (road.half_width + road.parking / 2 + _TO_KERB)
         s = road.first_station + float(rng.uniform(2.0, 5.0))
@@ -138,8 +135,7 @@ def plant_medians(draft: Draft) -> None:
     """Plants the strips between the directions, and lights them."""
     plan = draft.plan.medians or draft.plan.street
     for index, median in enumerate(draft.areas.medians.geoms):
-        draft.open_range()
-        rng = draft.rng("median", index)
+        rng = draft.task("median", index)
         line = _middle_line(median)
         s = float(rng.uniform(1.0, 3.0))
         while s < line.length - 1.0:

@@ -15,7 +15,6 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.facades.assembly import Assembly, Site
-from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry import (
     MeshShape,
     Model,
@@ -44,6 +43,7 @@ from cns_drake.imports.foreign_city import (
 )
 from cns_drake.imports.ground import Ground, bottom_of
 from cns_drake.imports.staged_city import StagedCity
+from cns_drake.scene.labels import MAX_INSTANCE
 
 # A building whose feet are farther from the ground was sunk into it [m].
 _LET_IN = 2.0
@@ -497,10 +497,10 @@ def dress_city(
         "without_room": things.no_room,
     }
     dressed = staged.replaced({**changed, **things.moved}).joined(added)
-    if len(dressed.kept) >= MAX_STRUCTURES:
+    if len(dressed.kept) >= MAX_INSTANCE:
         raise InputError(
             f"--plain: without it the city has {len(dressed.kept)} structures,"
-            f" more than instance ids can count ({MAX_STRUCTURES}); or give"
+            f" more than instance ids can count ({MAX_INSTANCE}); or give"
             " --within"
         )
     if is_paved:

@@ -27,7 +27,7 @@ from cns_drake.city.facades import (
     single_wall,
 )
 from cns_drake.city.geometry import Mesh, triangulate, upper_sides
-from cns_drake.imports.dressing.styles import Style, Use
+from cns_drake.imports.dressing.styles import Style
 from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.foreign_city import to_mesh
@@ -155,7 +155,7 @@ def plan_facade(
     cells = bays.stretches(panel.length, style.pitch, _MARGIN)
     first = max(0, math.floor(-floor / style.storey))
     last = math.ceil((panel.height - floor) / style.storey)
-    if style.use is Use.CHURCH:
+    if style.use == "church":
         last = min(last, 1)
     top = panel.height - _FROM_TOP - style.cornice
     openings = []
@@ -193,7 +193,7 @@ def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     street = plan.on_street
     if not street or any(o.kind == "shop" for o in street):
         return plan
-    is_gate = plan.style.use in (Use.SHED, Use.INDUSTRIAL)
+    is_gate = plan.style.use in ("shed", "industrial")
     kind, width = ("gate", _GATE_WIDTH) if is_gate else ("door", _DOOR_WIDTH)
     # A door must not reach into the windows above.
     above = min((o.z0 for o in plan.openings if o.row > 0), default=np.inf)
@@ -473,14 +473,14 @@ _LEAST_ROOF = 40.0  # [m^2]
 # Roof area for each piece of equipment [m^2], and the most pieces.
 _ROOF_EACH, _MOST = 90.0, 6
 _ITEMS = {
-    Use.FLATS: "stair_house vents skylight tank vents dish",
-    Use.OFFICE: "lift_house air_handler ac_unit ac_unit vents cooling_tower",
-    Use.RETAIL: "air_handler ac_unit skylight vents ac_unit dish",
-    Use.PUBLIC: "stair_house air_handler skylight vents ac_unit mast",
-    Use.INDUSTRIAL: "skylight vents skylight vents air_handler tank",
-    Use.HOUSE: "vents dish",
+    "flats": "stair_house vents skylight tank vents dish",
+    "office": "lift_house air_handler ac_unit ac_unit vents cooling_tower",
+    "retail": "air_handler ac_unit skylight vents ac_unit dish",
+    "public": "stair_house air_handler skylight vents ac_unit mast",
+    "industrial": "skylight vents skylight vents air_handler tank",
+    "house": "vents dish",
 }
-_CHIMNEYS = (Use.HOUSE, Use.FLATS, Use.PUBLIC)
+_CHIMNEYS = ("house", "flats", "public")
 _BRICK = (0.45, 0.27, 0.22)
 # Depth of a chimney's foot below the ridge, and its scale against the shared
 # mesh.

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 import re
 
@@ -12,20 +11,6 @@ import yaml
 
 from cns_drake.city.facades.assembly import Rgb, pick
 from cns_drake.imports.openstreetmap.tags import count
-
-
-class Use(Enum):
-    """The use of a building."""
-
-    HOUSE = "house"
-    FLATS = "flats"
-    OFFICE = "office"
-    RETAIL = "retail"
-    PUBLIC = "public"
-    INDUSTRIAL = "industrial"
-    CHURCH = "church"
-    SHED = "shed"
-
 
 _USE_KEYS = (
     "building",
@@ -50,7 +35,7 @@ _SMALL = 45.0  # [m^2]
 
 @dataclass(frozen=True)
 class Style:
-    """How a building is dressed; lengths in metres.
+    """How a building with a use of the file is dressed; lengths in metres.
 
     Windows have a pitch from middle to middle, a sill above their floor and the
     depth of their recess. The ground floor may have shops on the street, and
@@ -58,7 +43,7 @@ class Style:
     Fields that come from the file are listed in `by_tag`.
     """
 
-    use: Use
+    use: str
     storey: float
     pitch: float
     width: float
@@ -81,7 +66,7 @@ class Style:
 
 def building_use(
     tags: Mapping[str, str], area: float, height: float
-) -> tuple[Use, bool]:
+) -> tuple[str, bool]:
     """Returns the use of a building, and whether it comes from its tags.
 
     An untagged one has its use by the area of its footprint, about, and the
@@ -92,14 +77,14 @@ def building_use(
     found = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
     for use, look in _LOOKS["uses"].items():
         if found & set(look["words"].split()):
-            return Use(use), True
+            return use, True
     if area < _SMALL and height < 4.0:
-        return Use.SHED, False
+        return "shed", False
     if area < _LARGE_HOUSE and height < _HIGH_HOUSE:
-        return Use.HOUSE, False
+        return "house", False
     if height > _HIGH_BLOCK:
-        return Use.OFFICE, False
-    return Use.FLATS, False
+        return "office", False
+    return "flats", False
 
 
 def tagged_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
@@ -139,7 +124,7 @@ def make_style(
     """
     use, is_tagged = building_use(tags, area, height)
     by_tag = {"use"} if is_tagged else set()
-    look = _LOOKS["uses"][use.value]
+    look = _LOOKS["uses"][use]
     storey, pitch, width, window = (
         float(rng.uniform(*look[size]))
         for size in ("storey", "pitch", "width", "height")
@@ -151,7 +136,7 @@ def make_style(
     if year is not None:
         is_old = year < _OLD or (year < _NEW and is_old)
     chances = rng.random(4)
-    is_block = use in (Use.FLATS, Use.OFFICE, Use.RETAIL)
+    is_block = use in ("flats", "office", "retail")
     levels = count(tags.get("building:levels")) if tags else None
     numbered = max(1, round(height / storey))
     if levels and _STOREYS[0] <= height / levels <= _STOREYS[1]:
@@ -163,7 +148,7 @@ def make_style(
     by_tag |= {"wall"} if wall else set()
     by_tag |= {"roof"} if roof else set()
     wall = wall or _tinted(drawn_wall, tint)
-    shops = use is Use.RETAIL or (
+    shops = use == "retail" or (
         is_block
         and not is_tagged
         and storey * numbered > 6.0
@@ -185,17 +170,15 @@ def make_style(
         door=_colour(rng, "doors"),
         sign=_colour(rng, "signs"),
         shops=bool(shops),
-        balconies=bool(
-            use is Use.FLATS and numbered >= 3 and chances[1] < 0.45
-        ),
-        plinth=0.0 if use is Use.SHED else round(0.3 + 0.4 * chances[2], 2),
+        balconies=bool(use == "flats" and numbered >= 3 and chances[1] < 0.45),
+        plinth=0.0 if use == "shed" else round(0.3 + 0.4 * chances[2], 2),
         cornice=_cornice(use, is_flat, is_old, float(chances[3])),
         by_tag=frozenset(by_tag),
     )
 
 
-def _cornice(use: Use, is_flat: bool, is_old: bool, chance: float) -> float:
-    if use in (Use.SHED, Use.INDUSTRIAL):
+def _cornice(use: str, is_flat: bool, is_old: bool, chance: float) -> float:
+    if use in ("shed", "industrial"):
         return 0.0
     if not is_flat:
         return 0.12  # It is a gutter.

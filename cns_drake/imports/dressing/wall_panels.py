@@ -1,7 +1,5 @@
 """Plane walls of imported buildings, found in the triangles of a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

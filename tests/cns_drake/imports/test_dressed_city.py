@@ -25,7 +25,6 @@ from cns_drake.imports.dressing.facade_pieces import (
     with_doors,
 )
 from cns_drake.imports.dressing.styles import (
-    Use,
     building_use,
     make_style,
     tagged_colour,
@@ -174,11 +173,11 @@ def test_tags_win(row):
 
 @pytest.mark.parametrize(
     ("tags", "use"),
-    [({"building": "yes", "shop": "bakery"}, Use.RETAIL),
-     ({"building": "church"}, Use.CHURCH),
-     ({"building": "garages"}, Use.SHED),
-     ({"function": "Woonfunctie"}, Use.FLATS),
-     ({}, Use.HOUSE)],
+    [({"building": "yes", "shop": "bakery"}, "retail"),
+     ({"building": "church"}, "church"),
+     ({"building": "garages"}, "shed"),
+     ({"function": "Woonfunctie"}, "flats"),
+     ({}, "house")],
 )  # fmt: skip
 def test_uses(tags, use):
     assert building_use(tags, 100.0, 6.0) == (use, bool(tags))

@@ -276,7 +276,7 @@ def test_a_city_counts_what_is_from_the_file_and_what_at_random(
         "building": {"dressed"}, "walk": {"dressed"}, "road": {"file"},
         "lamp_post_n": {"file"}, "car": {"lot"},
     }  # fmt: skip
-    monkeypatch.setattr(dressed_city, "MAX_STRUCTURES", len(result.city.kept))
+    monkeypatch.setattr(dressed_city, "MAX_INSTANCE", len(result.city.kept))
     with pytest.raises(InputError, match="more than instance ids"):
         dress_city(staged, again, [drive_of(again)], ground, 0)
     (bottom,) = bottom_of(staged.kept, ground)

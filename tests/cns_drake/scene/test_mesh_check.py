@@ -8,7 +8,7 @@ from helpers.small_map import world_text
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.mesh_check import check_gltf, unread_parts
+from cns_drake.scene.mesh_files import check_gltf, unread_parts
 from cns_drake.scene.world import load_world
 
 

@@ -10,7 +10,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.streets import EgoBox
-from cns_drake.traffic.traffic_adding import make_traffic
+from cns_drake.traffic.traffic_motion import make_traffic
 from cns_drake.traffic.walkers import gait_rate
 
 DT, RADIUS, RATE = 0.1, 30.0, 0.2

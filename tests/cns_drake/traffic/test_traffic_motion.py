@@ -14,17 +14,15 @@ from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.traffic_adding import (
-    add_traffic,
-    connect_traffic,
-    make_traffic,
-    traffic_structures,
-)
 from cns_drake.traffic.traffic_motion import (
     MOVING_SPEED,
     BodyStates,
     LimbTable,
+    add_traffic,
     bodies_at,
+    connect_traffic,
+    make_traffic,
+    traffic_structures,
 )
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, Tracks, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS
