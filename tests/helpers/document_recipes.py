@@ -10,8 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from scipy.spatial.transform import Rotation
 import yaml
 
+from evaluation.drives import open_drive
 from helpers.small_cityjson import write_blocks
 from helpers.small_opendrive import straight, write_roads
 
@@ -23,6 +26,22 @@ def _write_sources(folder: Path) -> None:
         straight("1", 0, 0, 150, 0),
         straight("2", 150, 0, 300, 0),
     )
+
+
+def _write_own_drives(folder: Path) -> None:
+    """Writes the scans of the town's drives as arrays, in UTM coordinates."""
+    for stage in ("01", "02"):
+        drive = open_drive(folder / f"output/town_{stage}")
+        (folder / f"scans_{stage}").mkdir()
+        rows = []
+        for k, scan in enumerate(drive):
+            columns = [scan[name] for name in ("x", "y", "z", "intensity")]
+            path = folder / f"scans_{stage}/{k:06d}.npy"
+            np.save(path, np.stack(columns, axis=1))
+            p_WS = drive.X_WS[k, :3, 3] + [355_000.0, 4_026_000.0, 0.0]
+            quat = Rotation.from_matrix(drive.X_WS[k, :3, :3]).as_quat()
+            rows.append([1e-9 * drive.stamps_ns[k], *p_WS, *quat])
+        np.savetxt(folder / f"poses_{stage}.tum", rows)
 
 
 @dataclass(frozen=True)
@@ -108,6 +127,7 @@ RECIPES = {
             "output/pages/town_01.html",
             "town.html",
         ),
+        prepare=_write_own_drives,
         all_methods=True,
     ),
     "imported scenario": Recipe(
@@ -378,6 +398,7 @@ RECIPES = {
             "kitti/sequences/02/first_pose.txt",
             "kitti/sequences/02/poses.txt",
             "kitti/poses/02.txt",
+            "mulran/town_02/global_pose.csv",
             "tum/town_02/base_link.tum",
             "tum/town_02/lidar.tum",
             "changed/sequences/02/labels/000000.label",
@@ -527,6 +548,17 @@ RECIPES = {
         prints=("trend/index.html",),
         makes=("trend/results.csv",),
     ),
+    "random cities": Recipe(
+        "about: Do the methods rank alike in five",
+        changes=(("suburbia", "town"), ("[1, 2, 3, 4, 5]", "[1, 2]")),
+        file="random.yaml",
+    ),
+    "study of random cities": Recipe(
+        ".venv/bin/cns-drake study random.yaml",
+        changes=(("--output", "--method solid --output"),),
+        after=("random cities", "start a city"),
+        prints=("random/index.html",),
+    ),
     "experiments": Recipe(
         ".venv/bin/cns-drake study --list",
         prints=("map-pairs", "cases:"),
@@ -667,6 +699,23 @@ RECIPES = {
         after=("workers", "scenario of a world", "waypoints", "start a city"),
         prints=("shared/tour",),
         makes=("shared/tour/metadata.yaml",),
+    ),
+    "Slurm": Recipe(
+        "#!/bin/bash",
+        changes=(
+            ("tcp://$(hostname):8786", "{scheduler}"),
+            (".venv/bin/dask scheduler --port 8786", "sleep 0"),
+            ("srun ", ""),
+            ("--vary family.yaml", "tour.yaml --frames 2"),
+            ("output output", "output slurm"),
+        ),
+        after=(
+            *("scheduler", "scenario of a world"),
+            *("waypoints", "start a city"),
+        ),
+        file="cluster.sh",
+        command=".venv/bin/dask --version && bash cluster.sh",
+        makes=("slurm/tour/metadata.yaml",),
     ),
     "method": Recipe(
         "import numpy as np\n\nfrom evaluation", file="heights.py"
@@ -825,6 +874,24 @@ RECIPES = {
         changes=(("sequences/04", "sequences/02"),),
         after=("exports",),
         prints=("TCR_sym", "ring++"),
+    ),
+    "own scans and poses": Recipe(
+        "from pathlib import Path\n\nimport numpy as np\nfrom scipy.spatial",
+        after=("own city",),
+        file="convert.py",
+        command=".venv/bin/python convert.py",
+        makes=("mine/sequences/0[12]/velodyne/000039.bin",),
+    ),
+    "own scans, pairs": Recipe(
+        ".venv/bin/cns-eval drives mine",
+        after=("own scans and poses",),
+        prints=("another lane", "AUC", "AUROC"),
+    ),
+    "own scans, report": Recipe(
+        ".venv/bin/cns-eval report mine",
+        after=("own scans and poses",),
+        prints=("my_report/report.html", "my_study/index.html"),
+        all_methods=True,
     ),
     "own data, layered overlap": Recipe(
         ".venv/bin/cns-eval pr kitti",
