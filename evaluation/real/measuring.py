@@ -56,8 +56,8 @@ _AROUND = 30.0
 _ESTIMATORS = tuple(
     one for one in estimators.METHODS if one != estimators.KISS_MATCHER
 )
-# Draws of patches for the judge.
-_DRAWS = 4
+# Draws of patches for the judge, which differ by up to 0.04.
+_DRAWS = 1
 
 
 class _Part(NamedTuple):
@@ -148,29 +148,29 @@ class Measuring:
         task: str,
         method: str,
         values: Sequence[tuple[str, float, Interval]],
-        number: int,
+        n: int,
         *,
         gate: bool = False,
         database: str = "",
     ) -> Key:
         """Adds rows, and returns what identifies them."""
-        key = {
-            "experiment": "real",
-            "map": one.data_set.world,
-            "database": database or one.name,
-            "query": one.name,
-            "seed": _REAL.seed,
-            "factors": {},
-            "task": task,
-            "method": method,
-            "gate": gate,
-            "protocol": _REAL.name,
-        }
-        for metric, value, interval in values:
-            ends = {"low": interval.low, "high": interval.high}
-            row = Row(**key, metric=metric, value=value, **ends, n=number)
-            self.rows.append(row)
-        return Key(**key)
+        key = Key(
+            experiment="real",
+            map=one.data_set.world,
+            database=database or one.name,
+            query=one.name,
+            seed=_REAL.seed,
+            factors={},
+            task=task,
+            method=method,
+            gate=gate,
+            protocol=_REAL.name,
+        )
+        self.rows += [
+            Row(**vars(key), metric=m, value=v, low=i.low, high=i.high, n=n)
+            for m, v, i in values
+        ]
+        return key
 
     def _recognise(
         self, sets: Sequence[RealScans], made: Sequence[Drive]
@@ -319,8 +319,12 @@ class Measuring:
             return
         from evaluation.real import judge
 
+        places = judge.places_of(one.drive)
+        if len(places) < 2:
+            self._note(f"{one.name}: one place, not judged")
+            return
         found = judge.judge_draws(
-            judge.places_of(one.drive),
+            places,
             [place for drive in made for place in judge.places_of(drive)],
             _DRAWS,
             self._track,
@@ -330,8 +334,6 @@ class Measuring:
             known = [(n, v, UNKNOWN) for n, v in values.items() if v == v]
             number = found["patches"][0]
             self._add(one, "judge", group, known, number, database="simulated")
-        if math.isnan(found["auc"]["all"]):
-            self._note(f"{one.name}: one place, not judged")
 
 
 def _joined(parts: Sequence[_Part], method: int) -> DescribedScans:

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import yaml
 
 from evaluation.drives import open_drive
+from helpers.layered_scans import town
 from helpers.small_cityjson import write_blocks
 from helpers.small_opendrive import straight, write_roads
 
@@ -88,6 +89,14 @@ def shorten_drives(folder: Path) -> None:
         }
         path = folder / f"town/sequence_{stage}.yaml"
         path.write_text(yaml.safe_dump(short))
+
+
+def write_real_scans(folder: Path) -> None:
+    """Writes two scans of one place, seen from 6.3 m apart."""
+    for number, x in ((26, 0.0), (4481, 6.3)):
+        scan = town(1) - [x, 0.0, 0.0]
+        path = folder / f"real_scans/kitti_00_revisits/{number:06d}.npy"
+        np.save(path, scan.astype(np.float32))
 
 
 _FIRST = ("metropolis_01", "town_01")
@@ -345,6 +354,29 @@ RECIPES = {
         changes=(("report drives", "report cns"),),
         after=("exports",),
         prints=("report/report.",),
+    ),
+    "named poses": Recipe(
+        "# number x y z qx qy qz qw",
+        file="real_scans/kitti_00_revisits/poses.txt",
+        prepare=write_real_scans,
+    ),
+    "real": Recipe(
+        ".venv/bin/cns-eval real real_scans --output",
+        changes=(("--output", "--method solid --method btc --output"),),
+        after=("named poses",),
+        makes=("real/results.csv", "real/queries.csv"),
+    ),
+    "help: real": Recipe(
+        "cns-eval real real_scans",
+        changes=(("--output real", "--method plane-icp --output fits"),),
+        after=("named poses",),
+        prints=("fits/results.csv",),
+    ),
+    "rankings": Recipe(
+        ".venv/bin/cns-eval compare --rankings ladder real",
+        changes=(("ladder real", "real real"),),
+        after=("real",),
+        prints=("Kendall's tau",),
     ),
     "table of an entrant": Recipe("experiment,map,database", file="mine.csv"),
     "compare": Recipe(
@@ -959,6 +991,14 @@ NOT_RUN = {
     "for minutes",
     ".venv/bin/cns-drake map-truth aged": "needs a city that has aged, and "
     "minutes; the recipe map truth has a small one",
+    ".venv/bin/cns-drake simulate docs/examples/like_nuscenes": "records a "
+    "shipped drive, for minutes; test_real has recordings",
+    ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
+    "and drives through it, for an hour",
+    ".venv/bin/cns-eval tcr data/": "needs data sets that cannot be shipped",
+    ".venv/bin/cns-eval pr data/nclt": "needs them, too",
+    ".venv/bin/cns-eval pr data/sequences": "needs KITTI's scans",
+    ".venv/bin/cns-eval drives data/": "likewise, though poses alone do",
     ".venv/bin/cns-drake import neukolln": "needs the file that is not shipped",
     "/** A batch of rays": "C++ of a design",
     "lidars: typing.Mapping": "lines of an example of Drake's",

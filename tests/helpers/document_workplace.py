@@ -77,7 +77,7 @@ class Workplace:
         commands = text.splitlines()
         if recipe.file is not None:
             path = self.folder / recipe.file
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
             commands = [recipe.command] if recipe.command else []
         if recipe.ready is not None:
