@@ -16,7 +16,9 @@ def localise(
     method: Annotated[
         str,
         typer.Option(
-            "--method", metavar="icp|plane-icp|gicp|vgicp|kiss-matcher|FILE.py"
+            "--method",
+            metavar="icp|plane-icp|gicp|vgicp|robust-plane-icp|robust-gicp"
+            "|kiss-matcher|FILE.py",
         ),
     ],
     start: float = 0.5,

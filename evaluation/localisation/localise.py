@@ -26,13 +26,13 @@ from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.sampling import cropped, sample_frames
 from evaluation.localisation.estimators import (
-    MAX_RANGE,
     Estimator,
     LocalisationMap,
     Settings,
     judge,
     thinned,
 )
+from evaluation.localisation.robust import MAX_RANGE
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,

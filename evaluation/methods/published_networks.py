@@ -336,11 +336,14 @@ def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
 
     The first is 0.
     """
+    points = points.astype(np.float64)
+    norms = (points * points).sum(axis=1)
     chosen = np.zeros(number, np.int64)
-    squares = np.full(len(points), np.inf, np.float32)
+    squares = np.full(len(points), np.inf)
     for k in range(1, number):
-        offsets = points - points[chosen[k - 1]]
-        np.minimum(squares, (offsets * offsets).sum(axis=1), out=squares)
+        last = chosen[k - 1]
+        found = norms + norms[last] - 2.0 * (points @ points[last])
+        np.minimum(squares, found, out=squares)
         chosen[k] = squares.argmax()
     return chosen
 

@@ -82,9 +82,12 @@ def read_weights(
         raise InputError(
             f"{path}: no weights of PyTorch ({type(error).__name__}: {error})"
         ) from error
-    states = [found, *found.values()] if isinstance(found, dict) else []
-    states = [one for one in states if isinstance(one, dict)]
-    state = max(states, key=lambda one: len(shapes.keys() & one), default={})
+    nested = [found, *(found.values() if isinstance(found, dict) else ())]
+    state: dict[str, Any] = max(
+        (one for one in nested if isinstance(one, dict)),
+        key=lambda one: len(shapes.keys() & one),
+        default={},
+    )
     for name, shape in shapes.items():
         tensor = state.get(name)
         if not isinstance(tensor, np.ndarray):
