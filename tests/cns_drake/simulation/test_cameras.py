@@ -160,8 +160,11 @@ def test_images_are_jpegs_of_what_is_there(messages):
     label = messages["/front/label"][0][1].data.view("<u2").reshape(240, 320)
     pixels = np.asarray(picture).astype(float)
     sky, ground = pixels[label == 0], pixels[label == 72]
-    assert sky.std(axis=0).max() < 12.0
-    assert np.abs(sky.mean(axis=0) - ground.mean(axis=0)).max() > 30.0
+    # A sky is blue above all, with clouds; grass is green.
+    assert sky.mean(axis=0).argmax() == 2
+    assert sky.mean(axis=0)[2] > 180.0
+    assert ground.mean(axis=0).argmax() == 1
+    assert ground.std(axis=0).min() > 2.0
     small = Image.open(io.BytesIO(messages["/left/image"][0][1].data))
     assert small.size == (64, 32)
 
