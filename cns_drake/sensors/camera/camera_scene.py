@@ -59,7 +59,7 @@ RENDERER = "cameras"
 _SIDES = 64
 _GREY = (0.5, 0.5, 0.5)
 # Pixels of a side of the map of the sun's shadows, over the whole scene.
-_SHADOW_PIXELS = 8192
+_SHADOW_PIXELS = 4096
 # A sun, and far lamps in place of a sky, which cast no shadows: where light
 # comes from, its strength and colour.
 _LIGHTS = [
@@ -67,7 +67,7 @@ _LIGHTS = [
         type="directional",
         frame="world",
         direction=-SUN_W,
-        intensity=3.2,
+        intensity=4.0,
         color=Rgba(1.0, 0.94, 0.84),
     ),
     *(
@@ -79,10 +79,10 @@ _LIGHTS = [
             color=Rgba(*rgb),
         )
         for place, strength, rgb in (
-            ((0.1, -0.2, 1.0), 0.9, (0.75, 0.87, 1.0)),
-            ((0.9, 0.3, -0.3), 0.55, (0.9, 0.95, 1.0)),
-            ((-0.2, -0.9, -0.3), 0.55, (0.9, 0.95, 1.0)),
-            ((-0.7, 0.7, -0.3), 0.45, (1.0, 0.95, 0.9)),
+            ((0.1, -0.2, 1.0), 1.3, (0.75, 0.87, 1.0)),
+            ((0.9, 0.3, -0.3), 0.75, (0.9, 0.95, 1.0)),
+            ((-0.2, -0.9, -0.3), 0.75, (0.9, 0.95, 1.0)),
+            ((-0.7, 0.7, -0.3), 0.65, (1.0, 0.95, 0.9)),
         )
     ),
 ]

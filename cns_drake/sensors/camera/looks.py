@@ -101,8 +101,8 @@ def _bark(rng: np.random.Generator) -> np.ndarray:
 
 def _panes(rng: np.random.Generator) -> np.ndarray:
     """Returns what panes mirror: sky, clouds and what is opposite."""
-    sky = np.clip(0.5 + 0.9 * _noise(rng, 1.8), 0.0, 3.0)
-    return 0.5 + sky * (0.8, 0.95, 1.1)
+    sky = np.clip(0.4 + 1.2 * _noise(rng, 1.8), 0.0, 4.0)
+    return (0.5 + sky * (0.85, 0.95, 1.05)) * (1.0 + 0.1 * _noise(rng, 0.8))
 
 
 def _leaves(rng: np.random.Generator) -> np.ndarray:
@@ -135,7 +135,7 @@ LOOKS = {
     "grass": Look(5.0, _grass),
     "plaster": Look(9.0, _plaster),
     "bark": Look(1.5, _bark),
-    "panes": Look(40.0, _panes, 0.3),
+    "panes": Look(16.0, _panes, 0.3),
     "leaves": Look(2.0, _leaves),
     "hedge": Look(2.0, lambda rng: np.maximum(_leaves(rng)[:, :, :3], 0.3)),
 }
