@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterator, Mapping, Sequence, Set
 import contextlib
 from dataclasses import dataclass, field, replace
 from importlib import resources
+import io
 import logging
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from pydrake import geometry
@@ -15,6 +18,7 @@ from pydrake.common.value import Value
 from pydrake.geometry import FrameId, MeshcatParams, QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.sensors import ImageRgba8U
 
 from cns_drake.base.files import write_text
 from cns_drake.pictures import meshcat_drawing as drawing
@@ -60,6 +64,8 @@ _LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
 # Together they keep the page of any drive below 25 MB.
 _MAX_SCANS = 160
 _MAX_POINTS_PER_SCAN = 3000
+# The same for images of a camera, and pixels of their longer side.
+_MAX_IMAGES, _IMAGE_SIDE = 200, 400
 # One point for each cube of this size [m]: without that, nearly all points
 # would lie on the rings of ground around the vehicle.
 _THINNING_SIZE = 0.5
@@ -80,6 +86,7 @@ class DriveRecord:
         limbs: leading frame F -> the poses in F of all frames that move with it
             as one, with F itself.
         names: leading frame -> its name in the page.
+        images: camera -> frame index and JPEG of the images to show.
     """
 
     period: float
@@ -93,6 +100,7 @@ class DriveRecord:
         default_factory=dict
     )
     names: dict[FrameId, str] = field(default_factory=dict)
+    images: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -135,7 +143,7 @@ def make_drive_page(
     - `/stage_difference/lower/<class>`: parts of the other stage above their
       height here, translucent orange, off when the page opens.
 
-    A panel has the title and a legend; buttons play the drive, let the camera
+    A panel has the title and a legend, others what cameras see; buttons play the drive, let the camera
     follow the car, switch points off, and show the change: additional parts are
     then violet. Below the time line are plots of speed, IMU and stage.
     """
@@ -187,6 +195,13 @@ def make_panel(
             if name in changes
         },
         plots=motion_plots(drive),
+        cameras={
+            name: [
+                (f"{k * drive.period:.2f}", base64.b64encode(jpeg).decode())
+                for k, jpeg in images
+            ]
+            for name, images in drive.images.items()
+        },
         stage=shown.stage,
         stages=shown.stages,
     )
@@ -377,11 +392,12 @@ class MeshcatRecorder(LeafSystem):
         - specific_force
         - angular_velocity
         - <lidar>_scan (one for each LiDAR)
+        - <camera>_image (one for each camera)
 
     Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is
     an `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I
     [rad/s] are expressed in I; `<lidar>_scan` is a structured array of points
-    expressed in S.
+    expressed in S; `<camera>_image` is an ImageRgba8U.
 
     The poses of all moving frames are recorded at every frame, and the scans
     whenever the vehicle has gone another `scan_spacing` meters. On a long drive
@@ -397,6 +413,7 @@ class MeshcatRecorder(LeafSystem):
         num_frames: int | None = None,
         shown: ShownStages | None = None,
         scan_spacing: float = 15.0,
+        cameras: Mapping[str, int] = MappingProxyType({}),
     ):
         """Declares the ports and the schedule.
 
@@ -407,6 +424,8 @@ class MeshcatRecorder(LeafSystem):
             num_frames: frames that are recorded; all if None.
             shown: stages whose change the page shows.
             scan_spacing: way between two shown scans [m].
+            cameras: name of a camera -> number of frames from one image to
+                the next.
         """
         super().__init__()
         self._world = world
@@ -433,6 +452,13 @@ class MeshcatRecorder(LeafSystem):
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
             for name in self._X_BSs
         }
+        self._cameras = dict(cameras)
+        self._images = {}
+        for name in cameras:
+            self.drive.images[name] = []
+            self._images[name] = self.DeclareAbstractInputPort(
+                f"{name}_image", Value(ImageRgba8U())
+            )
         self.DeclarePeriodicPublishEvent(
             period_sec=period, offset_sec=0.0, publish=self._publish
         )
@@ -487,7 +513,25 @@ class MeshcatRecorder(LeafSystem):
         X_WBs.append(X_WB)
         if self._way_to_scan <= 0.0:
             self._take_scan(context, X_WB)
+        self._take_images(context, len(X_WBs) - 1)
         return EventStatus.Succeeded()
+
+    def _take_images(self, context: Context, frame: int) -> None:
+        for name, images in self.drive.images.items():
+            if frame % self._cameras[name]:
+                continue
+            # Slow to import, and few drives have cameras.
+            from PIL import Image
+
+            pixels = self._images[name].Eval(context).data[:, :, :3]
+            picture = Image.fromarray(np.ascontiguousarray(pixels))
+            picture.thumbnail((_IMAGE_SIDE, _IMAGE_SIDE))
+            jpeg = io.BytesIO()
+            picture.save(jpeg, "JPEG", quality=75)
+            images.append((frame, jpeg.getvalue()))
+            if len(images) > _MAX_IMAGES:
+                del images[1::2]
+                self._cameras[name] *= 2
 
     def _take_scan(self, context: Context, X_WB: RigidTransform) -> None:
         p_WRset = np.concatenate(

@@ -262,13 +262,14 @@ def _resume(
 
 
 def _make_page(drive: loaded_drive.LoadedDrive) -> MeshcatRecorder:
-    other, other_name = shown_beside(drive.scenario)
-    stage = drive.scenario.stage
-    stages = () if stage is None else tuple(map_folder(drive.scenario).stages())
+    scenario = drive.scenario
+    other, other_name = shown_beside(scenario)
+    stage = scenario.stage
+    stages = () if stage is None else tuple(map_folder(scenario).stages())
     return MeshcatRecorder(
         drive.world,
         X_BSs=drive.X_BSs,
-        period=drive.scenario.frame_period,
+        period=scenario.frame_period,
         num_frames=drive.num_frames,
         shown=ShownStages(
             None if other is None else loaded_drive.load_stage(other),
@@ -276,6 +277,10 @@ def _make_page(drive: loaded_drive.LoadedDrive) -> MeshcatRecorder:
             stage,
             stages,
         ),
+        cameras={
+            name: round(1 / (scenario.frame_period * camera.rate))
+            for name, camera in scenario.cameras.items()
+        },
     )
 
 

@@ -202,7 +202,11 @@ def make_station(
         for name, sensor in scenario.further_sensors.items()
     }
     if scenario.cameras:
-        scene = _copy_for_cameras(scene_graph, world)
+        scene = _copy_for_cameras(
+            scene_graph,
+            world,
+            any(one.depth or one.label for one in scenario.cameras.values()),
+        )
         scene.connect(builder, poses.get_output_port())
         frame = plant.GetBodyFrameIdOrThrow(base.index())
         for name, (port, recorded) in add_cameras(
@@ -249,7 +253,9 @@ def make_station(
     return diagram
 
 
-def _copy_for_cameras(scene_graph: SceneGraph, world: World) -> CameraScene:
+def _copy_for_cameras(
+    scene_graph: SceneGraph, world: World, classes: bool
+) -> CameraScene:
     """Returns what cameras on the vehicle see."""
     plant, inspector = world.plant, scene_graph.model_inspector()
     context = plant.CreateDefaultContext()
@@ -269,6 +275,7 @@ def _copy_for_cameras(scene_graph: SceneGraph, world: World) -> CameraScene:
         anchored=world.anchored_frames() | {world_frame},
         vehicle={plant.GetBodyFrameIdIfExists(body) for body in bodies},
         base=plant.GetBodyFrameIdOrThrow(base.index()),
+        classes=classes,
     )
 
 

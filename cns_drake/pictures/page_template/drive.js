@@ -14,6 +14,9 @@ let followed = null;
 // Plots of the drive: where the value is said, and all values.
 const plots = [...document.querySelectorAll(".plot output")].map((output) => (
   {output, values: output.dataset.values.split(",")}));
+// Images of each camera of the car, in the order of time.
+const cameras = [...document.querySelectorAll("#cameras figure")].map(
+  (figure) => [...figure.querySelectorAll("img")]);
 // Where the camera stood before.
 let overview = null;
 
@@ -124,11 +127,21 @@ function showTime() {
   }
 }
 
+// The latest image of each camera.
+function showImages() {
+  for (const images of cameras) {
+    const now = images.findLast(
+      ({dataset}) => Number(dataset.time) <= animator.time + 1e-3) ?? images[0];
+    for (const image of images) image.hidden = image !== now;
+  }
+}
+
 // Meshcat calls it before it draws a picture.
 viewer.render_callback = () => {
   if (followed) follow();
   placeMarker();
   showTime();
+  showImages();
 };
 
 // Colours as they are, instead of a film's.

@@ -5,6 +5,7 @@ import logging
 from typing import Any
 
 import numpy as np
+from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import (
     ClippingRange,
     ColorRenderCamera,
@@ -14,7 +15,12 @@ from pydrake.geometry import (
     RenderCameraCore,
 )
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import (
+    Context,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+)
 from pydrake.systems.sensors import (
     CameraInfo,
     ImageDepth32F,
@@ -28,6 +34,7 @@ from cns_drake.recording.mcap_recorder import RecordedSensor
 from cns_drake.recording.recorded_topics import camera_topic
 from cns_drake.sensors.camera.camera_scene import RENDERER, CameraScene
 from cns_drake.sensors.camera.config import CameraSection
+from cns_drake.sensors.camera.looks import HORIZON_RGB, sky
 
 # What is nearer or farther is not drawn; depths end before that [m].
 _NEAREST, _FARTHEST, _DEEPEST = 0.05, 2000.0, 250.0
@@ -70,33 +77,82 @@ def add_cameras(
         clipping = ClippingRange(_NEAREST, _FARTHEST)
         core = RenderCameraCore(RENDERER, info, clipping, RigidTransform())
         X_BC = optical_pose(config)
-        # No name of a scenario has a minus sign.
-        camera = builder.AddNamedSystem(
-            f"{name}-camera",
-            RgbdSensor(
-                scene.frames[base],
-                X_BC,
-                ColorRenderCamera(core),
-                DepthRenderCamera(core, DepthRange(2 * _NEAREST, _DEEPEST)),
-            ),
-        )
-        builder.Connect(
-            scene.scene_graph.get_query_output_port(),
-            camera.query_object_input_port(),
-        )
-        color = camera.color_image_output_port(), ImageRgba8U()
+        eyes = {}
+        for kind, scene_graph in scene.scene_graphs.items():
+            # No name of a scenario has a minus sign.
+            eyes[kind] = builder.AddNamedSystem(
+                f"{name}-{kind}",
+                RgbdSensor(
+                    scene.frames[base],
+                    X_BC,
+                    ColorRenderCamera(core),
+                    DepthRenderCamera(core, DepthRange(2 * _NEAREST, _DEEPEST)),
+                ),
+            )
+            builder.Connect(
+                scene_graph.get_query_output_port(),
+                eyes[kind].query_object_input_port(),
+            )
+        sky = builder.AddNamedSystem(f"{name}-sky", _Sky(info))
+        for port in (
+            eyes["colours"].color_image_output_port(),
+            eyes["colours"].body_pose_in_world_output_port(),
+        ):
+            builder.Connect(port, sky.GetInputPort(port.get_name()))
+        color = sky.get_output_port(), ImageRgba8U()
         ports = {"image": color, "camera_info": color}
         if config.depth:
-            depth = camera.depth_image_32F_output_port()
+            depth = eyes["classes"].depth_image_32F_output_port()
             ports["depth"] = depth, ImageDepth32F()
         if config.label:
-            ports["label"] = camera.label_image_output_port(), ImageLabel16I()
+            label = eyes["classes"].label_image_output_port()
+            ports["label"] = label, ImageLabel16I()
         make = _message_makers(info)
         for kind, (port, example) in ports.items():
             topic = camera_topic(name, kind)
             recorded = RecordedSensor(topic, X_BC, make[kind], name, example)
             found[f"{name}_{kind}"] = port, recorded
     return found
+
+
+class _Sky(LeafSystem):
+    """Draws a sky where an image has none of the scene.
+
+    .. pydrake_system::
+
+        name: _Sky
+        input_ports:
+        - color_image
+        - body_pose_in_world
+        output_ports:
+        - color_image
+    """
+
+    def __init__(self, info: CameraInfo):
+        """Draws into the images of a pinhole camera."""
+        super().__init__()
+        rows = np.indices((info.height(), info.width()))
+        pixels = np.stack([rows[1], rows[0], np.ones_like(rows[0])], axis=2)
+        d_C = pixels @ np.linalg.inv(info.intrinsic_matrix()).T
+        self._d_C = d_C / np.linalg.norm(d_C, axis=2, keepdims=True)
+        self._image = self.DeclareAbstractInputPort(
+            "color_image", Value(ImageRgba8U())
+        )
+        self._pose = self.DeclareAbstractInputPort(
+            "body_pose_in_world", Value(RigidTransform())
+        )
+        self.DeclareAbstractOutputPort(
+            "color_image", lambda: Value(ImageRgba8U()), self._calc
+        )
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        image = self._image.Eval(context)
+        R_WC = self._pose.Eval(context).rotation().matrix()
+        drawn = ImageRgba8U(image.width(), image.height())
+        drawn.mutable_data[:] = image.data
+        clear = (image.data[:, :, :3] == np.round(255 * HORIZON_RGB)).all(2)
+        drawn.mutable_data[clear, :3] = sky(self._d_C[clear] @ R_WC.T)
+        output.set_value(drawn)
 
 
 def _is_told(record: logging.LogRecord) -> bool:

@@ -1,8 +1,9 @@
 """The scene that cameras see: the LiDARs' geometry, as meshes for rendering.
 
 Drake's renderer wants normals, which meshes of worlds need not have, and is
-slow with thousands of geometries. All that stays is merged, by colour and
-class.
+slow with thousands of geometries. All that stays is merged: by look for images
+of colours, and by class for those of depths and classes, in which colours of
+vertices would be seen.
 """
 
 from collections.abc import Callable, Collection
@@ -29,6 +30,7 @@ from pydrake.geometry import (
     RenderCameraCore,
     RenderEngineVtkParams,
     RenderLabel,
+    Rgba,
     SceneGraph,
 )
 from pydrake.math import RigidTransform
@@ -42,29 +44,54 @@ from cns_drake.scene.perception_geometry import (
 )
 from cns_drake.scene.structure_table import StructureTable
 from cns_drake.scene.surfaces import merge_triangles, tessellate
+from cns_drake.sensors.camera.looks import (
+    GAMMA,
+    HORIZON_RGB,
+    LOOKS,
+    SUN_W,
+    look_of,
+    texture,
+    texture_places,
+)
 
 RENDERER = "cameras"
 # Sides of a circle: true to 0.1 % of its radius.
 _SIDES = 64
 _GREY = (0.5, 0.5, 0.5)
-# A sun, and others in place of a sky: directions of light, and strengths.
+# Pixels of a side of the map of the sun's shadows, over the whole scene.
+_SHADOW_PIXELS = 4096
+# A sun, and far lamps in place of a sky, which cast no shadows: where light
+# comes from, its strength and colour.
 _LIGHTS = [
     LightParameter(
-        type="directional", frame="world", direction=way, intensity=strength
-    )
-    for way, strength in (
-        ((0.5, -0.4, -0.8), 2.5),
-        ((-0.7, 0.6, -0.4), 0.9),
-        ((0.3, 0.7, -0.5), 0.6),
-        ((-0.2, -0.5, 0.6), 0.4),
-    )
+        type="directional",
+        frame="world",
+        direction=-SUN_W,
+        intensity=4.0,
+        color=Rgba(1.0, 0.94, 0.84),
+    ),
+    *(
+        LightParameter(
+            type="point",
+            frame="world",
+            position=1e5 * np.array(place),
+            intensity=strength,
+            color=Rgba(*rgb),
+        )
+        for place, strength, rgb in (
+            ((0.1, -0.2, 1.0), 1.3, (0.75, 0.87, 1.0)),
+            ((0.9, 0.3, -0.3), 0.75, (0.9, 0.95, 1.0)),
+            ((-0.2, -0.9, -0.3), 0.75, (0.9, 0.95, 1.0)),
+            ((-0.7, 0.7, -0.3), 0.65, (1.0, 0.95, 0.9)),
+        )
+    ),
 ]
 # Numbers of glTF 2.0: float, unsigned int; what buffers are for.
 _FLOAT, _UINT, _VERTICES, _CORNERS = 5126, 5125, 34962, 34963
 
 
 class CameraScene(LeafSystem):
-    """Gives a SceneGraph of its own the poses of the frames that move.
+    """Gives SceneGraphs of its own the poses of the frames that move.
 
     .. pydrake_system::
 
@@ -77,8 +104,8 @@ class CameraScene(LeafSystem):
     `frame_poses` is abstract, `KnownPoses`.
 
     Attributes:
-        scene_graph: what cameras see.
-        frames: frame in the scene that was copied -> frame in this one.
+        scene_graphs: what cameras see: `colours`, and `classes` if asked for.
+        frames: frame in the scene that was copied -> frame in these.
     """
 
     def __init__(
@@ -90,6 +117,7 @@ class CameraScene(LeafSystem):
         anchored: Collection[FrameId],
         vehicle: Collection[FrameId],
         base: FrameId,
+        classes: bool,
     ):
         """Copies a scene.
 
@@ -100,17 +128,28 @@ class CameraScene(LeafSystem):
             anchored: frames that never move, the world's included.
             vehicle: frames with what cameras do not see.
             base: the frame that carries cameras.
+            classes: whether a camera has images of depths or classes.
 
         Raises:
             InputError: Drake cannot render here.
         """
         super().__init__()
-        self.scene_graph = SceneGraph()
         check_renderer()
-        self.scene_graph.AddRenderer(
-            RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams(lights=_LIGHTS))
-        )
-        self._source = self.scene_graph.RegisterSource("cameras")
+        engines = {
+            "colours": RenderEngineVtkParams(
+                default_clear_color=HORIZON_RGB,
+                lights=_LIGHTS,
+                cast_shadows=True,
+                shadow_map_size=_SHADOW_PIXELS,
+            )
+        }
+        if classes:
+            engines["classes"] = RenderEngineVtkParams()
+        self.scene_graphs = {kind: SceneGraph() for kind in engines}
+        self._sources = {}
+        for kind, scene in self.scene_graphs.items():
+            scene.AddRenderer(RENDERER, MakeRenderEngineVtk(engines[kind]))
+            self._sources[kind] = scene.RegisterSource("cameras")
         geometries = read_perception_geometry(
             scene_graph.model_inspector(), lambda frame: frame not in vehicle
         )
@@ -122,18 +161,23 @@ class CameraScene(LeafSystem):
             is_anchored = frame in anchored
             if is_anchored:
                 X_FG = calc_X_WF(frame) @ X_FG
-            label = table[one.structure].label
-            key = None if is_anchored else frame, label, one.rgb or _GREY
-            parts.setdefault(key, []).append((label, X_FG, one))
-        moving = dict.fromkeys([base, *(key[0] for key in parts if key[0])])
+            entry = table[one.structure]
+            look = look_of(one.name, entry.semantic_class, one.rgb or _GREY)
+            for kind, group in (("colours", look), ("classes", entry.label)):
+                key = kind, None if is_anchored else frame, group
+                members = parts.setdefault(key, [])
+                members.append((len(members), X_FG, one))
+        moving = dict.fromkeys([base, *(key[1] for key in parts if key[1])])
         self.frames = {
-            frame: self.scene_graph.RegisterFrame(
-                self._source, GeometryFrame(f"frame_{k}")
-            )
-            for k, frame in enumerate(moving)
+            frame: GeometryFrame(f"frame_{k}") for k, frame in enumerate(moving)
         }
-        for k, ((frame, label, rgb), members) in enumerate(parts.items()):
-            self._register(f"mesh_{k}", frame, label, rgb, members)
+        for kind, scene in self.scene_graphs.items():
+            for frame in self.frames.values():
+                scene.RegisterFrame(self._sources[kind], frame)
+        self.frames = {f: own.id() for f, own in self.frames.items()}
+        for k, ((kind, frame, group), members) in enumerate(parts.items()):
+            if kind in self.scene_graphs:
+                self._register(f"mesh_{k}", kind, frame, group, members)
         self._poses = self.DeclareAbstractInputPort(
             "frame_poses", Value(object())
         )
@@ -147,38 +191,41 @@ class CameraScene(LeafSystem):
     def _register(
         self,
         name: str,
+        kind: str,
         frame: FrameId | None,
-        label: int,
-        rgb: tuple[float, float, float],
+        group: str | int,
         members: list[tuple[int, RigidTransform, PerceptionGeometry]],
     ) -> None:
         """Registers one mesh; without a frame it stays."""
-        merged, _ = merge_triangles(
+        merged, owners = merge_triangles(
             [(k, X, tessellate(g.surface, _SIDES)) for k, X, g in members]
         )
+        rgb = np.array([one.rgb or _GREY for *_, one in members])[owners]
         corners = merged.p_GVset[merged.triangles]
         middle = np.round(corners.mean(axis=(0, 1)))
-        made = GeometryInstance(
-            RigidTransform(middle), _as_mesh(corners - middle, rgb), name
-        )
+        mesh = _as_mesh(corners, middle, rgb, group)
+        made = GeometryInstance(RigidTransform(middle), mesh, name)
         properties = PerceptionProperties()
-        properties.AddProperty("label", "id", RenderLabel(label))
+        is_class = kind == "classes"
+        label = RenderLabel(group) if is_class else RenderLabel.kDontCare
+        properties.AddProperty("label", "id", label)
         made.set_perception_properties(properties)
-        scene_graph, source = self.scene_graph, self._source
+        scene_graph, source = self.scene_graphs[kind], self._sources[kind]
         if frame is None:
             scene_graph.RegisterAnchoredGeometry(source, made)
         else:
             scene_graph.RegisterGeometry(source, self.frames[frame], made)
 
     def connect(self, builder: DiagramBuilder, poses: object) -> None:
-        """Adds the system and its scene to a diagram."""
-        builder.AddNamedSystem("camera_scene_graph", self.scene_graph)
+        """Adds the system and its scenes to a diagram."""
         builder.AddNamedSystem("camera_scene", self)
         builder.Connect(poses, self.GetInputPort("frame_poses"))
-        builder.Connect(
-            self.GetOutputPort("geometry_pose"),
-            self.scene_graph.get_source_pose_port(self._source),
-        )
+        for kind, scene in self.scene_graphs.items():
+            builder.AddNamedSystem(f"camera_{kind}", scene)
+            builder.Connect(
+                self.GetOutputPort("geometry_pose"),
+                scene.get_source_pose_port(self._sources[kind]),
+            )
 
     def _calc_geometry_pose(
         self, context: Context, output: AbstractValue
@@ -207,32 +254,57 @@ def check_renderer() -> None:
         )
 
 
-def _as_mesh(corners: np.ndarray, rgb: tuple[float, float, float]) -> Mesh:
-    """Returns a glTF mesh of (N, 3, 3) corners of triangles, flat, in a colour.
+def _as_mesh(
+    corners: np.ndarray,
+    middle: np.ndarray,
+    rgb: np.ndarray,
+    look: str | int,
+) -> Mesh:
+    """Returns a glTF mesh of (N, 3, 3) corners of triangles, flat, of a look.
 
-    The axes of glTF are right, up and backwards: y up.
+    The (N, 3) colours are of screens; a class in place of a look has none.
+
+    The mesh is about `middle`. The axes of glTF are right, up and backwards: y
+    up.
     """
     first, second, third = np.moveaxis(corners, 1, 0)
     normals = np.cross(second - first, third - first)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0.0, length, 1.0)
     normals[length[:, 0] == 0.0] = (0.0, 0.0, 1.0)
-    places = corners.reshape(-1, 3)
+    places = (corners - middle).reshape(-1, 3)
     arrays = [
-        np.stack([a[:, 0], a[:, 2], -a[:, 1]], axis=1).astype("<f4")
+        np.stack([a[:, 0], a[:, 2], -a[:, 1]], axis=1)
         for a in (places, np.repeat(normals, 3, axis=0))
     ]
-    order = np.arange(len(places), dtype="<u4")
-    data = b"".join(a.tobytes() for a in (*arrays, order))
-    size = arrays[0].nbytes
-    # Colours of screens are nearly the roots of light (IEC 61966-2-1).
-    light = [float(c) ** 2 for c in rgb]
+    kinds, attributes = ["VEC3", "VEC3"], {"POSITION": 0, "NORMAL": 1}
+    material, files, extra = {"doubleSided": True}, {}, {}
+    if isinstance(look, str):
+        files["look.png"], white = texture(look)
+        tiles = texture_places(corners, normals) / LOOKS[look].size
+        tiles -= np.floor(tiles.min(axis=1, keepdims=True))
+        light = np.minimum(rgb**GAMMA * white, 1.0)
+        arrays += [tiles.reshape(-1, 2), np.repeat(light, 3, axis=0)]
+        kinds += ["VEC2", "VEC3"]
+        attributes |= {"TEXCOORD_0": 2, "COLOR_0": 3}
+        material |= {
+            "alphaMode": "MASK" if look == "leaves" else "OPAQUE",
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": 0},
+                "metallicFactor": 0.0,
+                "roughnessFactor": LOOKS[look].roughness,
+            },
+        }
+        extra = {
+            "images": [{"uri": "look.png"}],
+            "samplers": [{"minFilter": 9987, "magFilter": 9729}],
+            "textures": [{"source": 0, "sampler": 0}],
+        }
+    kinds.append("SCALAR")
     number = len(places)
-    vector = {"componentType": _FLOAT, "count": number, "type": "VEC3"}
-    limits = {
-        "min": arrays[0].min(axis=0).tolist(),
-        "max": arrays[0].max(axis=0).tolist(),
-    }
+    parts = [a.astype("<f4") for a in arrays]
+    parts.append(np.arange(number, dtype="<u4"))
+    ends = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
     document = {
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -242,48 +314,48 @@ def _as_mesh(corners: np.ndarray, rgb: tuple[float, float, float]) -> Mesh:
             {
                 "primitives": [
                     {
-                        "attributes": {"POSITION": 0, "NORMAL": 1},
-                        "indices": 2,
+                        "attributes": attributes,
+                        "indices": len(attributes),
                         "material": 0,
                     }
                 ]
             }
         ],
-        "materials": [
-            {
-                "doubleSided": True,
-                "pbrMetallicRoughness": {
-                    "baseColorFactor": [*light, 1.0],
-                    "metallicFactor": 0.0,
-                    "roughnessFactor": 1.0,
-                },
-            }
-        ],
-        "buffers": [{"uri": "mesh.bin", "byteLength": len(data)}],
+        "materials": [material],
+        **extra,
+        "buffers": [{"uri": "mesh.bin", "byteLength": ends[-1]}],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": k * size, "byteLength": n, "target": t}
-            for k, n, t in (
-                (0, size, _VERTICES),
-                (1, size, _VERTICES),
-                (2, order.nbytes, _CORNERS),
-            )
+            {
+                "buffer": 0,
+                "byteOffset": start,
+                "byteLength": part.nbytes,
+                "target": _CORNERS if kind == "SCALAR" else _VERTICES,
+            }
+            for start, part, kind in zip(ends, parts, kinds, strict=False)
         ],
         "accessors": [
-            {"bufferView": 0, **vector, **limits},
-            {"bufferView": 1, **vector},
             {
-                "bufferView": 2,
-                "componentType": _UINT,
+                "bufferView": k,
+                "componentType": _UINT if kind == "SCALAR" else _FLOAT,
                 "count": number,
-                "type": "SCALAR",
-            },
+                "type": kind,
+            }
+            for k, kind in enumerate(kinds)
         ],
     }
+    document["accessors"][0] |= {
+        "min": parts[0].min(axis=0).tolist(),
+        "max": parts[0].max(axis=0).tolist(),
+    }
+    files["mesh.bin"] = b"".join(part.tobytes() for part in parts)
     text = json.dumps(document).encode()
     return Mesh(
         InMemoryMesh(
             mesh_file=MemoryFile(text, ".gltf", "mesh.gltf"),
-            supporting_files={"mesh.bin": MemoryFile(data, ".bin", "mesh.bin")},
+            supporting_files={
+                name: MemoryFile(data, name[-4:], name)
+                for name, data in files.items()
+            },
         )
     )
 

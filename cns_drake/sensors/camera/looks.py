@@ -1,0 +1,227 @@
+"""What surfaces look like to a camera: textures that code makes from seeds.
+
+A texture says how light a place is beside the colour of its surface, whose mean
+stays. It repeats in the world; a wall has its height in the rows.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import functools
+import io
+
+import numpy as np
+
+# Pixels of a side of a texture.
+_SIDE = 512
+# A colour of a screen is about this root of its light (IEC 61966-2-1).
+GAMMA = 2.2
+# Where the sun is, and the colour of the sky at the horizon.
+SUN_W = np.array([-0.5, 0.55, 0.75]) / np.linalg.norm([-0.5, 0.55, 0.75])
+HORIZON_RGB = np.array([204.0, 221.0, 237.0]) / 255.0
+
+
+@dataclass(frozen=True)
+class Look:
+    """A repeated texture, and how a surface with it returns light.
+
+    Attributes:
+        size: side of the repeated square in the world [m].
+        paint: makes (N, N, 1 or 3) light, of any mean, from random numbers;
+            a fourth channel is 0 where there is nothing.
+        roughness: 0 of a mirror to 1 of chalk.
+    """
+
+    size: float
+    paint: Callable[[np.random.Generator], np.ndarray]
+    roughness: float = 1.0
+
+
+def _noise(rng: np.random.Generator, slope: float) -> np.ndarray:
+    """Returns (N, N, 1) noise that repeats, of mean 0 and deviation 1.
+
+    The amplitude of a wave falls with the power `slope` of its number.
+    """
+    number = np.hypot(*np.meshgrid(*[np.fft.fftfreq(_SIDE, 1 / _SIDE)] * 2))
+    number[0, 0] = np.inf
+    waves = np.fft.fft2(rng.normal(size=number.shape)) / number**slope
+    values = np.fft.ifft2(waves).real
+    return (values / values.std())[:, :, None]
+
+
+def _asphalt(rng: np.random.Generator) -> np.ndarray:
+    cracks = np.abs(_noise(rng, 1.8)) < 0.012
+    worn = 0.10 * _noise(rng, 1.4) + 0.16 * _noise(rng, 0.2)
+    return (1.0 + worn) * np.where(cracks & (_noise(rng, 1.5) > 0.6), 0.6, 1.0)
+
+
+def _cells(
+    rng: np.random.Generator,
+    across: int,
+    rows: int,
+    joint: tuple[float, float],
+    *,
+    lag: float = 0.0,
+    spread: float = 0.1,
+) -> np.ndarray:
+    """Returns stones of random lightness; `joint` is its width and lightness.
+
+    Every other row lags behind by a share of a stone.
+    """
+    y, x = np.indices((_SIDE, _SIDE)) / _SIDE
+    row = (y * rows).astype(int)
+    place = x * across + lag * (row % 2)
+    stones = 1.0 + spread * rng.normal(size=(rows, across))
+    shade = stones[row, place.astype(int) % across]
+    edge = np.minimum((place % 1) / across, (y * rows % 1) / rows) < joint[0]
+    shade = np.where(edge, joint[1], shade)[:, :, None]
+    return shade * (1.0 + 0.07 * _noise(rng, 0.5))
+
+
+def _grass(rng: np.random.Generator) -> np.ndarray:
+    blades = 1.0 + 0.28 * _noise(rng, 0.4) + 0.10 * _noise(rng, 1.5)
+    dry = 0.12 * _noise(rng, 1.2)
+    return (
+        np.maximum(blades, 0.2)
+        * (1.0 + dry * (1.0, 0.2, 0.3))
+        * (1.0, 1.1, 0.7)
+    )
+
+
+def _plaster(rng: np.random.Generator) -> np.ndarray:
+    streaks = _noise(rng, 1.2).mean(axis=0, keepdims=True)
+    return (
+        1.0 + 0.05 * _noise(rng, 1.5) + 0.04 * _noise(rng, 0.3) + 0.1 * streaks
+    )
+
+
+def _bark(rng: np.random.Generator) -> np.ndarray:
+    stretched = _noise(rng, 0.8)[np.arange(_SIDE) // 8]
+    return np.maximum(1.0 + 0.3 * stretched, 0.3)
+
+
+def _panes(rng: np.random.Generator) -> np.ndarray:
+    """Returns what panes mirror: sky, clouds and what is opposite."""
+    sky = np.clip(0.4 + 1.2 * _noise(rng, 1.8), 0.0, 4.0)
+    return (0.5 + sky * (0.85, 0.95, 1.05)) * (1.0 + 0.1 * _noise(rng, 0.8))
+
+
+def _leaves(rng: np.random.Generator) -> np.ndarray:
+    """Returns leaves, with gaps between them."""
+    from PIL import Image, ImageDraw
+
+    picture = Image.new("F", (_SIDE, _SIDE))
+    pen = ImageDraw.Draw(picture)
+    turn = np.linspace(0.0, 2.0 * np.pi, 9)
+    for place in rng.uniform(0, _SIDE, (900, 2)):
+        long, angle = rng.uniform(14, 22), rng.uniform(0.0, np.pi)
+        leaf = long * np.exp(1j * angle) * (np.cos(turn) + 0.45j * np.sin(turn))
+        shade = rng.uniform(0.55, 1.5)
+        for dx in (-_SIDE, 0, _SIDE):
+            for dy in (-_SIDE, 0, _SIDE):
+                x, y = leaf.real + place[0] + dx, leaf.imag + place[1] + dy
+                pen.polygon(list(zip(x, y, strict=True)), fill=shade)
+    shade = np.asarray(picture)[:, :, None]
+    return np.concatenate([shade * (1.05, 1.2, 0.6), shade > 0.0], axis=2)
+
+
+LOOKS = {
+    "asphalt": Look(6.0, _asphalt),
+    "paving": Look(
+        4.8, lambda rng: _cells(rng, 8, 8, (0.004, 0.6), lag=0.5, spread=0.06)
+    ),
+    "brick": Look(
+        2.25, lambda rng: _cells(rng, 9, 30, (0.0055, 1.5), lag=0.5, spread=0.2)
+    ),
+    "grass": Look(5.0, _grass),
+    "plaster": Look(9.0, _plaster),
+    "bark": Look(1.5, _bark),
+    "panes": Look(16.0, _panes, 0.3),
+    "leaves": Look(2.0, _leaves),
+    "hedge": Look(2.0, lambda rng: np.maximum(_leaves(rng)[:, :, :3], 0.3)),
+}
+_OF_CLASSES = {
+    "road": "asphalt",
+    "parking": "asphalt",
+    "sidewalk": "paving",
+    "other-ground": "paving",
+    "terrain": "grass",
+    "vegetation": "leaves",
+    "trunk": "bark",
+}
+
+
+def look_of(
+    name: str, semantic_class: str, rgb: tuple[float, float, float]
+) -> str:
+    """Returns the name of the look of a geometry, by name, class and colour."""
+    red, green, blue = rgb
+    if "marking" in name or "kerb" in name or "gravel" in name:
+        return "plaster"
+    if "hedge" in name:
+        return "hedge"
+    if "wood" in name:
+        return "bark"
+    if semantic_class != "building":
+        return _OF_CLASSES.get(semantic_class, "plaster")
+    if "glass" in name or (red < green < blue < 0.4):
+        return "panes"
+    return "brick" if red > 1.35 * blue and red > 1.15 * green else "plaster"
+
+
+@functools.cache
+def texture(name: str) -> tuple[bytes, float]:
+    """Returns a look's texture, a PNG, and the light of its white.
+
+    The mean of the product of both is 1.
+    """
+    from PIL import Image
+
+    seed = sum(name.encode())
+    light = LOOKS[name].paint(np.random.default_rng(seed))
+    if light.shape[2] == 1:
+        light = np.repeat(light, 3, axis=2)
+    shown = light[:, :, :3].mean(axis=2) > 0.0
+    light[:, :, :3] /= light[shown][:, :3].mean()
+    white = float(np.quantile(light[:, :, :3], 0.995))
+    light[:, :, :3] = np.clip(light[:, :, :3] / white, 0.0, 1.0) ** (1 / GAMMA)
+    stream = io.BytesIO()
+    Image.fromarray(np.round(255.0 * light).astype(np.uint8)).save(
+        stream, "PNG"
+    )
+    return stream.getvalue(), white
+
+
+@functools.cache
+def _clouds() -> np.ndarray:
+    """Returns (N, N) shares of a sky that clouds cover; it repeats."""
+    noise = _noise(np.random.default_rng(0), 1.6)[:, :, 0]
+    return np.clip(0.9 * noise - 0.1, 0.0, 1.0)
+
+
+def sky(d_W: np.ndarray) -> np.ndarray:
+    """Returns (N, 3) uint8 colours of the sky in directions (N, 3), unit."""
+    height = np.maximum(d_W[:, 2:], 0.0)
+    blue = HORIZON_RGB + height**0.45 * ((0.23, 0.43, 0.78) - HORIZON_RGB)
+    # Clouds are on a plane; a unit of height is a third of their repetition.
+    column, row = (d_W[:, :2] / (height + 0.08)).T * _SIDE / 3.0
+    clouds = _clouds()[row.astype(int) % _SIDE, column.astype(int) % _SIDE]
+    clouds = clouds[:, None] * np.clip(4.0 * height, 0.0, 0.9)
+    sun = np.maximum(d_W @ SUN_W, 0.0)[:, None]
+    glow = 0.25 * sun**16 + 0.8 * sun**800
+    colour = blue + clouds * (0.97 - blue) + glow
+    return np.round(255.0 * np.minimum(colour, 1.0)).astype(np.uint8)
+
+
+def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Returns (N, 3, 2) places in a texture [m] of corners (N, 3, 3).
+
+    The (N, 3) normals are of unit length. Rows of a texture are heights on
+    walls.
+    """
+    across = np.round(np.stack([-normals[:, 1], normals[:, 0]], axis=1), 3)
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    is_flat = length[:, 0] < 0.5
+    across = np.where(is_flat[:, None], (1.0, 0.0), across / (length + 1e-9))
+    along = np.einsum("nca,na->nc", corners[:, :, :2], across)
+    height = np.where(is_flat[:, None], corners[:, :, 1], corners[:, :, 2])
+    return np.stack([along, -height], axis=2)
