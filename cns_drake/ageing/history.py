@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.ageing import plots
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import Plot
-from cns_drake.ageing.rates import Tally
+from cns_drake.ageing.rates import MOVED, Tally
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry import (
     Part,
@@ -58,9 +58,8 @@ _YOUNG_YEARS = 10
 _LEAST_TREE = 3.0
 # A crown keeps this part of its reach off walls.
 _CROWN_PART = 0.8
-# Furniture moves by up to this [m], as its new foundation allows.
-_FARTHEST = 2.0
-_TURN = 0.1
+# Furniture that moves does so by at least this [m], and turns by up to [rad].
+_NEAREST, _TURN = 0.2, 0.1
 _TRIES = 6
 _KERB = 0.1
 # Sizes of new plots along streets: width, depth and setback [m].
@@ -652,15 +651,16 @@ class City:
         self._tell("planted", old, tree.name, f"{tree.height:g} m")
 
     def _move(self, place: str) -> None:
-        """Replaces a thing of the street within 2 m, at the same kerb."""
+        """Replaces a thing of the street near by, at the same kerb."""
         old = self._places[place]
         rng, foot = self._rng("moved", place), self._foot(old)
         middle = np.array(foot.centroid.coords[0])
         ground = self._world.ground
         offset, turn, rise = np.zeros(2), 0.0, 0.0
-        for _ in range(_TRIES):
+        farthest = self._rates[MOVED]
+        for _ in range(_TRIES if farthest else 0):
             angle = rng.uniform(-np.pi, np.pi)
-            by = float(rng.uniform(0.2, _FARTHEST))
+            by = float(rng.uniform(min(_NEAREST, farthest), farthest))
             step = by * np.array([math.cos(angle), math.sin(angle)])
             up = ground.rise(middle, middle + step)
             area = affinity.translate(foot, *step)

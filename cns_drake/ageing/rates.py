@@ -11,9 +11,11 @@ from scipy.stats import poisson
 from cns_drake.base.errors import InputError
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 
+# Not a rate: how far street furniture moves at most, and the limit of that [m].
+MOVED, _FARTHEST = "moved", 20.0
 # The events that a seed draws -> their rate a year, see rates.yaml.
 DEFAULT_RATES: Mapping[str, float] = {
-    event: values["rate"]
+    event: values["metres" if event == MOVED else "rate"]
     for event, values in parse_yaml(
         Path(__file__).with_name("rates.yaml").read_bytes()
     ).items()
@@ -25,7 +27,8 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
     """Returns event -> rate a year.
 
     Args:
-        path: a YAML file of event: rate, from 0 to 1; all others keep theirs.
+        path: a YAML file of event: rate, from 0 to 1, and moved: metres; all
+            others keep theirs.
         factor: for all rates.
 
     Raises:
@@ -33,9 +36,12 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
             rate, or the factor, is out of range.
     """
     found = check_rates({} if path is None else read_yaml(path), path)
-    rates = {e: factor * r for e, r in {**DEFAULT_RATES, **found}.items()}
+    rates = {
+        e: r if e == MOVED else factor * r
+        for e, r in {**DEFAULT_RATES, **found}.items()
+    }
     for event, rate in rates.items():
-        if not 0.0 <= rate <= 1.0:
+        if not 0.0 <= rate <= 1.0 and event != MOVED:
             raise InputError(
                 f"--rate: {factor:g} times the rate of {event} is {rate:g}, "
                 "not from 0 to 1"
@@ -58,8 +64,11 @@ def check_rates(found: object, source: object) -> dict[str, float]:
                 f"{', '.join(DEFAULT_RATES)})"
             )
         is_number = isinstance(rate, int | float) and not isinstance(rate, bool)
-        if not (is_number and 0.0 <= rate <= 1.0):
-            raise InputError(f"{source}: {event}: {rate!r} is no rate, 0 to 1")
+        kind, most = ("rate", 1.0) if event != MOVED else ("length", _FARTHEST)
+        if not (is_number and 0.0 <= rate <= most):
+            raise InputError(
+                f"{source}: {event}: {rate!r} is no {kind}, 0 to {most:g}"
+            )
     return found
 
 
@@ -109,6 +118,8 @@ class Tally:
         """
         lines = ["event,rate,exposure,expected,events,rate_came_about,p\n"]
         for event, rate in self.rates.items():
+            if event == MOVED:
+                continue
             exposure, number = self.exposure[event], self.number[event]
             expected = self.expected[event]
             share = number / exposure if exposure else float("nan")

@@ -40,7 +40,7 @@ route:
 speeds: {cruise: 8.0}
 """
 # A lot happens, so that a few years show all kinds of events.
-_BUSY = {**dict.fromkeys(DEFAULT_RATES, 0.1), "built": 0.3}
+_BUSY = {**dict.fromkeys(DEFAULT_RATES, 0.1), "built": 0.3, "moved": 2.0}
 
 
 @pytest.fixture(scope="module")
@@ -88,28 +88,43 @@ def test_today_is_the_last_stage_of_the_map(town, long):
     assert (long / "stage_01.sdf").read_bytes() == today
 
 
-def test_stages_follow_from_the_history(town, long):
-    """What was gone or came, by the history, is gone or there."""
+# What the rows of an event take from the list of structures, and add to it.
+_TAKES = {"demolished", "felled", "removed", "furniture", "taken_down"}
+_ADDS_ITSELF = {"built", "put_up"}
+_ADDS_SUCCESSOR = {
+    "replaced",
+    "frame",
+    "extended",
+    "renewed",
+    "planted",
+    "furniture",
+    "junction",
+}
+
+
+def test_stages_follow_from_the_history(long):
+    """The rows alone turn the list of one stage into that of the next."""
 
     def names(stage):
         text = (long / f"stage_{stage}.sdf").read_text()
         return set(re.findall('visual name="([^/"]+)/', text))
 
-    today, then = names("01"), names("03")
-    gone, come = set(), set()
-    for row in _rows(long):
-        one, successor = row["structure"], row["successor"]
-        if row["event"] in ("demolished", "felled", "removed", "furniture"):
-            gone.add(one)
-            come.discard(one)
-        if row["event"] == "built":
-            come.add(one)
-        if row["event"] in ("replaced", "planted", "furniture"):
-            come.add(successor)
-    assert today & gone
-    assert today - then == today & gone
-    assert come
-    assert come <= then
+    rows, told = _rows(long), names("01")
+    for stage, years in (("02", range(1, 4)), ("03", range(4, 9))):
+        for row in rows:
+            if int(row["year"]) not in years:
+                continue
+            one, successor = row["structure"], row["successor"]
+            if row["event"] in _TAKES:
+                told.remove(one)
+            if row["event"] in _ADDS_ITSELF:
+                told.add(one)
+            if row["event"] in _ADDS_SUCCESSOR and successor:
+                told.add(successor)
+        assert told == names(stage)
+    assert {"put_up", "taken_down", "frame", "replaced"} <= {
+        row["event"] for row in rows
+    }
 
 
 def test_drives_of_an_aged_map(long):
@@ -187,6 +202,8 @@ def test_rates_come_about(town, seed):
     tally = city.tally
     assert tally.expected["lamps"] > 5
     for event, rate in DEFAULT_RATES.items():
+        if event == "moved":
+            continue
         expected = rate * tally.exposure.get(event, 0)
         if event == "built":
             expected = tally.expected.get("built", 0.0)
@@ -208,6 +225,37 @@ def test_nothing_happens_at_rate_zero(town):
     for _ in range(5):
         city.live()
     assert {e.event for e in city.events} <= {"grown"}
+
+
+@pytest.mark.parametrize(
+    ("farthest", "least"), [(0.0, 0.0), (0.1, 0.1), (0.2, 0.2), (5.0, 0.2)]
+)
+def test_furniture_moves_as_far_as_allowed(town, farthest, least):
+    rates = {
+        **dict.fromkeys(DEFAULT_RATES, 0.0),
+        "lamps": 1.0,
+        "moved": farthest,
+    }
+    world = OldWorld(MapFolder(town))
+    city = City(world, rates, 1, shapely.Polygon())
+    city.live()
+    moves = [e for e in city.events if e.event == "furniture"]
+    assert moves
+    by = []
+    for one in moves:
+        middles = (
+            np.array(foot.centroid.coords[0])
+            for foot in (
+                world.things[one.structure].footprint,
+                city.new[one.successor].footprint_W,
+            )
+        )
+        by.append(np.linalg.norm(np.subtract(*middles)))
+    by = np.array(by)
+    stays = by < 0.01  # No place was free, or none is allowed.
+    assert stays.all() == (farthest == 0.0)
+    assert (by[~stays] < farthest + 0.01).all()
+    assert (by[~stays] > least - 0.01).all()
 
 
 def test_the_past_lacks_younger_buildings(town, tmp_path):
@@ -256,6 +304,8 @@ def test_faulty_years(years):
         ("built: 1.5", "built: 1.5 is no rate"),
         ("built: -0.1", "built: -0.1 is no rate"),
         ("built: yes", "built: True is no rate"),
+        ("moved: 20.1", "moved: 20.1 is no length"),
+        ("moved: -1", "moved: -1 is no length"),
         ("- built", "not a mapping"),
     ],
 )
@@ -271,6 +321,7 @@ def test_rates_of_a_file_and_a_factor(tmp_path):
     path.write_text("felled: 0.04")
     rates = read_rates(path, 2.0)
     assert rates["felled"] == 0.08
+    assert rates["moved"] == DEFAULT_RATES["moved"]  # A length has no factor.
     assert rates["built"] == 2 * DEFAULT_RATES["built"]
     with pytest.raises(InputError, match="--rate"):
         read_rates(path, 100.0)

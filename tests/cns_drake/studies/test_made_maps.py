@@ -62,6 +62,7 @@ def test_a_city_ages_once_for_all_of_its_years(town, tmp_path, steps):
     (run,) = steps
     assert all(isinstance(one, AgeCity) for one in run)
     doubled = {name: 2 * rate for name, rate in DEFAULT_RATES.items()}
+    doubled["moved"] = DEFAULT_RATES["moved"]  # A length.
     found = {
         (one.years, one.seed, tuple(sorted(dict(one.rates).items())))
         for one in run
