@@ -10,7 +10,7 @@ import re
 from typing import NoReturn, cast
 from xml.etree import ElementTree
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.scene.mesh_files import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
@@ -150,11 +150,9 @@ class _ModelCheck:
         # Visible meshes are checked when they are read.
         elif "collision" in parents and uri.lower().endswith(".obj"):
             place = self._path.parent / uri
-            try:
+            with value_errors(place):
                 if place.is_file():
                     check_obj(place)
-            except ValueError as error:
-                raise InputError(f"{place}: {error}") from error
 
     def _refuse(self, element: Element, fault: str) -> NoReturn:
         raise InputError(

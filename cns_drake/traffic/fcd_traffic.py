@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.elementary import cos, sin
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
@@ -97,14 +97,12 @@ def read_fcd(path: Path) -> FcdTrace:
     """
     root = read_elements(path, "fcd-export")
     steps = list(root.all("timestep"))
-    try:
+    with value_errors(path):
         times = np.array([step.number("time") for step in steps])
         begin, dt = _even(path, times)
         vehicles = _objects(steps, "vehicle")
         notes = _leave_out(path, steps)
         persons = _objects(steps, "person")
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from None
     if not vehicles and not persons:
         raise InputError(
             f"{path}: the trace has no vehicle and no person in any timestep"

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base.errors import InputError, validated, value_errors
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
 from cns_drake.traffic import lane_graph
@@ -132,10 +132,8 @@ def read_lanes(path: Path) -> LaneFile:
     Raises:
         InputError: the file cannot be read or is not a file of lanes.
     """
-    try:
+    with value_errors(f"{path}: not JSON"):
         found = validated(_File, parse_json(read_bytes(path)), path)
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON: {error}") from None
     count = len(found.lanes)
     for k, lane in enumerate(found.lanes):
         wrong = [one for one in lane.after if one >= count]

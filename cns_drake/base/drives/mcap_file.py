@@ -380,7 +380,7 @@ class McapFile:
         """Reads and uncompresses a chunk whose checksum is right."""
         with self._reading() as stream:
             start = stream.seek(self._contents.blocks[number])
-            opcode = stream.read(1)[0]
+            opcode = int.from_bytes(stream.read(1), "little")
             stream.seek(start)
             body = _read_body(stream, _RECORD_LIMIT_BYTES, "a chunk")
             if opcode == Opcode.MESSAGE:

@@ -13,7 +13,7 @@ import re
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.imports.opendrive import road_model
@@ -216,17 +216,13 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     names: set[str] = set()
     together = 0.0
     for kind in ("road", "junction"):
-        try:
+        with value_errors(path):
             _check_ids(top.all(kind))
-        except ValueError as error:
-            raise InputError(f"{path}: {error}") from error
     for element in top.all("road"):
         name = _plain(element.attrib.get("id", ""), names)
         names.add(name)
-        try:
+        with value_errors(f"{path}: road {name}"):
             road = _road(element, name, faults)
-        except ValueError as error:
-            raise InputError(f"{path}: road {name}: {error}") from error
         if road is not None:
             roads.append(road)
             together += road.length

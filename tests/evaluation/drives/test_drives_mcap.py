@@ -510,3 +510,11 @@ def test_pose_arithmetic():
     )
     with pytest.raises(ValueError, match="quaternion"):
         poses.rotation_from_quaternion(np.zeros(4))
+
+
+def test_an_index_that_points_behind_the_file(tmp_path):
+    path, _, _ = record(tmp_path / "s")
+    drive = open_drive(path)
+    drive._file._contents.blocks[0] = 10**12
+    with pytest.raises(InputError, match=f"^{path}: damaged MCAP file"):
+        drive.scan(0)
