@@ -1,6 +1,7 @@
 """`cns-eval real` on folders that the test fills: towns of boxes."""
 
 import hashlib
+import struct
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import run
@@ -183,3 +184,60 @@ def test_faults_are_one_line(tmp_path, capsys):
     status, out, err = ask(capsys, tmp_path, output, methods=("nothing",))
     assert (status, out) == (2, "")
     assert "no method 'nothing'" in err
+
+
+def test_other_formats_without_poses(tmp_path):
+    (tmp_path / "nclt").mkdir()
+    hits = struct.pack("<HHHBB", 20400, 19800, 20040, 31, 0)
+    (tmp_path / "nclt" / "1326652795280148.bin").write_bytes(hits)
+    folder = tmp_path / "helipr_two_lidars"
+    folder.mkdir()
+    avia = struct.pack("<fffBBBI", 1.0, 2.0, 3.0, 7, 0, 1, 5)
+    aeva = struct.pack("<5fiBf", 1.0, 2.0, 4.0, 0.5, -1.0, 3, 2, 9.0)
+    for number in (0, 1, 10):
+        (folder / f"avia_{number:06d}.bin").write_bytes(avia)
+        (folder / f"aeva_{number:06d}.bin").write_bytes(aeva)
+    found = data_sets.open_data_sets(tmp_path, lambda note: None)
+    z = [one.drive.scan(0)["z"][0] for one in found]
+    np.testing.assert_allclose(z, [-0.2 - 0.957, 3.0, 4.0], atol=1e-5)
+    assert [len(one.drive) for one in found] == [1, 3, 3]
+    # Nothing is asked of scans without poses.
+    measuring = Measuring(("solid",), silent, lambda note: None)
+    measuring.run(tmp_path, None)
+    assert measuring.rows == []
+
+
+@pytest.mark.slow
+def test_the_judge_tells_boxes_from_noise(tmp_path, monkeypatch):
+    from evaluation.real import judge
+
+    for name in ("_PATCHES", "_NEIGHBOURHOODS", "_TREES"):
+        monkeypatch.setattr(judge, name, 5)
+    folder = tmp_path / "scans" / "nuscenes_1072"
+    (folder / "velodyne").mkdir(parents=True)
+    rng = np.random.default_rng(3)
+    rows = []
+    for k in range(3):
+        scan = town(k) + rng.normal(0.0, 0.3, town(k).shape)
+        four = np.c_[scan, rng.uniform(0.0, 99.0, len(scan))].astype("<f4")
+        four.tofile(folder / "velodyne" / f"{k:06d}.bin")
+        rows.append(f"1 0 0 {40 * k} 0 1 0 0 0 0 1 1.84")
+    (folder / "poses.txt").write_text("\n".join(rows))
+    scenario = {"map": "one", "lidars": {"lidar": {"preset": "hdl-32e"}}}
+    write_recording(
+        tmp_path / "drives" / "one_01",
+        [make_scan(town(7 + k)) for k in range(4)],
+        [yaw_pose(40.0 * k, 0.0, 0.0, 0.0) for k in range(4)],
+        attachments={"scenario.json": scenario},
+    )
+    notes = []
+    measuring = Measuring(("icp",), silent, notes.append)
+    measuring.run(tmp_path / "scans", tmp_path / "drives")
+    found = measuring.results().where(task="judge")
+    (row,) = found.where(method="all", metric="auc").rows
+    assert row.value > 0.9
+    assert (row.database, row.query) == ("simulated", "nuscenes_1072")
+    (control,) = found.where(method="all", metric="auc_control").rows
+    assert control.value < row.value
+    # No scan is within 7.5 m of another one.
+    assert {one.task for one in measuring.rows} == {"judge"}
