@@ -58,7 +58,6 @@ from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.charts import draw
 from evaluation.results.page import write_page
 from evaluation.results.table import (
     QUERIES,
@@ -233,23 +232,11 @@ class Study:
             self.output,
             title=self.experiment.name,
             about=self.experiment.about,
-            charts=self._charts(results),
+            charts=self.experiment.charts,
             experiment_text=self.experiment.text,
             notes=[self._protocol.to_text()],
+            on_note=self.on_note,
         )
-
-    def _charts(self, results: Results) -> list[Mapping[str, Any]]:
-        """Returns the charts that the table allows, and notes others."""
-        found: list[Mapping[str, Any]] = []
-        for chart in self.experiment.charts:
-            try:
-                draw(chart, results)
-            except InputError as error:
-                # Other tasks or maps may be measured than those of the file.
-                self.on_note(f"{self.source}: {error}: left out")
-            else:
-                found.append(chart)
-        return found
 
     def _choose_methods(self) -> dict[str, tuple[MethodChoice, MethodVariant]]:
         """Returns key -> method of the experiment, with its variant."""
