@@ -25,8 +25,6 @@ from cns_drake.scenarios.shipped import (
 )
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import (
-    LAST,
-    OWN,
     Compared,
     MissingError,
     PairOfDrives,
@@ -58,6 +56,7 @@ from cns_drake.studies.tasks.task import Jobs, NamedDrive, Pair, Task
 from cns_drake.studies.tasks.update import MapTask
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.report.rows import LAST, OWN, STAGE
 from evaluation.results.page import write_page
 from evaluation.results.table import (
     QUERIES,
@@ -83,7 +82,6 @@ TASKS: Mapping[str, type[Task]] = {
         *(MapTask, ChangeTask, CostTask),
     )
 }
-_STAGE = "both.stage"
 # A study that takes longer is announced [s].
 _LONG = 3600.0
 # Tables that earlier versions wrote.
@@ -529,7 +527,7 @@ class Study:
             given = [f"{side}.{name}" for side in sides for name in sides[side]]
             given += [CAUSE] if condition.causes else []
             for name in given:
-                if name != _STAGE:
+                if name != STAGE:
                     name = next(
                         (n for n in condition.factors if n.startswith(name)),
                         name,
@@ -541,7 +539,7 @@ class Study:
             stage = sides["both"].get("stage", OWN)
             if stage not in (OWN, LAST):
                 raise InputError(
-                    f"{self.source}: {_STAGE}: {stage!r}: recordings have"
+                    f"{self.source}: {STAGE}: {stage!r}: recordings have"
                     f" {OWN} and {LAST}"
                 )
 

@@ -14,10 +14,11 @@ from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_recognition import RecognitionResult
 from evaluation.report.page import Report
-from evaluation.report.page_data import Illustration
+from evaluation.report.page_data import Illustration, Section
 from evaluation.report.rows import STAGE
 from evaluation.results.charts import draw
 from evaluation.results.drawing import method_style, plain, save
+from evaluation.results.table import Results
 from evaluation.results.table_forms import in_table_order, title
 
 _SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
@@ -86,11 +87,13 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
 
     A reference has its own, beside ours.
     """
-    title = "AUC against TCR_sym"
-    charts = [("auc_over_tcr", title, "figures", _SCATTER, report.results)]
+    name = "AUC against TCR_sym"
+    charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
+        ("auc_over_tcr", name, "figures", _SCATTER, report.results)
+    ]
     if report.compared:
         published = report.reference.to_results()
-        name = f"{title}, of {report.reference.title}"
+        name = f"{name}, of {report.reference.title}"
         stem = "auc_over_tcr_published"
         charts.insert(0, (stem, name, "figures", _SCATTER, published))
     if any(control for _, control in report.pairs):
@@ -98,20 +101,25 @@ def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
             ("survival", _SURVIVAL, "survival", _DUMBBELL, report.results)
         )
     shown = []
-    for stem, title, section, chart, results in charts:
+    for stem, words, section, chart, results in charts if report.pairs else ():
         gates = {"gate": tuple(results.distinct("gate"))}
         try:
-            drawn = draw(chart | gates, results, _WIDTH, alone=True)
-        except InputError:
-            continue  # Nothing was compared, or no change is defined.
+            drawn = draw({**chart, **gates}, results, _WIDTH, alone=True)
+        except InputError as error:
+            report.notes = [*report.notes, f"{words}: left out: {error}"]
+            continue
         save(drawn.figure, folder / stem)
-        legend = tuple(
-            (tuple(round(255 * part) for part in to_rgb(colour)), name)
-            for name, (colour, *_) in drawn.legend.items()
-        )
+        legend = []
+        for label, (colour, *_) in drawn.legend.items():
+            red, green, blue = (round(255 * part) for part in to_rgb(colour))
+            legend.append(((red, green, blue), label))
         shown.append(
             Illustration(
-                folder / stem, title, "svg", section=section, legend=legend
+                folder / stem,
+                words,
+                "svg",
+                section=section,
+                legend=tuple(legend),
             )
         )
     return shown

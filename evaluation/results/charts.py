@@ -280,7 +280,7 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
             for v in (before, after)
         ]
         shares[name] = (
-            float(kept_share(both[1], both[0])),
+            float(kept_share(float(both[1]), float(both[0]))),
             f"{both[1]:.2f} of {both[0]:.2f}",
         )
     best, worst = _ends(shares)

@@ -75,6 +75,11 @@ class Run:
         """Whether it repeats that by the study's own protocol."""
         return self.queries != self.method.key
 
+    @property
+    def shares_places(self) -> bool:
+        """Whether its places are those of the study's own protocol."""
+        return self.places == self.method.key
+
 
 @dataclass(frozen=True)
 class City:

@@ -205,11 +205,11 @@ class Study:
         roles = defaultdict(set)
         for pair in city.recognition_pairs():
             for run in self._runs(city, pair):
-                ours: tuple[tuple[str, Role], ...]
-                ours = (run.places, "places"), (run.queries, "queries")
-                for one, (key, role) in zip(pair, ours, strict=True):
-                    if run.repeats and one is drive and key == run.queries:
-                        roles[run.method, run.protocol].add(role)
+                key = run.method, run.protocol
+                if run.repeats and pair[1] is drive:
+                    roles[key].add("queries")
+                if run.repeats and pair[0] is drive and not run.shares_places:
+                    roles[key].add("places")
         return tuple(
             (method, frozenset(needed), protocol)
             for (method, protocol), needed in roles.items()
@@ -345,8 +345,11 @@ class Study:
                 elif result is not None:
                     compared.append(result)
                     if pair[0] is not pair[1]:
-                        part = control and self._result(control, run.queries)
-                        report.pairs.append((result, part and part.read()))
+                        unchanged = None
+                        if control is not None:
+                            beside = self._result(control, run.queries)
+                            unchanged = beside.read()
+                        report.pairs.append((result, unchanged))
             evidence = self._evidence(pair).read()
             if evidence is not None:
                 report.evidence[pair[0].name, pair[1].name] = evidence
